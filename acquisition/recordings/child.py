@@ -1,90 +1,190 @@
-"""The reading process: ``python -m acquisition.recordings.child FILE``, the job on standard input.
+"""The confined child: ``python -m acquisition.recordings.child``, requests on standard input.
 
-Whatever a hostile file does to a reader happens here, with bounded memory and time and without
-writing anything; what comes out are messages of :mod:`acquisition.recordings.stream`.
+Each request is a line of JSON. A fork with bounded memory and time that cannot write files answers
+it with :mod:`acquisition.recordings.messages`. A hostile file can harm
+that fork only.
 """
 
+import json
+import os
+import signal
 import sys
-from collections.abc import Callable
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
+import numpy as np
 from pydantic import TypeAdapter
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.confined import confine
-from acquisition.recordings.imports.job import Format, ImportJob
+from acquisition.recordings import tables  # loaded once, before the forks
+from acquisition.recordings.confined import confine, memory_in_use_bytes
+from acquisition.recordings.imports.can_log import read_frames
+from acquisition.recordings.imports.csv_file import CsvTable
+from acquisition.recordings.imports.hdf5_file import Hdf5File
+from acquisition.recordings.imports.job import ImportJob
+from acquisition.recordings.imports.mdf_file import MdfFile
 from acquisition.recordings.imports.rows import Table, raw_blocks
-from acquisition.recordings.stream import block_message, frames_message, send
+from acquisition.recordings.imports.series import SeriesTable
+from acquisition.recordings.imports.tdms_file import TdmsFile
+from acquisition.recordings.manifest import (
+    BLOCKS,
+    BLOCKS_PER_GROUP,
+    ROWS_PER_GROUP,
+    SAMPLES,
+    Manifest,
+)
+from acquisition.recordings.messages import (
+    FAILED,
+    READY,
+    Message,
+    block_message,
+    blocks_message,
+    frames_message,
+    send,
+)
+from core.arrays import RawArray
 
-MEMORY_BYTES = 2 * 2**30
 CPU_S = 3600
 _LOG_BYTES = 1_000_000
 
+_TABLES: Mapping[str, Callable[[Path, ImportJob], Table]] = {
+    "csv": CsvTable,
+    "hdf5": lambda path, job: SeriesTable(Hdf5File(path), job),
+    "tdms": lambda path, job: SeriesTable(TdmsFile(path), job),
+    "mdf4": lambda path, job: SeriesTable(MdfFile(path, job), job),
+}
+
 
 def main() -> None:
-    """Read one file."""
-    confine(MEMORY_BYTES, CPU_S, _LOG_BYTES)
-    job = TypeAdapter(ImportJob).validate_json(sys.stdin.buffer.read())
-    answer(Path(sys.argv[1]), job, sys.stdout.buffer)
+    """Answer requests, each in a fork, until standard input ends or one of them ends badly."""
+    sys.stdout.buffer.write(READY)
+    sys.stdout.buffer.flush()
+    for line in sys.stdin.buffer:
+        child = os.fork()
+        if child == 0:
+            _answer_and_exit(line)
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        if code < 0:
+            with suppress(OSError):  # SIGKILL has no other handler
+                signal.signal(-code, signal.SIG_DFL)
+            os.kill(os.getpid(), -code)
+        elif code:
+            sys.exit(code)
+        send(sys.stdout.buffer, {"kind": "end"})  # not before the fork has closed the file
+        sys.stdout.buffer.flush()
 
 
-def answer(path: Path, job: ImportJob, out: BinaryIO) -> None:
-    """Write the messages of one file; a file that is refused ends in an error message."""
+def _answer_and_exit(line: bytes) -> None:
+    code = 1
     try:
-        _read(path, job, out)
-    except ConfigError as error:
-        send(out, {"kind": "error", "message": str(error)[:1000]})
-    except MemoryError:
-        send(out, {"kind": "error", "message": f"needs more than {MEMORY_BYTES >> 30} GiB to read"})
+        request = json.loads(line)
+        confine(memory_in_use_bytes() + _memory_bytes(request), CPU_S, _LOG_BYTES)
+        code = FAILED  # from here on by the file
+        answer(request, sys.stdout.buffer)
+        code = 0
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        sys.stderr.flush()
+        os._exit(code)
+
+
+def _memory_bytes(request: Mapping[str, Any]) -> int:
+    """Memory for reading a file; a recording has narrow bounds, foreign formats have none."""
+    return 2**31 if request["format"] in _TABLES else 2**28
+
+
+def answer(request: Mapping[str, Any], out: BinaryIO) -> None:
+    """Write the messages of one file; a file that is refused ends in an error message.
+
+    Parameters
+    ----------
+    request
+        ``path``, ``format``, and ``job`` of an import; of a recording ``manifest``, the blocks from
+        ``first`` to before ``stop``, and whether with their ``samples``.
+    """
+    path = Path(request["path"])
+    is_recording = request["format"] == "recording"
+    try:
+        for head, body in _recording(path, request) if is_recording else _import(path, request):
+            send(out, head, body)
+    except (ConfigError, MemoryError) as error:
+        words, number = str(error), getattr(error.__cause__, "errno", None)
+        if isinstance(error, MemoryError) or isinstance(error.__cause__, MemoryError):
+            words = f"needs more than {_memory_bytes(request) >> 20} MiB of memory to read"
+        words = words if words.startswith(str(path)) else f"{path}: {words}"
+        send(out, {"kind": "error", "message": words[:1000], "errno": number})
     out.flush()
 
 
-def _read(path: Path, job: ImportJob, out: BinaryIO) -> None:
+def _import(path: Path, request: Mapping[str, Any]) -> Iterator[Message]:
+    job = TypeAdapter(ImportJob).validate_python(request["job"])
     if job.format in ("candump", "blf"):
-        from acquisition.recordings.imports.can_log import read_frames
-
-        send(out, {"kind": "start", "sample_type": ""})
         for batch, done in read_frames(path, job):
-            send(out, *frames_message(batch, done))
+            yield frames_message(batch, done)
     else:
-        table = _TABLES[job.format](path, job)
-        send(out, {"kind": "start", "sample_type": table.sample_type})
-        for block, done in raw_blocks(table.rows(), job):
-            send(out, *block_message(block, done))
-    send(out, {"kind": "end"})
+        for block, done in raw_blocks(_TABLES[job.format](path, job).rows(), job):
+            yield block_message(block, done)
 
 
-def _csv(path: Path, job: ImportJob) -> Table:
-    from acquisition.recordings.imports.csv_file import CsvTable
+def _recording(folder: Path, request: Mapping[str, Any]) -> Iterator[Message]:
+    manifest = Manifest.model_validate(request["manifest"])
+    first, stop = request["first"], request["stop"]
+    samples, blocks = tables.samples_schema(manifest), tables.blocks_schema(manifest)
+    with (
+        tables.parquet_file(folder / SAMPLES, samples, manifest.n_samples, ROWS_PER_GROUP) as file,
+        tables.parquet_file(folder / BLOCKS, blocks, manifest.n_blocks, BLOCKS_PER_GROUP) as heads,
+    ):
+        counts = _Counts(file, manifest) if request["samples"] else None
+        number = first_row = 0
+        for rows, rejected in tables.read_heads(heads, len(manifest.slow_channels)):
+            n_samples = rows["n_samples"]
+            for start, end in _pieces(n_samples, max(0, first - number), stop - number):
+                begin = first_row + int(n_samples[:start].sum())
+                yield blocks_message(
+                    rows[start:end],
+                    [(row - start, why, n) for row, why, n in rejected if start <= row < end],
+                    counts.read(begin, int(n_samples[start:end].sum())) if counts else None,
+                )
+            number, first_row = number + len(rows), first_row + int(n_samples.sum())
+            if number >= stop:
+                return
 
-    return CsvTable(path, job)
+
+def _pieces(n_samples: Any, start: int, stop: int) -> Iterator[tuple[int, int]]:
+    """Blocks that go into one message: all of these, or one by one if they are long."""
+    stop = min(stop, len(n_samples))
+    if start < stop and n_samples[start:stop].sum() <= ROWS_PER_GROUP:
+        yield start, stop
+    else:
+        yield from ((n, n + 1) for n in range(start, stop))
 
 
-def _hdf5(path: Path, job: ImportJob) -> Table:
-    from acquisition.recordings.imports.hdf5_file import Hdf5Table
+class _Counts:
+    """Counts by row, with one row group in memory."""
 
-    return Hdf5Table(path, job)
+    def __init__(self, file: Any, manifest: Manifest) -> None:
+        self._file, self._n_rows = file, manifest.n_samples
+        self._group: int | None = None
+        self._held: RawArray = np.empty((len(manifest.channels), 0), dtype=manifest.sample_type)
 
+    def read(self, first_row: int, n_rows: int) -> RawArray:
+        if first_row + n_rows > self._n_rows:
+            raise ConfigError("blocks of more samples than there are")
+        parts: list[Any] = []
+        while n_rows > 0:
+            group, offset = divmod(first_row, ROWS_PER_GROUP)
+            if group != self._group:
+                self._held, self._group = tables.read_counts(self._file, group), group
+            part = self._held[:, offset : offset + n_rows]
+            parts.append(part)
+            first_row += part.shape[1]
+            n_rows -= part.shape[1]
+        return np.concatenate(parts, axis=1)
 
-def _tdms(path: Path, job: ImportJob) -> Table:
-    from acquisition.recordings.imports.tdms_file import TdmsTable
-
-    return TdmsTable(path, job)
-
-
-def _mdf4(path: Path, job: ImportJob) -> Table:
-    from acquisition.recordings.imports.mdf_file import MdfTable
-
-    return MdfTable(path, job)
-
-
-_TABLES: dict[Format, Callable[[Path, ImportJob], Table]] = {
-    "csv": _csv,
-    "hdf5": _hdf5,
-    "tdms": _tdms,
-    "mdf4": _mdf4,
-}
 
 if __name__ == "__main__":
     main()

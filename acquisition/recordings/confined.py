@@ -1,4 +1,4 @@
-"""A process of its own for reading a foreign file, which may fail there in any way it likes."""
+"""Child processes that read foreign files, with limits on memory, processor time and files."""
 
 import os
 import resource
@@ -6,82 +6,97 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-_LAST_BYTES = 4000
+_LOG_BYTES_SHOWN = 4000
 
 
-class ReadingProcess:
-    """The reading process as its parent sees it; see :func:`reading_process`."""
-
-    def __init__(self, process: "subprocess.Popen[bytes]", log: IO[bytes]) -> None:
-        self._process, self._log = process, log
-
-    @property
-    def job(self) -> IO[bytes]:
-        """Where it is told what to do."""
-        return _piped(self._process.stdin)
-
-    @property
-    def found(self) -> IO[bytes]:
-        """What it finds."""
-        return _piped(self._process.stdout)
-
-    def exit_code(self) -> int:
-        """Wait for its end; negative, if a signal ended it."""
-        return self._process.wait()
-
-    def last_words(self) -> str:
-        """Wait for its end; what it said last, or what ended it, in one printable line."""
-        code = self._process.wait()
-        if code < 0:
-            return f"reading it was ended by {signal.Signals(-code).name}"
-        size = self._log.seek(0, os.SEEK_END)
-        self._log.seek(max(0, size - _LAST_BYTES))
-        text = self._log.read(_LAST_BYTES).decode("utf-8", "replace")
-        lines = [line.strip() for line in text.splitlines() if line.strip()]
-        return printable(lines[-1] if lines else f"reading it ended with code {code}")
-
-
-@contextmanager
-def reading_process(
-    module: str, path: Path, environment: Mapping[str, str]
-) -> Iterator[ReadingProcess]:
-    """Start ``python -m module path``; leaving the context ends it.
+class ConfinedProcess:
+    """Child process ``python -m module arguments``; to be closed.
 
     Parameters
     ----------
     environment
-        Beside what this process has.
+        Added to the environment of this process.
+
+    Raises
+    ------
+    OSError
+        If the system cannot start another process now.
     """
-    search = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    with tempfile.TemporaryFile() as log:
-        process = subprocess.Popen(  # noqa: S603  our own module
-            [sys.executable, "-m", module, str(path.absolute())],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=log,
-            env=os.environ | dict(environment) | search,
-        )
+
+    def __init__(self, module: str, *arguments: str, environment: Mapping[str, str]) -> None:
+        search = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        self._log = tempfile.TemporaryFile()  # noqa: SIM115  closed with the process
         try:
-            yield ReadingProcess(process, log)
-        finally:
-            process.kill()
-            process.wait()
-            for pipe in (process.stdin, process.stdout):
+            self._process = subprocess.Popen(  # noqa: S603  our own module
+                [sys.executable, "-m", module, *arguments],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=self._log,
+                env=os.environ | dict(environment) | search,
+                process_group=0,
+            )
+        except BaseException:
+            self._log.close()
+            raise
+
+    @property
+    def input(self) -> IO[bytes]:
+        """Standard input of the child."""
+        return _piped(self._process.stdin)
+
+    @property
+    def output(self) -> IO[bytes]:
+        """Standard output of the child."""
+        return _piped(self._process.stdout)
+
+    def exit_code(self) -> int:
+        """Wait for the end of the child; negative if a signal ended it."""
+        return self._process.wait()
+
+    def is_running(self) -> bool:
+        """Whether the child has not ended yet."""
+        return self._process.poll() is None
+
+    def clear_log(self) -> None:
+        """Forget what the child has written to standard error so far."""
+        self._log.seek(0)
+        self._log.truncate()
+
+    def last_words(self) -> str:
+        """Wait for the end of the child; its last line of log, or the signal that ended it."""
+        code = self._process.wait()
+        if code < 0:
+            return f"reading it was ended by {signal.Signals(-code).name}"
+        size = self._log.seek(0, os.SEEK_END)
+        self._log.seek(max(0, size - _LOG_BYTES_SHOWN))
+        text = self._log.read(_LOG_BYTES_SHOWN).decode("utf-8", "replace")
+        lines = [line.strip() for line in text.splitlines() if line.strip()]
+        return printable(lines[-1] if lines else f"reading it ended with code {code}")
+
+    def close(self) -> None:
+        """End the child and what it has started."""
+        if self.is_running():
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with suppress(BrokenPipeError):
                 _piped(pipe).close()
+        self._log.close()
 
 
 def confine(memory_bytes: int, cpu_s: int, log_bytes: int) -> None:
-    """Limit what this process, the reading one, may use.
+    """Limit what this process may use from now on.
 
     Parameters
     ----------
     log_bytes
-        Most that it may write to a file: its own last words, and no unpacked archives.
+        Largest file that it may write: enough for its log, too small for an unpacked archive.
     """
     for kind, limit in (
         (resource.RLIMIT_AS, memory_bytes),
@@ -89,14 +104,21 @@ def confine(memory_bytes: int, cpu_s: int, log_bytes: int) -> None:
         (resource.RLIMIT_CORE, 0),
         (resource.RLIMIT_FSIZE, log_bytes),
     ):
-        most = resource.getrlimit(kind)[1]  # of whoever started us, and never to be raised
-        limit = limit if most == resource.RLIM_INFINITY else min(limit, most)
-        resource.setrlimit(kind, (limit, limit))
+        highest = resource.getrlimit(kind)[1]  # inherited; an unprivileged process cannot raise it
+        limit = limit if highest == resource.RLIM_INFINITY else min(limit, highest)
+        is_lower = kind == resource.RLIMIT_CPU and limit != highest
+        resource.setrlimit(kind, (limit, limit + is_lower))  # SIGXCPU comes before SIGKILL
 
 
-def printable(text: str) -> str:
-    """A line as a terminal may have it: what a file says may be anything."""
-    return "".join(c if c.isprintable() else "�" for c in text)[:300]
+def memory_in_use_bytes() -> int:
+    """Address space of this process, which is what `confine` limits."""
+    n_pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
+    return n_pages * resource.getpagesize()
+
+
+def printable(text: str, max_length: int = 300) -> str:
+    """Text without control characters, safe to print on a terminal."""
+    return "".join(c if c.isprintable() else "�" for c in text)[:max_length]
 
 
 def _piped(pipe: IO[bytes] | None) -> IO[bytes]:

@@ -1,4 +1,4 @@
-"""Recordings as CSV and Parquet: engineering units, UTC, a row for each sample, gaps in sight."""
+"""Recordings as CSV and Parquet: engineering units, UTC, a row for each sample."""
 
 import math
 import os
@@ -32,7 +32,7 @@ UNITS = {
     Measurand.ACCELERATION_M_S2: "m/s2",
     Measurand.KEY_PHASE_V: "V",
 }
-"""Of waveform channels, spelt so that every tool can print them."""
+"""ASCII units of waveform channels."""
 
 _BLOCKS_AT_ONCE = 512
 _OWN = ("time_utc", "epoch", "index")
@@ -40,7 +40,7 @@ _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 
 class ExportFormat(StrEnum):
-    """What a recording can be exported as."""
+    """File formats of exports."""
 
     CSV = "csv"
     PARQUET = "parquet"
@@ -59,7 +59,7 @@ def export_recording(
     out
         Must not exist yet.
     advanced
-        Told how many samples per channel have been written since it was last called.
+        Called with the number of samples per channel written since its last call.
 
     Raises
     ------
@@ -73,7 +73,11 @@ def export_recording(
     schema, writer = _FORMATS[kind]
     try:
         with foreign_errors_of(out):
-            _export(recording, schema(recording.manifest), writer, aside, advanced)
+            columns = schema(recording.manifest)
+            with writer(aside, columns) as file:
+                for table in export_tables(recording, columns):
+                    file.write_table(table)
+                    advanced(table.num_rows)
             aside.rename(out)
     finally:
         with suppress(FileNotFoundError):
@@ -130,7 +134,7 @@ def parquet_schema(manifest: Manifest) -> Any:
     Raises
     ------
     ConfigError
-        If a channel has the name of a column that is there anyway.
+        If a channel has the name of a column of every export.
     """
     columns = _columns(manifest)
     for id_, _ in columns:
@@ -140,19 +144,6 @@ def parquet_schema(manifest: Manifest) -> Any:
     for at, (_, unit) in enumerate(columns, start=len(_OWN)):
         schema = schema.set(at, schema.field(at).with_metadata({"unit": unit}))
     return schema.with_metadata({"unit": manifest.unit, "made_by": manifest.made_by})
-
-
-def _export(
-    recording: Recording,
-    schema: Any,
-    writer: Callable[[Path, Any], Any],
-    path: Path,
-    advanced: Callable[[int], None],
-) -> None:
-    with writer(path, schema) as file:
-        for table in export_tables(recording, schema):
-            file.write_table(table)
-            advanced(table.num_rows)
 
 
 def _parquet_writer(path: Path, schema: Any) -> Any:

@@ -1,4 +1,4 @@
-"""From calibrated blocks back to what a device delivered, exactly or not at all."""
+"""Calibrated blocks back to raw blocks, exactly or not at all."""
 
 import math
 
@@ -23,11 +23,10 @@ INT16 = np.dtype(np.int16)
 def raw_of(
     block: SampleBlock, calibration: UnitCalibration, dtype: npt.DTypeLike = INT16
 ) -> RawBlock:
-    """Find the samples that `calibrate` makes this very block of.
+    """Find the raw block from which `calibrate` makes exactly this block.
 
-    What `calibrate` has already judged is given back as judged: a channel that has failed is not
-    OK, one that had a sample that was none has nothing else, a slow value that was out of range
-    lies just above it.
+    Judgements of `calibrate` stay: a failed channel is not OK, a channel with a sample that is not
+    finite has no samples, and a slow value out of range is one just above its range.
 
     Parameters
     ----------
@@ -37,7 +36,7 @@ def raw_of(
     Raises
     ------
     ConfigError
-        If there are no such samples: the block was calibrated otherwise, or never was counts.
+        If there is none: the calibration was another, or the samples were never counts.
     """
     if len(calibration.channels) != len(block.samples):
         raise _not_found(block, dtype)
@@ -76,7 +75,7 @@ def _counts(block: SampleBlock, calibration: UnitCalibration) -> CountArray:
 
 
 def _units(block: SampleBlock) -> SampleArray:
-    """Engineering units; a channel that was blanked for one sample that was none has none."""
+    """Engineering units; NaN in a channel that had a sample that was not finite."""
     blanked = [quality.reason is Reason.NOT_FINITE for quality in block.channel_quality]
     return np.where(np.array(blanked)[:, np.newaxis], np.float32(np.nan), block.samples)
 
@@ -85,7 +84,7 @@ def _slow_value(reading: Reading | None, channel: SlowCalibration) -> float:
     if reading is None or reading.quality.reason is Reason.NOT_MEASURED:
         return math.nan
     if reading.value is None:
-        # the next one that single precision, in which slow values travel, can tell from it
+        # the next larger number in single precision, in which slow values are sent
         return float(np.nextafter(np.float32(channel.maximum), np.float32(np.inf)))
     return reading.value
 

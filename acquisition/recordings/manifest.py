@@ -1,7 +1,9 @@
-"""The manifest of a recording: what was recorded, how to read it, and what its files must be."""
+"""The manifest of a recording: what was recorded, how to read it, its files and its bounds."""
 
 import hashlib
 import json
+from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -16,14 +18,8 @@ from acquisition.delivery.calibration import (
     UnitCalibration,
 )
 from acquisition.errors import ConfigError
-from acquisition.recordings.limits import (
-    MAX_BLOCK_SAMPLES,
-    MAX_CHANNELS,
-    MAX_MANIFEST_BYTES,
-    MAX_SAMPLES,
-    MAX_SLOW_CHANNELS,
-)
 from core.machine.channel import Measurand
+from core.samples.blocks import Rejection
 from core.units import NS_PER_S
 
 FORMAT = "padwatch-recording"
@@ -31,6 +27,29 @@ VERSION = 3
 MANIFEST = "manifest.json"
 SAMPLES = "samples.parquet"
 BLOCKS = "blocks.parquet"
+
+MAX_CHANNELS = 32
+MAX_SLOW_CHANNELS = 50
+
+ROWS_PER_GROUP = 131_072
+"""Samples of each channel that are written and read at once: 1 MB for four channels."""
+
+BLOCKS_PER_GROUP = 8192
+
+MAX_BLOCK_SAMPLES = ROWS_PER_GROUP
+
+MAX_SAMPLES = 2**29
+"""Per channel: ten days at 600 Hz."""
+
+MAX_INDEX = 2**53
+"""Largest index of a sample and number of an epoch; exact as a double, too."""
+
+MAX_REJECTIONS = 32
+"""Reasons for which samples before one block may have been refused."""
+
+MAX_REASON_LENGTH = 64
+
+MAX_MANIFEST_BYTES = 1_000_000
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
@@ -98,7 +117,7 @@ class RecordedUnit(ManifestPart):
 
     @property
     def calibration(self) -> UnitCalibration:
-        """How the samples were read when they were recorded."""
+        """Calibration at the time of the recording."""
         return UnitCalibration(
             unit=self.unit,
             rate_hz=self.rate_hz,
@@ -112,14 +131,14 @@ class RecordedUnit(ManifestPart):
 
 
 class RecordedFile(ManifestPart):
-    """What a file beside the manifest must be."""
+    """Expected size and checksum of a file beside the manifest."""
 
     size: Annotated[int, Field(ge=1, le=2**50)]
     sha256: Sha256
 
 
 class Manifest(RecordedUnit):
-    """All of a manifest.
+    """Contents of ``manifest.json``.
 
     Parameters
     ----------
@@ -130,7 +149,7 @@ class Manifest(RecordedUnit):
     n_samples
         Per channel.
     checksum
-        SHA-256 of all else in it, so that no number of it changes unnoticed; see `manifest_text`.
+        SHA-256 of all other values, see :func:`checksum_of`.
     """
 
     format: Literal["padwatch-recording"]
@@ -143,8 +162,62 @@ class Manifest(RecordedUnit):
     checksum: Sha256 | None = None
 
 
+@dataclass(frozen=True)
+class Progress:
+    """Position in a recording: what the next block, written or read, must follow on.
+
+    Parameters
+    ----------
+    n_passed
+        Samples per channel, gaps within an epoch included.
+    epoch, stop_index
+        Where the last block ended; no epoch before the first.
+    """
+
+    n_passed: int = 0
+    epoch: int | None = None
+    stop_index: int = 0
+
+    def after(
+        self, epoch: int, first_index: int, n_samples: int, rejected: Sequence[Rejection]
+    ) -> "Progress":
+        """Return the position after one more block.
+
+        Raises
+        ------
+        ConfigError
+            If no device can have delivered it at this position.
+        """
+        if not 1 <= n_samples <= MAX_BLOCK_SAMPLES:
+            raise ConfigError(
+                f"a block of {n_samples} samples; it must have 1 to {MAX_BLOCK_SAMPLES}"
+            )
+        for name, value in (("epoch", epoch), ("first index", first_index)):
+            if not 0 <= value <= MAX_INDEX:
+                raise ConfigError(f"a block of {name} {value}; it must be 0 to {MAX_INDEX}")
+        expected = self.stop_index if epoch == self.epoch else 0
+        n_missing = max(first_index - expected, 0)
+        _require_room(rejected, n_missing)
+        n_gap = n_missing if epoch == self.epoch else 0
+        return Progress(self.n_passed + n_gap + n_samples, epoch, first_index + n_samples)
+
+
+def _require_room(rejected: Sequence[Rejection], n_missing: int) -> None:
+    if len(rejected) > MAX_REJECTIONS:
+        raise ConfigError(f"a block with {len(rejected)} rejections; at most {MAX_REJECTIONS}")
+    for rejection in rejected:
+        if not 1 <= len(rejection.reason) <= MAX_REASON_LENGTH or rejection.n_samples < 1:
+            raise ConfigError(
+                f"a rejection of {rejection.n_samples} samples for {rejection.reason[:80]!r}; it"
+                f" needs at least one, and a reason of 1 to {MAX_REASON_LENGTH} letters"
+            )
+    n_rejected = sum(rejection.n_samples for rejection in rejected)
+    if n_rejected > n_missing:
+        raise ConfigError(f"a block with {n_rejected} samples rejected in a jump of {n_missing}")
+
+
 class _Head(BaseModel):
-    """What every version of the format has."""
+    """Keys of every version of the format."""
 
     format: str
     version: int
@@ -156,7 +229,7 @@ def read_manifest(folder: Path) -> Manifest:
     Raises
     ------
     ConfigError
-        If there is none, or anything about it is wrong; the message names the first mistake.
+        If there is none, or anything in it is wrong; the message names the first mistake.
     """
     path = folder / MANIFEST
     text = _read(path)
@@ -179,7 +252,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def manifest_text(manifest: Manifest) -> str:
-    """The manifest as its file has it: what it is comes first, its checksum last."""
+    """Text of the manifest file: format and version first, checksum last."""
     values = manifest.model_dump(mode="json", exclude={"checksum"})
     first = {name: values.pop(name) for name in ("format", "version", "made_by", "start")}
     checksum = checksum_of(first | values)
@@ -187,13 +260,13 @@ def manifest_text(manifest: Manifest) -> str:
 
 
 def start_text(start_ns: int) -> str:
-    """Time with all its nanoseconds, for people."""
+    """ISO 8601 time with nanoseconds."""
     seconds, ns = divmod(start_ns, NS_PER_S)
     return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{ns:09d}Z"
 
 
 def checksum_of(document: dict[str, object]) -> str:
-    """Of all but the checksum itself, whatever the order and the spaces."""
+    """SHA-256 of all values but the checksum, independent of order and white space."""
     rest = {name: value for name, value in document.items() if name != "checksum"}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("ascii")).hexdigest()

@@ -1,23 +1,116 @@
-"""`RecordingSource`: a recording as a sample source that comes to an end."""
+"""`RecordingSource`: a recording, or some of its channels, as a source that comes to an end."""
 
-from collections.abc import AsyncGenerator, AsyncIterator
+from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Mapping
 from contextlib import aclosing, asynccontextmanager, closing
+from dataclasses import dataclass, replace
 
 from acquisition.clock import Clock
 from acquisition.delivery.blocks import Delivery
-from acquisition.recordings.progress import Progress
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.raw import RawBlock
+from acquisition.errors import ConfigError
+from acquisition.recordings.manifest import Progress, RecordedUnit
 from acquisition.recordings.reader import Recording
-from acquisition.recordings.selection import Selection, all_of
+from core.machine.unit import Unit
 from core.samples.blocks import SampleBlock
 
 
-class RecordingSource:
-    """Calibrated blocks of a recording, as fast as they are taken or as they once came.
+@dataclass(frozen=True)
+class Selection:
+    """Columns of a recording in the order of a unit's channels, and their calibration.
 
-    Paced, the recording runs from the first connection on, connected or not: what passed while
-    nobody was connected is missing, and the sample index jumps. Unpaced, a new connection goes on
-    where the last one stopped. Gaps within an epoch take the time they took; a restart of the
-    device, whose length nobody knows, takes none.
+    Parameters
+    ----------
+    channels, slow
+        Positions in the recording.
+    """
+
+    channels: tuple[int, ...]
+    slow: tuple[int, ...]
+    calibration: UnitCalibration
+
+    def of(self, raw: RawBlock) -> RawBlock:
+        """The selected part of a recorded block."""
+        if self.channels == tuple(range(len(raw.ok))) and self.slow == tuple(range(len(raw.slow))):
+            return raw
+        return replace(
+            raw,
+            counts=raw.counts[list(self.channels)],
+            ok=tuple(raw.ok[n] for n in self.channels),
+            slow=tuple(raw.slow[n] for n in self.slow),
+        )
+
+
+def all_of(recorded: RecordedUnit) -> Selection:
+    """All columns with the recorded calibration."""
+    n_channels, n_slow = len(recorded.channels), len(recorded.slow_channels)
+    return Selection(tuple(range(n_channels)), tuple(range(n_slow)), recorded.calibration)
+
+
+def select(recorded: RecordedUnit, unit: Unit, slow_units: Mapping[str, str]) -> Selection:
+    """Find the channels of a unit in a recording; the calibration is that of the recording.
+
+    Parameters
+    ----------
+    slow_units
+        Unit of each slow channel wanted, by id, in the order wanted.
+
+    Raises
+    ------
+    ConfigError
+        If the rates differ, or a channel is missing or in another unit; the message has both.
+    """
+    if recorded.rate_hz != unit.rate_hz:
+        raise ConfigError(
+            f"the recording has {recorded.rate_hz:.9g} Hz, unit {unit.id} is configured for"
+            f" {unit.rate_hz:.9g} Hz"
+        )
+    measurands = {c.id: c.measurand.value for c in recorded.channels}
+    units = {c.id: c.unit for c in recorded.slow_channels}
+    wanted = {c.id: c.measurand.value for c in unit.channels}
+    channels = _positions(measurands, wanted, f"unit {unit.id}", "channel")
+    slow = _positions(units, slow_units, f"unit {unit.id}", "slow channel")
+    calibration = recorded.calibration
+    return Selection(
+        channels,
+        slow,
+        replace(
+            calibration,
+            unit=unit.id,
+            channels=tuple(calibration.channels[n] for n in channels),
+            slow=tuple(calibration.slow[n] for n in slow),
+        ),
+    )
+
+
+def _positions(
+    recorded: Mapping[str, str], wanted: Mapping[str, str], owner: str, kind: str
+) -> tuple[int, ...]:
+    missing = [id_ for id_ in wanted if id_ not in recorded]
+    if missing:
+        raise ConfigError(
+            f"{owner} needs {kind} {_listed(missing)}, the recording has {_listed(recorded)}"
+        )
+    for id_, unit in wanted.items():
+        if recorded[id_] != unit:
+            raise ConfigError(
+                f"{kind} {id_} is recorded as {recorded[id_]}, {owner} is configured for {unit}"
+            )
+    ids = list(recorded)
+    return tuple(ids.index(id_) for id_ in wanted)
+
+
+def _listed(ids: Iterable[str]) -> str:
+    return ", ".join(ids) or "none"
+
+
+class RecordingSource:
+    """Calibrated blocks of a recording, as fast as they are taken or at their own pace.
+
+    A paced recording runs from the first connection on: what passes without a connection is
+    missing, and the sample index jumps. Unpaced, a new connection continues where the last one
+    stopped. Gaps within an epoch take their time; a restart of the device, whose length is not
+    known, takes none.
 
     Parameters
     ----------

@@ -1,10 +1,11 @@
-"""What happened in a recording: its gaps, restarts and rejections, counted from its blocks."""
+"""Gaps, restarts and rejections of a recording, counted from its blocks."""
 
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from acquisition.recordings.reader import BlockHead, Recording
+from acquisition.recordings.messages import BlockHead
+from acquisition.recordings.reader import Recording
 from core.samples.account import Gap
 from core.units import ns_from_s
 
@@ -24,9 +25,9 @@ class RecordingSummary:
     gaps
         The first thousand, in order of time.
     n_gaps, n_gap_samples
-        All of them; without what was rejected.
+        All gaps, without rejected samples.
     epochs
-        In order of time; more than one if the device began to count anew.
+        In order of time; more than one if the device restarted.
     n_not_ok
         Samples of each channel, by id, in blocks in which the device called it not OK.
     """
@@ -51,55 +52,42 @@ def summary_of(recording: Recording) -> RecordingSummary:
     ConfigError
         If they cannot be read any more.
     """
-    count = _Count()
+    rate_hz, ids = recording.manifest.rate_hz, [c.id for c in recording.manifest.channels]
+    first: BlockHead | None = None
+    last: BlockHead | None = None
+    gaps: list[Gap] = []
+    epochs: list[int] = []
+    n_gaps = n_gap_samples = n_samples = 0
+    rejected: Counter[str] = Counter()
+    n_not_ok: Counter[int] = Counter()
     for head in recording.heads():
-        count.take(head)
-    return count.summary(recording)
-
-
-class _Count:
-    def __init__(self) -> None:
-        self._first: BlockHead | None = None
-        self._last: BlockHead | None = None
-        self._gaps: list[Gap] = []
-        self._n_gaps = self._n_gap_samples = self._n_samples = 0
-        self._rejected: Counter[str] = Counter()
-        self._n_not_ok: Counter[int] = Counter()
-        self._epochs: list[int] = []
-
-    def take(self, head: BlockHead) -> None:
-        last, self._last = self._last, head
-        self._first = self._first or head
         if last is None or head.epoch != last.epoch:
-            self._epochs.append(head.epoch)
-        else:
-            self._note_missing(head, head.first_index - last.first_index - last.n_samples)
-        self._n_samples += head.n_samples
+            epochs.append(head.epoch)
+        elif (gap := _gap(last, head)).n_samples > 0:
+            gaps += [gap] if n_gaps < MAX_GAPS_LISTED else []
+            n_gaps += 1
+            n_gap_samples += gap.n_samples
+        n_samples += head.n_samples
         for rejection in head.rejected:
-            self._rejected[rejection.reason] += rejection.n_samples
-        for number, ok in enumerate(head.ok):
-            self._n_not_ok[number] += 0 if ok else head.n_samples
+            rejected[rejection.reason] += rejection.n_samples
+        n_not_ok.update({n: head.n_samples for n, ok in enumerate(head.ok) if not ok})
+        first, last = first or head, head
+    return RecordingSummary(
+        start_ns=first.start_ns if first else 0,
+        stop_ns=last.start_ns + ns_from_s(last.n_samples / rate_hz) if last else 0,
+        n_samples=n_samples,
+        n_passed=n_samples + n_gap_samples + rejected.total(),
+        gaps=tuple(gaps),
+        n_gaps=n_gaps,
+        n_gap_samples=n_gap_samples,
+        rejected=dict(rejected),
+        epochs=tuple(epochs),
+        n_not_ok={ids[n]: count for n, count in sorted(n_not_ok.items())},
+    )
 
-    def _note_missing(self, head: BlockHead, n_missing: int) -> None:
-        n_gap = n_missing - sum(rejection.n_samples for rejection in head.rejected)
-        if n_gap > 0:
-            gap = Gap(head.epoch, head.first_index - n_missing, n_gap, head.start_ns)
-            self._gaps += [gap] if self._n_gaps < MAX_GAPS_LISTED else []
-            self._n_gaps += 1
-            self._n_gap_samples += n_gap
 
-    def summary(self, recording: Recording) -> RecordingSummary:
-        rate_hz, ids = recording.manifest.rate_hz, [c.id for c in recording.manifest.channels]
-        first, last = self._first, self._last
-        return RecordingSummary(
-            start_ns=first.start_ns if first else 0,
-            stop_ns=last.start_ns + ns_from_s(last.n_samples / rate_hz) if last else 0,
-            n_samples=self._n_samples,
-            n_passed=self._n_samples + self._n_gap_samples + self._rejected.total(),
-            gaps=tuple(self._gaps),
-            n_gaps=self._n_gaps,
-            n_gap_samples=self._n_gap_samples,
-            rejected=dict(self._rejected),
-            epochs=tuple(self._epochs),
-            n_not_ok={ids[n]: count for n, count in sorted(self._n_not_ok.items()) if count},
-        )
+def _gap(last: BlockHead, head: BlockHead) -> Gap:
+    """Samples missing between two blocks of an epoch, without rejected ones; possibly none."""
+    n_missing = head.first_index - last.first_index - last.n_samples
+    n_rejected = sum(rejection.n_samples for rejection in head.rejected)
+    return Gap(head.epoch, head.first_index - n_missing, n_missing - n_rejected, head.start_ns)

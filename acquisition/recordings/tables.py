@@ -1,27 +1,19 @@
-"""Blocks as Parquet tables and back: the only module that knows pyarrow."""
+"""Blocks as Parquet tables and back."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings.limits import FOOTER_BYTES_PER_COLUMN
-from acquisition.recordings.manifest import RecordedUnit
-from acquisition.recordings.pages import (
-    NUMBER,
-    REJECTED_COUNT,
-    REJECTED_REASON,
-    ColumnLimits,
-    PageError,
-    read_footer,
-    require_bounded,
-)
+from acquisition.recordings.manifest import MAX_REASON_LENGTH, RecordedUnit
+from acquisition.recordings.messages import HEAD_NUMBERS, Rejected, head_type
 from core.arrays import RawArray
 
 ZSTD_LEVEL = 1
@@ -31,15 +23,13 @@ _SAMPLE_TYPES = {"int16": pa.int16(), "float32": pa.float32()}
 _ENCODINGS = {"int16": "DELTA_BINARY_PACKED", "float32": "BYTE_STREAM_SPLIT"}
 """Differences of counts need few bits; floats that follow each other share their high bytes."""
 
-_MAGIC = b"PAR1"
-_TAIL_BYTES = 8  # length of the footer, then the magic
+_HEADS_AT_ONCE = 256
 _REJECTION = pa.struct(
     [
         pa.field("reason", pa.string(), nullable=False),
         pa.field("n_samples", pa.int64(), nullable=False),
     ]
 )
-_REJECTED_LIMITS = (REJECTED_REASON, REJECTED_COUNT)
 _REJECTED_COUNT = "rejected.list.element.n_samples"
 _REJECTED = pa.list_(pa.field("element", _REJECTION, nullable=False))
 
@@ -88,7 +78,7 @@ def blocks_table(blocks: Sequence[RawBlock], unit: RecordedUnit) -> Any:
 
 
 def samples_writer(path: Path, unit: RecordedUnit) -> Any:
-    """Packed, then zstd: 6 bits a count where int16 itself takes 11."""
+    """Packed by differences, then zstd: 6 bits a count; int16 alone packs to 11."""
     schema = samples_schema(unit)
     return pq.ParquetWriter(
         path,
@@ -103,7 +93,7 @@ def samples_writer(path: Path, unit: RecordedUnit) -> Any:
 
 
 def blocks_writer(path: Path, unit: RecordedUnit) -> Any:
-    """Few and repetitive: dictionaries and zstd; but no dictionary can multiply long texts."""
+    """Dictionaries and zstd, for rows that are few and repetitive; texts have no dictionary."""
     schema = blocks_schema(unit)
     return pq.ParquetWriter(
         path,
@@ -118,23 +108,19 @@ def blocks_writer(path: Path, unit: RecordedUnit) -> Any:
 
 @contextmanager
 def parquet_file(path: Path, schema: Any, n_rows: int, rows_per_group: int) -> Iterator[Any]:
-    """Open a file after its footer has shown that it is what the manifest says, and no more.
+    """Open a file whose footer agrees with the manifest; for the confined child only.
+
+    pyarrow allocates for a page what the header of the page says, up to 2 GB for one of 64 kB.
 
     Raises
     ------
     ConfigError
-        If it is not, or if reading it fails inside the context.
+        If the file is something else, or if reading it fails inside the context.
     """
-    with foreign_errors_of(path), path.open("rb") as stream:
-        full, last = divmod(n_rows, rows_per_group)
-        group_rows = [rows_per_group] * full + [last] * (last > 0)
-        footer_at = _small_footer(stream, path, schema, len(group_rows))
-        footer = read_footer(stream, footer_at)
-        stream.seek(0)
-        with pq.ParquetFile(stream) as file:
-            _require_shape(file, path, schema, n_rows, group_rows)
-            require_bounded(stream, footer_at, footer, _limits(schema), group_rows)
-            yield file
+    full, last = divmod(n_rows, rows_per_group)
+    with foreign_errors_of(path), path.open("rb") as stream, pq.ParquetFile(stream) as file:
+        _require_shape(file, path, schema, n_rows, [rows_per_group] * full + [last] * (last > 0))
+        yield file
 
 
 @contextmanager
@@ -142,7 +128,7 @@ def foreign_errors_of(path: Path) -> Iterator[None]:
     """Rename what pyarrow and the disk raise to ConfigError, with the path in front."""
     try:
         yield
-    except (pa.ArrowException, OSError, PageError, UnicodeDecodeError) as error:
+    except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         # names may not be text
         words = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise ConfigError(f"{path}: {words.splitlines()[0]}") from error
@@ -154,44 +140,33 @@ def read_counts(file: Any, group: int) -> RawArray:
     return np.stack([column.to_numpy() for column in columns])
 
 
-def read_rows(file: Any, group: int, columns: list[str] | None = None) -> Iterable[dict[str, Any]]:
-    """Rows of one row group as dictionaries."""
-    rows: list[dict[str, Any]] = file.read_row_group(group, columns, use_threads=False).to_pylist()
-    return rows
-
-
-def _limits(schema: Any) -> list[ColumnLimits]:
-    numbers = [NUMBER for name in schema.names if name != "rejected"]
-    return numbers if len(numbers) == len(schema.names) else [*numbers, *_REJECTED_LIMITS]
-
-
-def _small_footer(stream: Any, path: Path, schema: Any, n_groups: int) -> int:
-    """Find the footer; refuse one that lists more than there can be, before anything parses it."""
-    size = stream.seek(0, 2)
-    stream.seek(max(0, size - _TAIL_BYTES))
-    tail = stream.read(_TAIL_BYTES)
-    if tail[4:] != _MAGIC:
-        raise ConfigError(f"{path}: not a complete Parquet file")
-    n_columns = len(schema.names) + 2  # rejections take three
-    limit = FOOTER_BYTES_PER_COLUMN * n_columns * (n_groups + 2)
-    n_bytes = int.from_bytes(tail[:4], "little")
-    if n_bytes > limit:
-        raise ConfigError(f"{path}: footer of {n_bytes} bytes, at most {limit} belong to this one")
-    if n_bytes > size - _TAIL_BYTES:
-        raise ConfigError(f"{path}: not a complete Parquet file")
-    return int(size) - _TAIL_BYTES - n_bytes
+def read_heads(file: Any, n_slow: int) -> Iterator[tuple[npt.NDArray[np.void], list[Rejected]]]:
+    """Blocks without their samples, some hundred at once: heads and their rejections."""
+    for batch in file.iter_batches(_HEADS_AT_ONCE, use_threads=False):
+        *numbers, rejected = batch.columns
+        heads = np.empty(len(batch), head_type(n_slow))
+        for name, column in zip(HEAD_NUMBERS, numbers, strict=False):
+            heads[name] = column.to_numpy()
+        for n, column in enumerate(numbers[len(HEAD_NUMBERS) :]):
+            heads["slow"][:, n] = column.to_numpy()
+        yield (
+            heads,
+            [
+                (row, each["reason"][: MAX_REASON_LENGTH + 1], each["n_samples"])
+                for row, rejections in enumerate(rejected.to_pylist())
+                for each in rejections
+            ],
+        )
 
 
 def _require_shape(file: Any, path: Path, schema: Any, n_rows: int, group_rows: list[int]) -> None:
-    found = file.schema_arrow
+    found, metadata = file.schema_arrow, file.metadata
     if not found.equals(schema):
         name = next((a for a, b in zip(found, schema, strict=False) if a != b), None)
         words = f"column {name.name!r} of type {name.type}" if name else f"{len(found)} columns"
         raise ConfigError(f"{path}: {words} where the manifest says otherwise")
-    metadata = file.metadata
     if metadata.num_rows != n_rows:
         raise ConfigError(f"{path}: {metadata.num_rows} rows, the manifest says {n_rows}")
-    # never ask for a column's metadata: a lying footer makes pyarrow abort the process there
     found_rows = [metadata.row_group(n).num_rows for n in range(metadata.num_row_groups)]
     if found_rows != group_rows:
         raise ConfigError(f"{path}: not in row groups of {group_rows[0]}")

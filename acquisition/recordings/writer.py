@@ -1,9 +1,8 @@
-"""`RecordingWriter`: raw blocks in, a finished recording out, or nothing that looks like one."""
+"""`RecordingWriter`: raw blocks in, a finished recording out, or nothing."""
 
 import hashlib
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -14,21 +13,23 @@ from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.inversion import raw_of
-from acquisition.recordings.limits import BLOCKS_PER_GROUP, MAX_SAMPLES, ROWS_PER_GROUP
 from acquisition.recordings.manifest import (
     BLOCKS,
+    BLOCKS_PER_GROUP,
     FORMAT,
     MANIFEST,
+    MAX_SAMPLES,
+    ROWS_PER_GROUP,
     SAMPLES,
     VERSION,
     Manifest,
+    Progress,
     RecordedFile,
     RecordedUnit,
     SampleType,
     manifest_text,
     start_text,
 )
-from acquisition.recordings.progress import Progress
 from acquisition.recordings.tables import (
     blocks_table,
     blocks_writer,
@@ -40,11 +41,11 @@ from core.arrays import RawArray
 from core.samples.blocks import SampleBlock
 
 INCOMPLETE = ".incomplete"
-"""Ending of the folder's name while it is being written."""
+"""Suffix of the name of a folder that is being written."""
 
 
 class RecordingWriter:
-    """Writes a recording aside and gives it its name when it is complete and on the disk.
+    """Writes a recording under another name and renames it when it is complete and synced.
 
     As a context manager it finishes on a regular end, and leaves nothing behind on an exception.
 
@@ -55,7 +56,7 @@ class RecordingWriter:
     made_by
         Program and person, for the manifest.
     first_decides
-        Whether the first block decides about the sample type, instead of the unit: counts if it is
+        Whether the first block decides on the sample type, instead of the unit: counts if it is
         exactly counts, else engineering units.
 
     Raises
@@ -88,7 +89,7 @@ class RecordingWriter:
                 f"{self._aside}: is there already: being written, or left by a program that was"
                 " killed; delete it then"
             )
-        with self._renamed_errors():
+        with foreign_errors_of(self._aside):
             self._aside.mkdir()
             self._blocks_file = blocks_writer(self._aside / BLOCKS, unit)
 
@@ -117,7 +118,7 @@ class RecordingWriter:
         return self._progress.n_passed / self.unit.rate_hz
 
     def write(self, raw: RawBlock) -> None:
-        """Append a block exactly as a device delivered it.
+        """Append a raw block.
 
         Raises
         ------
@@ -140,14 +141,14 @@ class RecordingWriter:
         self._counts.append(raw.counts)
         self._n_waiting += n_samples
         self._blocks.append(raw)
-        with self._renamed_errors():
+        with foreign_errors_of(self._aside):
             if self._n_waiting >= ROWS_PER_GROUP:
                 self._write_counts(ROWS_PER_GROUP)
             if len(self._blocks) >= BLOCKS_PER_GROUP:
                 self._write_blocks()
 
     def write_calibrated(self, block: SampleBlock) -> None:
-        """Append a block as an adapter hands it out.
+        """Append a block of a source.
 
         Raises
         ------
@@ -160,7 +161,7 @@ class RecordingWriter:
         self.write(raw_of(block, self._calibration, np.dtype(self.unit.sample_type)))
 
     def finish(self) -> Manifest:
-        """Bring everything to the disk and give the recording its name.
+        """Sync all files and rename the recording.
 
         Raises
         ------
@@ -170,7 +171,7 @@ class RecordingWriter:
         if self.n_blocks == 0:
             self.abandon()
             raise ConfigError(f"{self._folder}: no samples arrived, nothing was recorded")
-        with self._renamed_errors():
+        with foreign_errors_of(self._aside):
             self._write_counts(self._n_waiting)
             self._write_blocks()
             self._close()
@@ -191,9 +192,12 @@ class RecordingWriter:
         ConfigError
             If the disk refuses.
         """
-        with suppress(ConfigError), self._renamed_errors():  # a full disk may refuse the footer
+        with (
+            suppress(ConfigError),
+            foreign_errors_of(self._aside),
+        ):  # a full disk may refuse the footer
             self._close()
-        with self._renamed_errors():
+        with foreign_errors_of(self._aside):
             for name in (SAMPLES, BLOCKS, MANIFEST):
                 (self._aside / name).unlink(missing_ok=True)
             self._aside.rmdir()
@@ -232,19 +236,13 @@ class RecordingWriter:
             n_blocks=self.n_blocks,
             n_samples=self.n_samples,
             files={
-                SAMPLES: recorded_file(self._aside / SAMPLES),
-                BLOCKS: recorded_file(self._aside / BLOCKS),
+                SAMPLES: _recorded_file(self._aside / SAMPLES),
+                BLOCKS: _recorded_file(self._aside / BLOCKS),
             },
         )
 
-    @contextmanager
-    def _renamed_errors(self) -> Iterator[None]:
-        with foreign_errors_of(self._aside):
-            yield
 
-
-def recorded_file(path: Path) -> RecordedFile:
-    """Size and checksum of a file."""
+def _recorded_file(path: Path) -> RecordedFile:
     with path.open("rb") as file:
         return RecordedFile(
             size=os.fstat(file.fileno()).st_size,

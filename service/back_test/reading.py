@@ -3,6 +3,7 @@
 import re
 import stat
 from collections.abc import Callable, Collection, Mapping
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from acquisition.recordings.confined import ReadingProcess, reading_process
+from acquisition.recordings.confined import ConfinedProcess
 from service.back_test.child import WRONG_FILE
 from service.back_test.file_columns import LINE, TEXTS, ReadingsError
 from service.back_test.histories import BearingRows, Place, histories_of
@@ -59,7 +60,8 @@ def read_histories(
 
 
 def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mapping[str, Any]:
-    with reading_process("service.back_test.child", path, _ENVIRONMENT) as process:
+    module, file = "service.back_test.child", str(path.absolute())
+    with closing(ConfinedProcess(module, file, environment=_ENVIRONMENT)) as process:
         try:
             gathered = _gathered(process, word, advanced)
         except (pa.ArrowException, OSError):
@@ -77,10 +79,10 @@ def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mappin
 
 
 def _gathered(
-    process: ReadingProcess, word: str, advanced: Callable[[int], object]
+    process: ConfinedProcess, word: str, advanced: Callable[[int], object]
 ) -> dict[str, list[Any]]:
     """Parts of each column: texts dictionary-encoded, numbers as numpy arrays."""
-    reader = pa.ipc.open_stream(process.found)
+    reader = pa.ipc.open_stream(process.output)
     parts: dict[str, list[Any]] = {key: [] for key in reader.schema.names}
     names: dict[str, set[str]] = {key: set() for key in parts if key in TEXTS}
     before = 0
@@ -116,6 +118,6 @@ def _check_names(key: str, column: Any, names: set[str], line: Any, word: str) -
         )
 
 
-def _why(process: ReadingProcess) -> str:
+def _why(process: ConfinedProcess) -> str:
     words = process.last_words()
     return words if process.exit_code() == WRONG_FILE else f"not readable: {words}"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from acquisition.delivery.calibration import calibrate
 from acquisition.errors import ConfigError
 from acquisition.recordings.reader import Recording
-from acquisition.recordings.selection import all_of
+from acquisition.recordings.source import all_of
 from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 
@@ -58,9 +58,7 @@ def window_of(recording: Recording, start_s: float, seconds: float) -> Recording
 
 def _read(recording: Recording, wanted: Sequence[int]) -> list[SampleBlock]:
     calibration = all_of(recording.manifest).calibration
-    found: list[SampleBlock] = []
-    if wanted:
-        raws = recording.raw_blocks(wanted[0])
-        found = [calibrate(next(raws), calibration) for _ in range(wanted[-1] - wanted[0] + 1)]
-        raws.close()
-    return found
+    if not wanted:
+        return []
+    raws = recording.raw_blocks(wanted[0], wanted[-1] + 1)
+    return [calibrate(raw, calibration) for raw in raws]

@@ -1,5 +1,9 @@
 """Frames of an imported CAN log through the decoder of live ones."""
 
+from collections.abc import Iterator
+
+import can
+
 from acquisition.can.assembly import Assembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
@@ -7,7 +11,7 @@ from acquisition.can.settings import CanSettings
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings.frames import FrameBatch
+from acquisition.recordings.messages import MAX_DATA, Frames
 from service.conversion import calibration_of
 from service.settings.can import CanSettings as CanSourceSettings
 from service.settings.units import UnitSettings
@@ -36,8 +40,8 @@ class CanLogDecoder:
         )
         self._gate = FrameGate(plan, self._assembler.refused)
 
-    def take(self, frames: FrameBatch) -> list[RawBlock]:
-        """Decode frames; see :class:`acquisition.recordings.frames.FrameDecoder`.
+    def take(self, frames: Frames) -> list[RawBlock]:
+        """Decode the next frames of a log.
 
         Raises
         ------
@@ -45,17 +49,13 @@ class CanLogDecoder:
             If they cannot all be those of one device.
         """
         blocks: list[RawBlock] = []
-        for time_ns, message in zip(frames.times_ns.tolist(), frames.messages(), strict=True):
+        for time_ns, message in zip(frames["time_ns"].tolist(), _messages(frames), strict=True):
             frame = self._gate.admit(message)
             if frame is not None:
                 blocks += self._assembler.take([frame], time_ns)
         if self._assembler.trouble:
             raise ConfigError(self._assembler.trouble)
         return blocks
-
-    def flush(self) -> list[RawBlock]:
-        """Frames of a sample that never became complete are nothing."""
-        return []
 
 
 def log_decoder_of(unit: UnitSettings) -> CanLogDecoder | None:
@@ -69,3 +69,17 @@ def log_decoder_of(unit: UnitSettings) -> CanLogDecoder | None:
     if not isinstance(unit.source, CanSourceSettings):
         return None
     return CanLogDecoder(can_settings_of(unit, unit.source), calibration_of(unit))
+
+
+def _messages(frames: Frames) -> Iterator[can.Message]:
+    rows = frames[["time_ns", "id", "extended", "fd", "length"]].tolist()
+    data = frames["data"].tobytes()
+    for n, (time_ns, id_, extended, fd, length) in enumerate(rows):
+        yield can.Message(
+            timestamp=time_ns / 1e9,
+            arbitration_id=id_,
+            is_extended_id=extended,
+            is_fd=fd,
+            dlc=length,
+            data=data[n * MAX_DATA : n * MAX_DATA + length],
+        )

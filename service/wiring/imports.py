@@ -1,26 +1,27 @@
 """Foreign files into recordings of a unit."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
+from contextlib import closing
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from itertools import chain
 from pathlib import Path
 
 from acquisition.delivery.block_grid import BlockGrid
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings.frames import FrameDecoder
 from acquisition.recordings.imports.job import (
     ChannelColumn,
+    ColumnName,
     CsvLayout,
     ImportJob,
-    Place,
     SlowColumn,
     TimeAxis,
 )
 from acquisition.recordings.imports.units import slow_conversion, waveform_factor
 from acquisition.recordings.manifest import Manifest, read_manifest
-from acquisition.recordings.reading import Reading, reading
+from acquisition.recordings.reading import imported_blocks, imported_frames
 from acquisition.recordings.writer import RecordingWriter
 from service.conversion import calibration_of
 from service.settings.import_mapping import (
@@ -30,7 +31,7 @@ from service.settings.import_mapping import (
     TimeSettings,
 )
 from service.settings.units import UnitSettings
-from service.wiring.can_logs import log_decoder_of
+from service.wiring.can_logs import CanLogDecoder, log_decoder_of
 from service.wiring.recorded_units import recorded_unit
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -93,31 +94,26 @@ def import_recording(
     decoder = None if job.channels else log_decoder_of(unit)
     if not job.channels and decoder is None:
         raise ConfigError(f'unit {unit.id} has no source of kind "can", whose DBC file is needed')
-    with reading(path, job) as found:
-        blocks = _decoded(found, decoder, job.block_samples) if decoder else found.blocks()
+    read = _decoded(path, job, decoder) if decoder else imported_blocks(path, job)
+    with closing(read) as blocks:
         first = next(blocks, None)
         if first is None:
             raise ConfigError(f"{path}: has no samples of unit {unit.id}")
         with RecordingWriter(folder, recorded_unit(unit), made_by, first_decides=True) as writer:
-            for block in _chained(first, blocks):
+            for block, done in chain([first], blocks):
                 writer.write(block if decoder else _with_all_slow(block, job, unit))
-                advanced(found.done)
+                advanced(done)
     return read_manifest(folder)
 
 
-def _decoded(found: Reading, decoder: FrameDecoder, block_samples: int) -> Iterator[RawBlock]:
-    grid = BlockGrid(block_samples)
-    for frames in found.frames():
-        for block in decoder.take(frames):
-            yield from grid.put(block)
-    for block in decoder.flush():
-        yield from grid.put(block)
-    yield from grid.flush()
-
-
-def _chained(first: RawBlock, rest: Iterator[RawBlock]) -> Iterator[RawBlock]:
-    yield first
-    yield from rest
+def _decoded(
+    path: Path, job: ImportJob, decoder: CanLogDecoder
+) -> Generator[tuple[RawBlock, float]]:
+    grid, done = BlockGrid(job.block_samples), 0.0
+    for frames, done in imported_frames(path, job):
+        for raw in decoder.take(frames):
+            yield from ((block, done) for block in grid.put(raw))
+    yield from ((block, done) for block in grid.flush())
 
 
 def _with_all_slow(block: RawBlock, job: ImportJob, unit: UnitSettings) -> RawBlock:
@@ -137,7 +133,7 @@ def _channels(mapped: Mapping[str, MappedChannel], unit: UnitSettings) -> tuple[
         found.append(
             ChannelColumn(
                 id=channel.id,
-                place=Place(column.column, column.group),
+                place=ColumnName(column.column, column.group),
                 unit=column.unit,
                 factor=factor,
                 calibrated_per_count=calibration.unit_per_count,
@@ -152,8 +148,8 @@ def _slow(column: MappedSlowChannel, channel_unit: str) -> SlowColumn:
         factor, offset = slow_conversion(channel_unit, column.unit)
     except ConfigError as error:
         raise ConfigError(f"slow channel {column.id}: {error}") from error
-    time = Place(column.time_column, column.time_group) if column.time_column else None
-    place = Place(column.column, column.group)
+    time = ColumnName(column.time_column, column.time_group) if column.time_column else None
+    place = ColumnName(column.column, column.group)
     return SlowColumn(column.id, place, column.unit, factor, offset, time)
 
 
@@ -162,7 +158,7 @@ def _time_axis(time: TimeSettings) -> TimeAxis:
     return TimeAxis(
         kind=time.source,
         utc_offset_s=_utc_offset_s(time.zone),
-        place=Place(time.column, time.group) if time.column else None,
+        place=ColumnName(time.column, time.group) if time.column else None,
         form=time.form or "elapsed_s",
         start_ns=None if start_ns is None else start_ns * 1000,
         tolerance=time.tolerance,

@@ -8,8 +8,7 @@ from acquisition.clock import Clock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import read_manifest
 from acquisition.recordings.reader import Recording, open_recording
-from acquisition.recordings.selection import Selection, select
-from acquisition.recordings.source import RecordingSource
+from acquisition.recordings.source import RecordingSource, Selection, select
 from acquisition.recordings.writer import RecordingWriter
 from acquisition.simulated.devices.recorded import RecordedFeed
 from acquisition.simulated.feed import SampleFeed

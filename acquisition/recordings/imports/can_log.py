@@ -1,37 +1,48 @@
-"""CAN logs of candump and BLF, in batches of frames."""
+"""CAN logs of candump and BLF, read by python-can, in batches of frames."""
 
+import logging
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, BinaryIO
 
+import can
 import numpy as np
+from can.io.blf import BLFParseError
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.frames import MAX_DATA, FrameBatch
-from acquisition.recordings.imports.blf import frames_of_blf
-from acquisition.recordings.imports.candump import frames_of_candump
+from acquisition.recordings.imports.csv_file import CUT_OFF
 from acquisition.recordings.imports.job import ImportJob
+from acquisition.recordings.messages import FRAME, MAX_DATA, Frames
 
 _BATCH = 8192
 _LENGTHS = {*range(9), 12, 16, 20, 24, 32, 48, 64}
 """That a CAN FD frame can have; a classic one up to 8."""
 
+_CANDUMP_LINE = re.compile(
+    r"\(\d{1,12}\.\d{1,9}\) \S{1,64} "
+    r"(?:(?P<error>[23][0-9A-Fa-f]{7})|[0-9A-Fa-f]{3}|[01][0-9A-Fa-f]{7})#"
+    r"(?:R[0-9]?|(?:#[0-9])?(?:[0-9A-Fa-f]{2})*)(?: [RT])?\s*"
+)
+"""python-can takes an id of more than 29 bits for another one, and most error frames for data."""
 
-def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[FrameBatch, float]]:
+
+def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[Frames, float]]:
     """Data frames of a log and the share of it that has been read.
 
-    candump writes seconds since 1970 in UTC. BLF has the clock of whoever recorded it: its time
-    zone is that of the mapping.
+    candump writes seconds since 1970 in UTC. BLF has the local time of its writer, in the
+    time zone of the mapping.
 
     Raises
     ------
     ConfigError
-        If a frame cannot have been on a bus, or frames were on several and it is not said which.
+        If a frame cannot have been on a bus, anything is missing, or frames were on several buses
+        and the mapping does not say which is meant.
     """
     size = max(path.stat().st_size, 1)
     with path.open("rb") as stream:
-        waiting: list[Any] = []
-        for frame in _of_one_bus(_data_frames(stream, job), job.bus):
+        waiting: list[can.Message] = []
+        for frame in _of_one_bus(_data_frames(stream, job), job):
             waiting.append(frame)
             if len(waiting) == _BATCH:
                 yield _batch(waiting, job), min(stream.tell() / size, 1.0)
@@ -40,18 +51,87 @@ def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[FrameBatch, float]
             yield _batch(waiting, job), 1.0
 
 
-def _data_frames(stream: BinaryIO, job: ImportJob) -> Iterator[Any]:
-    for number, frame in enumerate(_frames(stream, job)):
+def _data_frames(stream: BinaryIO, job: ImportJob) -> Iterator[can.Message]:
+    frames = _candump_frames(stream) if job.format == "candump" else _blf_frames(stream)
+    for number, frame in enumerate(frames):
         _require_possible(frame, number + 1)
         if not (frame.is_error_frame or frame.is_remote_frame):
             yield frame
 
 
-def _of_one_bus(frames: Iterator[Any], wanted: str) -> Iterator[Any]:
+def _candump_frames(stream: BinaryIO) -> Iterator[can.Message]:
+    lines: Any = _candump_lines(stream)
+    yield from can.CanutilsLogReader(lines)
+
+
+def _candump_lines(stream: BinaryIO) -> Iterator[str]:
+    """Lines with a frame, without error frames."""
+    for number, content in enumerate(iter(stream.readline, b""), start=1):
+        line = content.decode("ascii", "replace")
+        if not line.endswith("\n"):
+            raise ConfigError(f"line {number}: {CUT_OFF}")
+        match = _CANDUMP_LINE.fullmatch(line)
+        if match is None and line.strip():
+            raise ConfigError(f"line {number}: {line[:60]!r} is not a frame")
+        if match is not None and match["error"] is None:
+            yield line
+
+
+def _blf_frames(stream: BinaryIO) -> Iterator[can.Message]:
+    """All frames, error frames included; python-can passes over what it cannot read."""
+    size = stream.seek(0, 2)
+    stream.seek(0)
+    warnings = logging.getLogger("can.io.blf")
+    warnings.disabled = False
+    warnings.setLevel(logging.WARNING)
+    warnings.addHandler(_Refusal())
+    reader = _CountingBlfReader(stream)
+    if reader.file_size != size:
+        raise ConfigError(
+            f"the file has {size} bytes, its header says {reader.file_size}: cut off, or its writer"
+            " has not finished it"
+        )
+    try:
+        yield from reader
+    except BLFParseError as error:
+        raise ConfigError(f"damaged: {error or 'not an object'}") from error
+    reader.require_all()
+
+
+class _Refusal(logging.Handler):
+    """Refuses what python-can only warns of: an object or a container that it leaves out."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        raise ConfigError(record.getMessage())
+
+
+class _CountingBlfReader(can.BLFReader):
+    """Counts objects: python-can takes a log that breaks off for one that ends."""
+
+    n_objects = 0
+
+    def require_all(self) -> None:
+        if self._tail.strip(b"\0"):
+            raise ConfigError("cut off: it ends within an object")
+        if self.n_objects < self.object_count:
+            raise ConfigError(f"{self.n_objects} objects, the header says {self.object_count}")
+
+    def _parse_container(self, data: bytes) -> Iterator[can.Message]:
+        known, at = self._tail + data, -1
+        for frame in super()._parse_container(data):
+            if self._pos == at:  # python-can would read it for ever
+                raise ConfigError("damaged: an object of no length")
+            at = self._pos
+            yield frame
+        self.n_objects += known.count(b"LOBJ", 0, len(known) - len(self._tail))
+
+
+def _of_one_bus(frames: Iterator[can.Message], job: ImportJob) -> Iterator[can.Message]:
     """Frames of the same id on two buses come from two devices."""
+    wanted = job.bus
     bus, other, n_taken = wanted, "", 0
     for frame in frames:
-        found = _bus(frame)
+        found = _bus(frame, job)
         bus = bus or found
         if found == bus:
             n_taken += 1
@@ -67,16 +147,13 @@ def _of_one_bus(frames: Iterator[Any], wanted: str) -> Iterator[Any]:
         raise ConfigError(f'has no frame of bus "{wanted}", but of bus "{other}"')
 
 
-def _bus(frame: Any) -> str:
-    """As a log has it: candump names buses, BLF counts them from 1."""
-    return frame.channel if isinstance(frame.channel, str) else str((frame.channel or 0) + 1)
+def _bus(frame: can.Message, job: ImportJob) -> str:
+    """Name of the bus: candump has names, BLF counts from 1 and python-can from 0."""
+    is_counted = job.format == "blf" and isinstance(frame.channel, int)
+    return str(frame.channel + 1 if is_counted else frame.channel)  # type: ignore[operator]
 
 
-def _frames(stream: BinaryIO, job: ImportJob) -> Iterator[Any]:
-    return frames_of_candump(stream) if job.format == "candump" else frames_of_blf(stream)
-
-
-def _require_possible(frame: Any, number: int) -> None:
+def _require_possible(frame: can.Message, number: int) -> None:
     n_bytes = len(frame.data)
     limit = MAX_DATA if frame.is_fd else 8
     id_limit = 2**29 if frame.is_extended_id else 2**11
@@ -90,18 +167,16 @@ def _require_possible(frame: Any, number: int) -> None:
         raise ConfigError(f"frame {number}: {frame.timestamp} s is no time")
 
 
-def _batch(frames: list[Any], job: ImportJob) -> FrameBatch:
-    data = np.zeros((len(frames), MAX_DATA), np.uint8)
-    for row, frame in zip(data, frames, strict=True):
-        row[: len(frame.data)] = np.frombuffer(frame.data, np.uint8)
+def _batch(frames: list[can.Message], job: ImportJob) -> Frames:
+    found = np.zeros(len(frames), FRAME)
     # a double of seconds since 1970 is good to a fourth of a microsecond
     us = np.rint(np.array([frame.timestamp for frame in frames]) * 1e6).astype(np.int64)
     offset_s = job.time.utc_offset_s if job.format == "blf" else 0
-    return FrameBatch(
-        times_ns=us * 1000 - offset_s * 1_000_000_000,
-        ids=np.array([frame.arbitration_id for frame in frames], np.uint32),
-        extended=np.array([frame.is_extended_id for frame in frames], np.bool_),
-        fd=np.array([frame.is_fd for frame in frames], np.bool_),
-        lengths=np.array([len(frame.data) for frame in frames], np.uint8),
-        data=data,
-    )
+    found["time_ns"] = us * 1000 - offset_s * 1_000_000_000
+    found["id"] = [frame.arbitration_id for frame in frames]
+    found["extended"] = [frame.is_extended_id for frame in frames]
+    found["fd"] = [frame.is_fd for frame in frames]
+    found["length"] = [len(frame.data) for frame in frames]
+    for row, frame in zip(found["data"], frames, strict=True):
+        row[: len(frame.data)] = np.frombuffer(frame.data, np.uint8)
+    return found

@@ -1,4 +1,4 @@
-"""CSV files, line by line, with a limit to everything."""
+"""CSV files, read line by line with limits on lines and columns."""
 
 import csv
 import math
@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.candump import CUT_OFF
-from acquisition.recordings.imports.job import ImportJob, Place
+from acquisition.recordings.imports.job import ColumnName, ImportJob
 from acquisition.recordings.imports.rows import Rows, SlowValues
-from acquisition.recordings.imports.scaling import counts_are_kept, engineering_units
+from acquisition.recordings.imports.series import counts_are_kept, engineering_units
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns, text_to_ns
 from acquisition.recordings.imports.units import require_unit, unit_in
 from core.arrays import FloatArray, RawArray
+
+CUT_OFF = "the file ends within it; if it is whole, put an end to its last line"
 
 MAX_LINE_BYTES = 1_000_000
 MAX_COLUMNS = 4096
@@ -24,7 +25,7 @@ _CELLS = 2**20
 
 
 class CsvTable:
-    """One heading for each column; an empty cell of a slow channel means: as before."""
+    """One heading for each column; an empty cell of a slow channel repeats the value before it."""
 
     def __init__(self, path: Path, job: ImportJob) -> None:
         self._job, self._path = job, path
@@ -85,7 +86,7 @@ class CsvTable:
         except csv.Error as error:
             raise self._wrong(str(error)) from error
 
-    def _column(self, place: Place) -> int:
+    def _column(self, place: ColumnName) -> int:
         found = [n for n, heading in enumerate(self._headings) if heading == place.name]
         if len(found) != 1:
             words = f"there {len(found)} times" if found else "not there"

@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.extras import library
-from acquisition.recordings.imports.job import ImportJob, Place
-from acquisition.recordings.imports.series import SeriesTable
-from acquisition.recordings.imports.times import TimeArray
+from acquisition.recordings.imports.job import ColumnName
+from acquisition.recordings.imports.series import SeriesFile
+from acquisition.recordings.imports.times import TimeArray, library
 
 UNIT_ATTRIBUTES = ("unit", "units")
 PER_COUNT_ATTRIBUTE = "unit_per_count"
@@ -20,27 +19,18 @@ _MAX_CHUNK_BYTES = 2**26
 """HDF5 unpacks whole chunks, however few of their values are asked for."""
 
 
-class Hdf5Table(SeriesTable):
-    """A path is that of a dataset; its unit is its attribute ``unit`` or ``units``."""
-
-    def __init__(self, path: Path, job: ImportJob) -> None:
-        super().__init__(_Hdf5File(path), job)
-
-
-class _Hdf5File:
-    start_ns: int | None = None
+class Hdf5File(SeriesFile):
+    """A name is the path of a dataset; its unit is its attribute ``unit`` or ``units``."""
 
     def __init__(self, path: Path) -> None:
+        super().__init__()
         self._h5py = library("h5py", "HDF5")
         self._file = self._h5py.File(path, "r")
-        self._found: dict[Place, _Hdf5Series] = {}
 
-    def series(self, place: Place) -> "_Hdf5Series":
-        if place not in self._found:
-            self._found[place] = _Hdf5Series(self._dataset(place))
-        return self._found[place]
+    def _find(self, place: ColumnName) -> "_Hdf5Series":
+        return _Hdf5Series(self._dataset(place))
 
-    def _dataset(self, place: Place) -> Any:
+    def _dataset(self, place: ColumnName) -> Any:
         at, parts = self._file, [part for part in str(place).split("/") if part]
         for n, part in enumerate(parts):
             link = at.get(part, getlink=True) if isinstance(at, self._h5py.Group) else None
@@ -53,7 +43,7 @@ class _Hdf5File:
             at = at[part]
         return self._plain(at, place)
 
-    def _plain(self, dataset: Any, place: Place) -> Any:
+    def _plain(self, dataset: Any, place: ColumnName) -> Any:
         if not isinstance(dataset, self._h5py.Dataset):
             raise ConfigError(f"{str(place)[:200]!r} is no dataset")
         if dataset.is_virtual or dataset.external:
@@ -77,7 +67,7 @@ class _Hdf5File:
         return dataset
 
     def _is_written(self, dataset: Any) -> bool:
-        """HDF5 gives zeros, or what it was told to, in the place of what nobody has written."""
+        """Whether all values were written; HDF5 returns a fill value for the others."""
         if dataset.chunks is None:
             return bool(dataset.size == 0 or dataset.id.get_storage_size())
         return bool(dataset.id.get_num_chunks() * dataset.chunks[0] >= dataset.shape[0])

@@ -1,4 +1,4 @@
-"""`ImportJob`: which column of a file is which channel, and how its time is to be read."""
+"""`ImportJob`: columns of the channels of a file, and its time axis."""
 
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -22,16 +22,16 @@ TimeForm: TypeAlias = Literal[
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where a column is.
+class ColumnName:
+    """Name of a column in a file.
 
     Parameters
     ----------
     name
         Heading of a CSV column, path of an HDF5 dataset, name of an MDF or TDMS channel.
     group
-        Group of a TDMS channel; name or number of an MDF channel group. Empty where the name says
-        enough.
+        Group of a TDMS channel; name or number of an MDF channel group. Empty if the name is
+        unique.
     """
 
     name: str
@@ -43,12 +43,12 @@ class Place:
 
 @dataclass(frozen=True)
 class TimeAxis:
-    """How the samples of a file lie in time.
+    """Times of the samples of a file.
 
     Parameters
     ----------
     kind
-        "file": by what the format itself has. "column": by a column. "start": from a given time on
+        "file": times of the format itself. "column": a time column. "start": from a given time on
         at the unit's rate, without a gap.
     form
         What a column has: text, seconds since 1970, seconds since the start, or the format's own
@@ -56,14 +56,14 @@ class TimeAxis:
     start_ns
         Start in UTC; None if the file has it.
     utc_offset_s
-        Time zone of what has none of its own: local time minus UTC.
+        Local time minus UTC, for times without a time zone.
     tolerance
         How far a stamp may be from its place at the unit's rate, in samples.
     """
 
     kind: TimeKind
     utc_offset_s: int
-    place: Place | None = None
+    place: ColumnName | None = None
     form: TimeForm = "elapsed_s"
     start_ns: int | None = None
     tolerance: float = 0.4
@@ -83,11 +83,11 @@ class ChannelColumn:
         Engineering units per count by the channel's calibration: only counts of just this scale
         are taken over as counts.
     per_count
-        The file's unit per count, if the column has counts and the file does not say so itself.
+        The file's unit per count, if the column has counts and the file does not state it.
     """
 
     id: str
-    place: Place
+    place: ColumnName
     unit: str
     factor: float
     calibrated_per_count: float
@@ -105,16 +105,16 @@ class SlowColumn:
     """
 
     id: str
-    place: Place
+    place: ColumnName
     unit: str
     factor: float
     offset: float = 0.0
-    time: Place | None = None
+    time: ColumnName | None = None
 
 
 @dataclass(frozen=True)
 class CsvLayout:
-    """How a CSV file is written.
+    """Format of a CSV file.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ class CsvLayout:
 
 @dataclass(frozen=True)
 class ImportJob:
-    """Everything a reader needs to know.
+    """Description of a file for its reader.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class ImportJob:
     channels, slow
         In the order of the unit.
     bus
-        Whose frames are read, of a CAN log of several; empty if it must be of one.
+        Bus to read from a CAN log of several; empty if the log must be of one.
     """
 
     format: Format

@@ -7,45 +7,36 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.extras import library
-from acquisition.recordings.imports.job import ImportJob, Place
-from acquisition.recordings.imports.series import SeriesTable, require_one
-from acquisition.recordings.imports.times import TimeArray, utc_ns
+from acquisition.recordings.imports.job import ColumnName, ImportJob
+from acquisition.recordings.imports.series import SeriesFile, require_one
+from acquisition.recordings.imports.times import TimeArray, library, utc_ns
 
 _MAGIC = b"MDF     4"
 _LOCAL_TIME = 1
 _NO_CONVERSION, _LINEAR = 0, 1
 _INVALID = 0b11
-"""All samples are invalid, or a bit says which: then there is no count for each of them."""
+"""Flags of a channel whose samples are all invalid, or invalid where a bit is set."""
 
 
-class MdfTable(SeriesTable):
-    """A place is channel and, where needed, name or number of its group."""
+class MdfFile(SeriesFile):
+    """A name is that of a channel and, where needed, name or number of its group."""
 
     def __init__(self, path: Path, job: ImportJob) -> None:
+        super().__init__()
         with path.open("rb") as stream:
             if stream.read(len(_MAGIC)) != _MAGIC:  # asammdf would unpack archives to the disk
                 raise ConfigError("not an MDF file of version 4, or not finished")
-        super().__init__(_MdfFile(path, job), job)
-
-
-class _MdfFile:
-    def __init__(self, path: Path, job: ImportJob) -> None:
         self._mdf = library("asammdf", "MDF4").MDF(path)
         header = self._mdf.header
         is_local = bool(header.time_flags & _LOCAL_TIME)
-        self.start_ns: int | None = int(header.abs_time) - (
-            job.time.utc_offset_s * 1_000_000_000 if is_local else 0
-        )
-        self._found: dict[Place, _MdfSeries] = {}
+        offset_s = job.time.utc_offset_s if is_local else 0
+        self.start_ns: int = int(header.abs_time) - offset_s * 1_000_000_000
 
-    def series(self, place: Place) -> "_MdfSeries":
-        if place not in self._found:
-            all_places = self._mdf.channels_db.get(place.name, ())
-            places = [at for at in all_places if self._is_in(at[0], place.group)]
-            group, index = require_one(places, place, list(self._mdf.channels_db)[:12])
-            self._found[place] = _MdfSeries(self._mdf, group, index, place, self.start_ns or 0)
-        return self._found[place]
+    def _find(self, place: ColumnName) -> "_MdfSeries":
+        all_places = self._mdf.channels_db.get(place.name, ())
+        places = [at for at in all_places if self._is_in(at[0], place.group)]
+        group, index = require_one(places, place, list(self._mdf.channels_db)[:12])
+        return _MdfSeries(self._mdf, group, index, place, self.start_ns)
 
     def _is_in(self, number: int, wanted: str) -> bool:
         name = str(self._mdf.groups[number].channel_group.acq_name or "")
@@ -53,7 +44,7 @@ class _MdfFile:
 
 
 class _MdfSeries:
-    def __init__(self, mdf: Any, group: int, index: int, place: Place, start_ns: int) -> None:
+    def __init__(self, mdf: Any, group: int, index: int, place: ColumnName, start_ns: int) -> None:
         self._mdf, self._group, self._index, self._start_ns = mdf, group, index, start_ns
         channel = mdf.groups[group].channels[index]
         self.n_samples = int(mdf.groups[group].channel_group.cycles_nr)

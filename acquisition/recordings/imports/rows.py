@@ -1,4 +1,4 @@
-"""`Rows`: what every reader makes of its file, and the blocks that come of them."""
+"""Rows of a file to blocks: time stamps to uniform stretches, exact gaps and restarts."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -10,14 +10,28 @@ from acquisition.delivery.block_grid import BlockGrid
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob
-from acquisition.recordings.imports.stretches import Indexer, Stretch
 from acquisition.recordings.imports.times import TimeArray
 from core.arrays import FloatArray, RawArray
+from core.units import NS_PER_S
+
+_PIECE = 512
+"""Rows that are compared with one straight line: short against the drift of a clock."""
+
+_FIRST_ROWS = 64
+_FOLLOWED_ROWS = 256
+"""Over how many rows the line follows the stamps: longer than their jitter, shorter than drift."""
+
+_GAP_STEP = 1.5
+
+_MEDIAN_STEP = (0.6, 1.4)
+"""Median step in samples at the right rate, even with coarse stamps."""
+
+_MIN_STEPS = 16
 
 
 @dataclass(frozen=True)
 class SlowValues:
-    """Values of a slow channel and since when each was valid."""
+    """Values of a slow channel, and the time from which each is valid."""
 
     times_ns: TimeArray
     values: FloatArray
@@ -32,7 +46,7 @@ class Rows:
     samples
         (n_channels, n_rows) int16 counts or float32 engineering units.
     slow
-        For each slow channel what is new up to the last of the rows.
+        New values of each slow channel, at least up to the last row.
     done
         Share of the file that has been read.
     """
@@ -54,8 +68,126 @@ class Table(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Stretch:
+    """Consecutive rows without a gap, and the sample index of the first one."""
+
+    start: int
+    stop: int
+    epoch: int
+    first_index: int
+
+
+class Indexer:
+    """Assigns sample indices to rows by their time stamps, at the rate of the unit.
+
+    A line of constant rate is fitted to the stamps and follows the drift of their clock. A step off
+    the line by a whole number of samples is a gap of that number; a step by a fraction of a sample
+    after a pause is a restart of the device, a new epoch. Everything else, another rate included,
+    is refused. Nothing is interpolated.
+
+    Parameters
+    ----------
+    tolerance
+        How far a stamp may be from its place on the line, in samples.
+    """
+
+    def __init__(self, rate_hz: float, tolerance: float) -> None:
+        self._period_ns = NS_PER_S / rate_hz
+        self._rate_hz = rate_hz
+        self._tolerance = tolerance
+        self._row = 0
+        self._epoch = 0
+        self._next_index = 0
+        self._expected_ns: float | None = None
+        self._origin_ns = 0
+        self._last_ns = 0
+
+    def stretches(self, times_ns: TimeArray) -> Iterator[Stretch]:
+        """Divide the next rows into stretches, whose rows are counted from the first of these.
+
+        Raises
+        ------
+        ConfigError
+            If time goes back, is irregular or of another rate; the message names the row.
+        """
+        start = 0
+        while start < len(times_ns):
+            if self._expected_ns is None:
+                self._lay_line(times_ns[start : start + _FIRST_ROWS])
+            piece = times_ns[start : start + _PIECE]
+            n_fit = self._n_fitting(piece)
+            if n_fit:
+                yield Stretch(start, start + n_fit, self._epoch, self._next_index)
+                self._pass(piece[:n_fit])
+                start += n_fit
+            if n_fit < len(piece):
+                self._step(int(times_ns[start]), piece)
+
+    def _lay_line(self, piece: TimeArray) -> None:
+        """Fit the phase of the line to the first stamps; gaps of whole samples do not matter."""
+        self._origin_ns, self._expected_ns = int(piece[0]), 0.0
+        turns = np.exp(2j * np.pi * self._deviations(piece))
+        self._expected_ns = float(np.angle(turns.mean())) / (2 * np.pi) * self._period_ns
+
+    def _deviations(self, piece: TimeArray) -> np.ndarray:
+        """In samples, from the line."""
+        since_ns = (piece - self._origin_ns).astype(np.float64) - (self._expected_ns or 0.0)
+        return np.asarray(since_ns / self._period_ns - np.arange(len(piece)))
+
+    def _n_fitting(self, piece: TimeArray) -> int:
+        off = np.abs(self._deviations(piece)) > self._tolerance
+        self._require_rate(piece)
+        return int(off.argmax()) if off.any() else len(piece)
+
+    def _pass(self, piece: TimeArray) -> None:
+        gain = len(piece) / (len(piece) + _FOLLOWED_ROWS)
+        off_ns = float(self._deviations(piece).mean()) * self._period_ns
+        ahead_ns = (self._expected_ns or 0.0) + len(piece) * self._period_ns + gain * off_ns
+        moved = int(piece[-1]) - self._origin_ns
+        self._origin_ns, self._expected_ns = int(piece[-1]), ahead_ns - moved
+        self._last_ns = int(piece[-1])
+        self._next_index += len(piece)
+        self._row += len(piece)
+
+    def _step(self, time_ns: int, piece: TimeArray) -> None:
+        """Pass a gap or a restart before the row at this time."""
+        step = (time_ns - self._last_ns) / self._period_ns
+        if step <= 0:
+            raise ConfigError(f"row {self._row + 1}: time goes back by {-step:.3f} samples")
+        off = float(self._deviations(np.array([time_ns], dtype=np.int64))[0])
+        n_missing = round(off)
+        is_whole = abs(off - n_missing) <= self._tolerance
+        in_one_step = abs(step - 1 - n_missing) <= 2 * self._tolerance
+        if step < _GAP_STEP or not in_one_step or n_missing < 1:
+            raise self._irregular(piece, f"a stamp {off:+.3f} samples off its place")
+        if is_whole:
+            self._next_index += n_missing
+            self._expected_ns = (self._expected_ns or 0.0) + n_missing * self._period_ns
+        else:
+            self._epoch, self._next_index = self._epoch + 1, 0
+            self._expected_ns = None
+
+    def _require_rate(self, piece: TimeArray) -> None:
+        """Refuse another rate, every step of which would look like a gap."""
+        steps = np.diff(piece) / self._period_ns
+        if len(steps) >= _MIN_STEPS or (self._row == 0 and len(steps) > 1):
+            low, high = _MEDIAN_STEP
+            if not low <= float(np.median(steps)) <= high:
+                raise self._irregular(piece, f"a step of {np.median(steps):.4g} samples")
+
+    def _irregular(self, piece: TimeArray, what: str) -> ConfigError:
+        steps = np.diff(piece)
+        plain = steps[(steps > 0) & (steps <= 2 * np.median(steps))] if len(steps) else steps
+        found = f"; there they come at {NS_PER_S / plain.mean():.6g} Hz" if len(plain) else ""
+        return ConfigError(
+            f"row {self._row + 1}: {what} where samples at {self._rate_hz:.9g} Hz are needed"
+            f"{found}; padwatch does not resample"
+        )
+
+
 class _Hold:
-    """The last value that was valid at a time."""
+    """Holds the values of a slow channel until their time."""
 
     def __init__(self, id_: str) -> None:
         self._id = id_
@@ -102,7 +234,7 @@ def raw_blocks(tables: Iterable[Rows], job: ImportJob) -> Iterator[tuple[RawBloc
 
 
 def _pieces(rows: Rows, stretch: Stretch, holds: list[_Hold], job: ImportJob) -> Iterator[RawBlock]:
-    """Parts of a stretch that begin at multiples of the grid, so that slow values are theirs."""
+    """Parts of a stretch, cut at multiples of the block length, where slow values are taken."""
     to_grid = -stretch.first_index % job.block_samples or job.block_samples
     starts = [stretch.start, *range(stretch.start + to_grid, stretch.stop, job.block_samples)]
     for start, stop in zip(starts, [*starts[1:], stretch.stop], strict=True):

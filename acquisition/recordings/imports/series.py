@@ -1,5 +1,7 @@
 """Files whose columns can be read from anywhere: one way to rows for HDF5, TDMS and MDF."""
 
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Any, Protocol
 
@@ -7,15 +9,17 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.job import ImportJob, Place, SlowColumn
+from acquisition.recordings.imports.job import ChannelColumn, ColumnName, ImportJob, SlowColumn
 from acquisition.recordings.imports.rows import Rows, SlowValues
-from acquisition.recordings.imports.scaling import counts_are_kept, engineering_units
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns
 from acquisition.recordings.imports.units import require_unit
-from core.arrays import RawArray
+from core.arrays import RawArray, SampleArray
 
 MAX_SAMPLES = 2**29
 """Per channel, as in a recording."""
+
+_SAME_GAIN = 1e-6
+"""Gains that differ by less come from rounding in files; 24 bits cannot tell them apart."""
 
 _ROWS = 65_536
 _SLOW_ROWS = 4096
@@ -30,7 +34,7 @@ class Series(Protocol):
     n_samples: int
 
     per_count: float | None
-    """Unit of the file per count, where the column has int16 counts and says so."""
+    """Unit of the file per count, for a column of int16 counts with a linear scale."""
 
     time_key: object
     """Columns of the same key have the same times."""
@@ -44,15 +48,29 @@ class Series(Protocol):
         ...
 
 
-class SeriesFile(Protocol):
-    """An opened file."""
+class SeriesFile(ABC):
+    """An opened file.
 
-    start_ns: int | None
-    """What its times count from, where it says so."""
+    Attributes
+    ----------
+    start_ns
+        What its times count from, if the file has that.
+    """
 
-    def series(self, place: Place) -> Series:
-        """Find a column; raises ConfigError if it is not there, or there twice."""
-        ...
+    start_ns: int | None = None
+
+    def __init__(self) -> None:
+        self._found: dict[ColumnName, Series] = {}
+
+    def series(self, name: ColumnName) -> Series:
+        """A column; raises ConfigError if it is not there, or there twice."""
+        if name not in self._found:
+            self._found[name] = self._find(name)
+        return self._found[name]
+
+    @abstractmethod
+    def _find(self, name: ColumnName) -> Series:
+        """Find a column that has not been asked for yet."""
 
 
 class SeriesTable:
@@ -99,12 +117,9 @@ class SeriesTable:
         return lengths[0]
 
     def _times_ns(self, start: int, stop: int) -> TimeArray:
-        axis, rate_hz = self._job.time, self._job.rate_hz
-        if axis.kind == "start":
-            return from_start(axis.start_ns or 0, start, stop, rate_hz)
-        if axis.place is not None:
-            return times_in_column(self._file, self._job, axis.place, start, stop)
-        first = self._channels[0].times_ns(start, stop)
+        first = _times_ns(self._file, self._job, None, self._channels[0], start, stop)
+        if self._job.time.kind == "start" or self._job.time.place is not None:
+            return first
         seen = {self._channels[0].time_key}
         for channel, series in zip(self._job.channels, self._channels, strict=True):
             if series.time_key not in seen:
@@ -154,36 +169,37 @@ class _SlowFeed:
             len(times[-1]) and times[-1][-1] > time_ns
         ):
             start, stop = self._next, min(self._next + _SLOW_ROWS, self._series.n_samples)
-            times.append(self._times_ns(start, stop))
+            times.append(
+                _times_ns(self._file, self._job, self._column.time, self._series, start, stop)
+            )
             found = _complete(self._series.values(start, stop), stop - start, self._column.place)
             scale = (self._series.per_count or 1.0) * self._column.factor
             values.append(found.astype(np.float64) * scale + self._column.offset)
             self._next = stop
         return SlowValues(np.concatenate(times), np.concatenate(values))
 
-    def _times_ns(self, start: int, stop: int) -> TimeArray:
-        axis = self._job.time
-        if self._column.time is not None:
-            return times_in_column(self._file, self._job, self._column.time, start, stop)
-        if axis.kind == "start":
-            return from_start(axis.start_ns or 0, start, stop, self._job.rate_hz)
-        if axis.place is not None:
-            return times_in_column(self._file, self._job, axis.place, start, stop)
-        return self._series.times_ns(start, stop)
 
-
-def times_in_column(
-    file: SeriesFile, job: ImportJob, place: Place, start: int, stop: int
+def _times_ns(
+    file: SeriesFile,
+    job: ImportJob,
+    column: ColumnName | None,
+    series: Series,
+    start: int,
+    stop: int,
 ) -> TimeArray:
-    """Times out of a column of numbers, or of the format's own time stamps."""
-    series = file.series(place)
+    """Times of samples of a series by its own time column, or as the job describes them."""
+    if column is None and job.time.kind == "start":
+        return from_start(job.time.start_ns or 0, start, stop, job.rate_hz)
+    column = column or job.time.place
+    if column is None:
+        return series.times_ns(start, stop)
+    values = _complete(file.series(column).values(start, stop), stop - start, column)
     if job.time.form == "timestamp":
-        return _complete(series.values(start, stop), stop - start, place).astype(np.int64)
-    values = _complete(series.values(start, stop), stop - start, place)
+        return values.astype(np.int64)
     return numbers_to_ns(values, job.time, job.time.start_ns or file.start_ns)
 
 
-def _complete(values: npt.NDArray[Any], n_values: int, place: Place) -> npt.NDArray[Any]:
+def _complete(values: npt.NDArray[Any], n_values: int, place: ColumnName) -> npt.NDArray[Any]:
     if values.shape != (n_values,) or values.dtype.kind not in "iuf":
         raise ConfigError(
             f"column {str(place)[:200]!r}: {values.dtype} of shape {values.shape} where"
@@ -192,7 +208,7 @@ def _complete(values: npt.NDArray[Any], n_values: int, place: Place) -> npt.NDAr
     return values
 
 
-def require_one(found: Sequence[Any], place: Place, known: Sequence[str]) -> Any:
+def require_one(found: Sequence[Any], place: ColumnName, known: Sequence[str]) -> Any:
     """The only one of what was found.
 
     Raises
@@ -205,3 +221,35 @@ def require_one(found: Sequence[Any], place: Place, known: Sequence[str]) -> Any
         names = ", ".join(known[:12])[:300]
         raise ConfigError(f"column {str(place)[:200]!r} is {words}; the file has {names}")
     return found[0]
+
+
+def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
+    """Whether all columns have counts, with just the gain of their channel's calibration.
+
+    Parameters
+    ----------
+    per_count
+        Unit of the file per count of each column, as stated in the file; None if it states none.
+    """
+    return all(
+        gain is not None
+        and math.isclose(gain * c.factor, c.calibrated_per_count, rel_tol=_SAME_GAIN)
+        for c, gain in (
+            (c, found or c.per_count) for c, found in zip(job.channels, per_count, strict=True)
+        )
+    )
+
+
+def engineering_units(
+    values: npt.NDArray[np.generic], channel: ChannelColumn, per_count: float | None
+) -> SampleArray:
+    """Values of a column in the unit of its channel; integers that are counts are scaled.
+
+    Parameters
+    ----------
+    per_count
+        As in :func:`counts_are_kept`.
+    """
+    gain = channel.factor * (per_count or channel.per_count or 1.0)
+    with np.errstate(over="ignore"):  # beyond float32 is infinite, and so not finite
+        return (values.astype(np.float64) * gain).astype(np.float32)

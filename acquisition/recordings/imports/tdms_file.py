@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.extras import library
-from acquisition.recordings.imports.job import ImportJob, Place
-from acquisition.recordings.imports.series import SeriesTable, require_one
-from acquisition.recordings.imports.times import TimeArray, from_start
+from acquisition.recordings.imports.job import ColumnName
+from acquisition.recordings.imports.series import SeriesFile, require_one
+from acquisition.recordings.imports.times import TimeArray, from_start, library
 
 _EPOCH_1904_S = -2_082_844_800
 _UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
@@ -24,41 +23,32 @@ _BIG_ENDIAN = 1 << 6
 _UNFINISHED = 2**64 - 1
 
 
-class TdmsTable(SeriesTable):
-    """A place is group and channel; time of its own is that of the waveform properties."""
-
-    def __init__(self, path: Path, job: ImportJob) -> None:
-        super().__init__(_TdmsFile(path), job)
-
-
-class _TdmsFile:
-    start_ns: int | None = None
+class TdmsFile(SeriesFile):
+    """A name is group and channel; time of its own is that of the waveform properties."""
 
     def __init__(self, path: Path) -> None:
-        # an open file, not a path: npTDMS would believe an index file that lies beside it
+        super().__init__()
+        # an open file, not a path: npTDMS would use an index file beside it
         self._stream = path.open("rb")
         _require_whole(self._stream)
         self._file = library("nptdms", "TDMS").TdmsFile.open(self._stream, raw_timestamps=True)
-        self._found: dict[Place, _TdmsSeries] = {}
 
-    def series(self, place: Place) -> "_TdmsSeries":
-        if place not in self._found:
-            channels = [
-                channel
-                for group in self._file.groups()
-                if place.group in ("", group.name)
-                for channel in group.channels()
-                if channel.name == place.name
-            ]
-            self._found[place] = _TdmsSeries(require_one(channels, place, self._names()), place)
-        return self._found[place]
+    def _find(self, place: ColumnName) -> "_TdmsSeries":
+        channels = [
+            channel
+            for group in self._file.groups()
+            if place.group in ("", group.name)
+            for channel in group.channels()
+            if channel.name == place.name
+        ]
+        return _TdmsSeries(require_one(channels, place, self._names()), place)
 
     def _names(self) -> list[str]:
         return [f"{g.name}/{c.name}" for g in self._file.groups() for c in g.channels()[:12]][:12]
 
 
 class _TdmsSeries:
-    def __init__(self, channel: Any, place: Place) -> None:
+    def __init__(self, channel: Any, place: ColumnName) -> None:
         self._channel, self._place = channel, place
         self._properties = channel.properties
         self.n_samples = len(channel)

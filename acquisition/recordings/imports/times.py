@@ -1,5 +1,6 @@
-"""Time as files have it, to UTC nanoseconds in whole microseconds."""
+"""Times of files to UTC nanoseconds in whole microseconds; libraries that are optional."""
 
+import importlib
 from datetime import UTC, datetime, timedelta, timezone
 from typing import Any
 
@@ -26,12 +27,12 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
     Parameters
     ----------
     start_ns
-        What "elapsed" counts from, in UTC.
+        Origin of "elapsed" times, in UTC.
 
     Raises
     ------
     ConfigError
-        If a value is no time, or a start is missing.
+        If a value is not a time, or a start is missing.
     """
     origin, _, unit = axis.form.partition("_")
     if unit not in _US_PER:
@@ -76,7 +77,7 @@ def text_to_ns(texts: list[str], axis: TimeAxis) -> TimeArray:
     Raises
     ------
     ConfigError
-        If one is no time.
+        If one is not a time.
     """
     zone = timezone(timedelta(seconds=axis.utc_offset_s))
     return utc_ns(np.array([_text_to_us(text, zone) for text in texts], dtype=np.int64), 0)
@@ -96,3 +97,17 @@ def from_start(start_ns: int, first: int, stop: int, rate_hz: float) -> TimeArra
     """Times of the samples from one index to another, without a gap."""
     number = np.arange(first, stop, dtype=np.float64)
     return utc_ns(np.floor(number * (1e6 / rate_hz)).astype(np.int64), start_ns)
+
+
+def library(name: str, what: str) -> Any:
+    """Import an optional library.
+
+    Raises
+    ------
+    ConfigError
+        If it is not installed.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise ConfigError(f"{what} needs {name}: pip install 'padwatch[imports]'") from error

@@ -1,4 +1,4 @@
-"""Units as files write them, and what they are in the units of channels; nothing is guessed."""
+"""Spellings of units in files, and their factors to the units of channels; no guesses."""
 
 import re
 from collections.abc import Iterable
@@ -47,7 +47,7 @@ _SLOW: dict[str, dict[str, tuple[float, float]]] = {
 
 
 def canonical(unit: str) -> str:
-    """The one spelling of a unit that padwatch knows; any other text stays what it is."""
+    """Canonical spelling of a unit; an unknown text is unchanged."""
     return _CANONICAL.get(unit.strip(), unit.strip())
 
 
@@ -57,12 +57,12 @@ def waveform_factor(measurand: Measurand, unit: str, unit_per_v: float) -> float
     Parameters
     ----------
     unit_per_v
-        Of the channel's calibration: what a volt is.
+        Engineering units per volt, of the channel's calibration.
 
     Raises
     ------
     ConfigError
-        If the unit is not one in which such a quantity is measured.
+        If the unit is not one of this quantity.
     """
     known = _WAVEFORMS[measurand] | {volt: v * unit_per_v for volt, v in _VOLTS.items()}
     if canonical(unit) not in known:

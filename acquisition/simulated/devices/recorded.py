@@ -5,7 +5,7 @@ from collections import deque
 from acquisition.delivery.block_grid import BlockGrid
 from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.reader import Recording
-from acquisition.recordings.selection import Selection, all_of
+from acquisition.recordings.source import Selection, all_of
 from acquisition.simulated.feed import FeedEndedError
 
 

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.delivery.epochs import TOLD, Epochs
-from acquisition.recordings.limits import MAX_INDEX
+from acquisition.recordings.manifest import MAX_INDEX
 
 NS_PER_S = 1_000_000_000
 BEGUN_NS = 1_767_225_600 * NS_PER_S

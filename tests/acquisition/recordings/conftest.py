@@ -1,14 +1,19 @@
 """A unit of two channels, blocks whose samples are their own numbers, and a recording of them."""
 
+import io
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from acquisition.delivery.raw import RawBlock
+from acquisition.errors import ConfigError
+from acquisition.recordings import reader
+from acquisition.recordings.child import answer
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
+from acquisition.recordings.messages import Message, receive, send
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand
 
@@ -72,3 +77,20 @@ def record(tmp_path: Path, unit: RecordedUnit) -> Callable[..., Path]:
         return folder
 
     return recorded
+
+
+@pytest.fixture
+def reads_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read recordings within the process of the test, where it can change the reader."""
+
+    def messages(path: Path, format_: str, _: str, request: dict[str, object]) -> Iterator[Message]:
+        out = io.BytesIO()
+        answer({"path": str(path), "format": format_} | request, out)
+        send(out, {"kind": "end"})
+        out.seek(0)
+        while (message := receive(out.read))[0]["kind"] == "blocks":
+            yield message
+        if message[0]["kind"] == "error":
+            raise ConfigError(message[0]["message"])
+
+    monkeypatch.setattr(reader, "confined_messages", messages)

@@ -1,12 +1,28 @@
-"""Reading foreign files: libraries that are missing, and limits of the reading process."""
+"""Reading foreign files: libraries that are missing, limits and ends of the reading process."""
 
+import errno
+import io
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from unittest.mock import Mock
 
+import pyarrow.parquet as pq
 import pytest
 
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.extras import library
+from acquisition.recordings import reading
+from acquisition.recordings.child import answer
+from acquisition.recordings.confined import ConfinedProcess
+from acquisition.recordings.imports.times import library
+from acquisition.recordings.messages import receive
+from acquisition.recordings.reader import open_recording
+
+Record = Callable[..., Path]
+Numbered = Callable[..., RawBlock]
 
 CONFINED = """
 import resource
@@ -31,3 +47,57 @@ def test_a_library_that_is_not_installed_is_named_with_how_to_get_it() -> None:
         ConfigError, match=r"^XYZ needs absent_one: pip install 'padwatch\[imports\]'$"
     ):
         library("absent_one", "XYZ")
+
+
+@pytest.mark.parametrize(
+    ("number", "cause"),
+    [("SIGKILL", InterruptedError), ("SIGTERM", InterruptedError), ("SIGSEGV", EOFError)],
+)
+def test_a_child_that_the_system_has_ended_is_no_fault_of_the_recording(
+    record: Record,
+    numbered: Numbered,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    number: str,
+    cause: type,
+) -> None:
+    recording = open_recording(record([numbered(0, 50)]))
+    (tmp_path / "ended.py").write_text(f"import os, signal; os.kill(os.getpid(), signal.{number})")
+    monkeypatch.syspath_prepend(tmp_path)
+    with monkeypatch.context() as patch:
+        ended = partial(ConfinedProcess, "ended", environment={})
+        patch.setattr(reading, "_idle_or_new", ended)
+        with pytest.raises(ConfigError, match=f"recording: reading it was ended by {number}") as it:
+            list(recording.heads())
+    assert isinstance(it.value.__cause__, cause)
+    with monkeypatch.context() as patch:
+        patch.setattr(reading, "ConfinedProcess", lambda *_, **__: ended())
+        reading.close_idle_children()
+        with pytest.raises(ConfigError, match=f"no process to read it: .*{number}") as it:
+            list(recording.heads())
+    assert isinstance(it.value.__cause__, OSError)
+    assert len(list(recording.heads())) == 1
+
+
+def test_what_is_not_read_to_its_end_is_never_taken_for_the_next(
+    record: Record, numbered: Numbered
+) -> None:
+    recording = open_recording(record([numbered(50 * n, 50) for n in range(600)]))
+    blocks = recording.raw_blocks()
+    assert next(blocks).first_index == 0
+    blocks.close()
+    found = [block.first_index for block in recording.raw_blocks(500)]
+    assert found == list(range(25_000, 30_000, 50))
+
+
+def test_an_error_of_the_disk_keeps_its_number(
+    record: Record, numbered: Numbered, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fails = Mock(side_effect=OSError(errno.EIO, "Input/output error"))
+    recording = open_recording(record([numbered(0, 50)]))
+    monkeypatch.setattr(pq, "ParquetFile", fails)
+    request = {"manifest": recording.manifest.model_dump(mode="json"), "first": 0, "stop": 1}
+    out = io.BytesIO()
+    answer({"path": str(recording.folder), "format": "recording", "samples": True} | request, out)
+    out.seek(0)
+    assert receive(out.read)[0]["errno"] == errno.EIO

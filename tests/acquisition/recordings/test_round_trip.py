@@ -22,7 +22,7 @@ from acquisition.delivery.calibration import (
 )
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.recordings import reader, tables, writer
+from acquisition.recordings import child, tables, writer
 from acquisition.recordings.inversion import raw_of
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from acquisition.recordings.reader import open_recording
@@ -125,16 +125,18 @@ def test_any_stream_of_blocks_comes_back_bit_for_bit(
 
 
 @pytest.mark.parametrize("n_each", [1, 7, 64, 200])
+@pytest.mark.usefixtures("reads_here")
 def test_blocks_of_any_length_come_back_across_the_borders_of_row_groups(
     record: Callable[..., Path], numbered: Numbered, monkeypatch: pytest.MonkeyPatch, n_each: int
 ) -> None:
-    for module in (writer, reader):
+    for module in (writer, child):
         monkeypatch.setattr(module, "ROWS_PER_GROUP", 200)
         monkeypatch.setattr(module, "BLOCKS_PER_GROUP", 10)
     blocks = [numbered(n_each * n, n_each) for n in range(900 // n_each + 3)]
     opened = open_recording(record(blocks))
     assert list(map(bits, opened.raw_blocks())) == list(map(bits, blocks))
     assert list(map(bits, opened.raw_blocks(3))) == list(map(bits, blocks[3:]))
+    assert list(map(bits, opened.raw_blocks(2, 4))) == list(map(bits, blocks[2:4]))
     with tables.parquet_file(
         opened.folder / "samples.parquet",
         tables.samples_schema(opened.manifest),

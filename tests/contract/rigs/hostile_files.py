@@ -25,15 +25,16 @@ from pathlib import Path
 from pydantic import TypeAdapter
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob
-from acquisition.recordings.reading import reading
+from acquisition.recordings.reading import close_idle_children, imported_blocks, imported_frames
 
 job, said = TypeAdapter(ImportJob).validate_json(sys.argv[1]), []
 for path in sys.argv[2:]:
     try:
-        with reading(Path(path), job) as found:
-            said.append(str(sum(block.n_samples for block in found.blocks())))
+        read = imported_blocks if job.channels else imported_frames
+        said.append(str(sum(1 for _ in read(Path(path), job))))
     except ConfigError as error:
         said.append(str(error))
+close_idle_children()
 status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text().splitlines())
 own = int(status["VmHWM"].split()[0]) // 1024
 child = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss // 1024

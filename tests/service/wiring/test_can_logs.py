@@ -14,7 +14,7 @@ from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
-from acquisition.recordings.reading import reading
+from acquisition.recordings.reading import imported_frames
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_frames import WireFrame
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_dbc, daq_settings
@@ -65,8 +65,8 @@ def test_every_sample_flag_and_stamp_comes_back(
     settings: CanSettings = daq_settings(shape, link, ("um", "um"))
     decoder = CanLogDecoder(settings, counts_calibration())
     job = ImportJob(format=kind, rate_hz=600.0, time=TimeAxis("file", 0))
-    with reading(tmp_path / "log", job) as found:
-        raws = [raw for frames in found.frames() for raw in decoder.take(frames)]
+    read = imported_frames(tmp_path / "log", job)
+    raws = [raw for frames, _ in read for raw in decoder.take(frames)]
     assert on_grid(raws) == on_grid(feed.sent)
 
 
@@ -87,10 +87,9 @@ def test_a_log_of_two_devices_under_the_same_ids_is_refused(
     link = CanLinkSettings(interface="virtual", channel="none")
     decoder = CanLogDecoder(daq_settings(shape, link, ("um", "um")), counts_calibration())
     job = ImportJob(format="candump", rate_hz=600.0, time=TimeAxis("file", 0))
-    with reading(tmp_path / "log", job) as found:
-        every_batch = map(decoder.take, found.frames())
-        with pytest.raises(ConfigError, match="do two devices send the same ids"):
-            list(every_batch)
+    every_batch = (decoder.take(frames) for frames, _ in imported_frames(tmp_path / "log", job))
+    with pytest.raises(ConfigError, match="do two devices send the same ids"):
+        list(every_batch)
 
 
 def write_log(path: Path, kind: str, *devices: CanDevice) -> None:

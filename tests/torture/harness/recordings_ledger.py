@@ -12,7 +12,8 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.reader import BlockHead, Recording, open_recording
+from acquisition.recordings.messages import BlockHead
+from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.summary import summary_of
 from harness.ledger_daq import Offered
 from harness.ledger_plant import LedgerPlant

@@ -1,89 +1,25 @@
 """A run of two waveform channels and a slow one, and jobs that read it back."""
 
-import gc
-import sys
-import tempfile
-import traceback
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
 
 from acquisition.delivery.raw import RawBlock
-from acquisition.recordings import reading as reading_module
-from acquisition.recordings.child import answer
-from acquisition.recordings.confined import printable
-from acquisition.recordings.imports.job import ChannelColumn, ImportJob, Place, SlowColumn, TimeAxis
-from acquisition.recordings.reading import reading
+from acquisition.recordings.imports.job import (
+    ChannelColumn,
+    ColumnName,
+    ImportJob,
+    SlowColumn,
+    TimeAxis,
+)
+from acquisition.recordings.reading import imported_blocks
 
 START_NS = 1_767_225_600_000_000_000
 PER_COUNT = 12.0 / 32768 * 250.0
-
-
-class _ReadingHere:
-    """Stands in for the reading process, and for its pipes: reads as soon as the job is closed."""
-
-    def __init__(self, path: Path, found: IO[bytes]) -> None:
-        self._path, self.found = path, found
-        self._job, self._last_words = b"", ""
-
-    @property
-    def job(self) -> "_ReadingHere":
-        return self
-
-    def write(self, job: bytes) -> None:
-        self._job += job
-
-    def close(self) -> None:
-        gc.freeze()  # only what the reader leaves behind is collected below
-        try:
-            with _without_warnings():
-                self._answer()
-                gc.collect()
-        finally:
-            gc.unfreeze()
-        self.found.seek(0)
-
-    def _answer(self) -> None:
-        try:
-            answer(self._path, TypeAdapter(ImportJob).validate_json(self._job), self.found)
-        except Exception as error:  # as the end of a process
-            self._last_words = traceback.format_exception_only(error)[-1].strip()
-
-    def last_words(self) -> str:
-        return printable(self._last_words)
-
-
-@contextmanager
-def _without_warnings() -> Iterator[None]:
-    """A process that has read its file ends without closing it, and without a test to fail."""
-    with warnings.catch_warnings(), pytest.MonkeyPatch.context() as patch:
-        warnings.simplefilter("ignore")
-        patch.setattr(sys, "unraisablehook", lambda _: None)
-        yield
-
-
-@contextmanager
-def _reads_here(_module: str, path: Path, _environment: object) -> Iterator[_ReadingHere]:
-    with tempfile.TemporaryFile() as found:
-        yield _ReadingHere(path.absolute(), found)
-
-
-@pytest.fixture
-def confined() -> None:
-    """Read in a process of its own, as in a plant; the other tests read within their own."""
-
-
-@pytest.fixture(autouse=True)
-def _reading_process(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    if "confined" not in request.fixturenames:
-        monkeypatch.setattr(reading_module, "reading_process", _reads_here)
 
 
 @dataclass(frozen=True)
@@ -123,12 +59,12 @@ def job() -> ImportJob:
     return ImportJob(
         format="csv",
         rate_hz=600.0,
-        time=TimeAxis("column", 0, Place("time"), "elapsed_s", START_NS),
+        time=TimeAxis("column", 0, ColumnName("time"), "elapsed_s", START_NS),
         channels=(
-            ChannelColumn("x", Place("shaft x"), "um", 1.0, PER_COUNT),
-            ChannelColumn("y", Place("shaft y"), "um", 1.0, PER_COUNT),
+            ChannelColumn("x", ColumnName("shaft x"), "um", 1.0, PER_COUNT),
+            ChannelColumn("y", ColumnName("shaft y"), "um", 1.0, PER_COUNT),
         ),
-        slow=(SlowColumn("oil", Place("oil"), "degC", 1.0, time=Place("oil time")),),
+        slow=(SlowColumn("oil", ColumnName("oil"), "degC", 1.0, time=ColumnName("oil time")),),
     )
 
 
@@ -151,8 +87,8 @@ class Found:
 @pytest.fixture
 def read() -> Callable[[Path, ImportJob], Found]:
     def read_all(path: Path, job: ImportJob) -> Found:
-        with reading(path, job) as found:
-            return Found(found.sample_type, list(found.blocks()))
+        blocks = [block for block, _ in imported_blocks(path, job)]
+        return Found(blocks[0].counts.dtype.name, blocks)
 
     return read_all
 
@@ -177,10 +113,12 @@ def placed() -> Callable[[ImportJob, str], ImportJob]:
     def in_groups(job: ImportJob, waveforms: str = "waveforms", slow: str = "slow") -> ImportJob:
         return replace(
             job,
-            time=replace(job.time, place=Place("time", waveforms)),
-            channels=tuple(replace(c, place=Place(c.place.name, waveforms)) for c in job.channels),
+            time=replace(job.time, place=ColumnName("time", waveforms)),
+            channels=tuple(
+                replace(c, place=ColumnName(c.place.name, waveforms)) for c in job.channels
+            ),
             slow=tuple(
-                replace(c, place=Place(c.place.name, slow), time=Place("oil time", slow))
+                replace(c, place=ColumnName(c.place.name, slow), time=ColumnName("oil time", slow))
                 for c in job.slow
             ),
         )

@@ -12,7 +12,13 @@ import pytest
 from acquisition.delivery.calibration import calibrate
 from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.export import ExportFormat, export_recording
-from acquisition.recordings.imports.job import ChannelColumn, ImportJob, Place, SlowColumn, TimeAxis
+from acquisition.recordings.imports.job import (
+    ChannelColumn,
+    ColumnName,
+    ImportJob,
+    SlowColumn,
+    TimeAxis,
+)
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.writer import RecordingWriter
@@ -75,18 +81,19 @@ def recording(tmp_path: Path, sample_type: str) -> Recording:
 JOB = ImportJob(
     format="csv",
     rate_hz=600.0,
-    time=TimeAxis("column", 0, Place("time_utc"), "iso8601"),
+    time=TimeAxis("column", 0, ColumnName("time_utc"), "iso8601"),
     channels=tuple(
-        ChannelColumn(id_, Place(f"{id_} [{unit}]"), unit, 1.0, 1.0)
+        ChannelColumn(id_, ColumnName(f"{id_} [{unit}]"), unit, 1.0, 1.0)
         for id_, (_, unit) in MEASURANDS.items()
     ),
-    slow=tuple(SlowColumn(id_, Place(f"{id_} [{unit}]"), unit, 1.0) for id_, unit in SLOW.items()),
+    slow=tuple(
+        SlowColumn(id_, ColumnName(f"{id_} [{unit}]"), unit, 1.0) for id_, unit in SLOW.items()
+    ),
 )
 """As somebody who looks into the exported file would map it."""
 
 
 @pytest.mark.parametrize("sample_type", ["float32", "int16"])
-@pytest.mark.usefixtures("confined")
 def test_every_block_is_the_same_to_the_last_bit(
     recording: Recording, tmp_path: Path, read: Callable[..., Any]
 ) -> None:

@@ -15,7 +15,7 @@ import pytest
 from asammdf.blocks.v4_blocks import ChannelConversion
 
 from acquisition.errors import ConfigError
-from acquisition.recordings.imports.job import CsvLayout, ImportJob, Place, TimeAxis
+from acquisition.recordings.imports.job import ColumnName, CsvLayout, ImportJob, TimeAxis
 
 START_NS = 1_767_225_600_000_000_000
 START = datetime(2026, 1, 1, tzinfo=UTC)
@@ -172,7 +172,7 @@ def test_a_unit_or_a_column_that_is_not_the_mapped_one_is_refused(
 ) -> None:
     group = "" if kind == "csv" else "waveforms"
     with pytest.raises(ConfigError, match="shaft z' is not there"):
-        imported(kind, run.units_um, with_channels(place=Place("shaft z", group)))
+        imported(kind, run.units_um, with_channels(place=ColumnName("shaft z", group)))
     if kind != "csv":  # has units in its headings only
         says = r"'waveforms/shaft x' is in '(u|µ)m', the mapping says"
         with pytest.raises(ConfigError, match=says):
