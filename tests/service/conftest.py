@@ -2,12 +2,14 @@
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from itertools import count
 from pathlib import Path
 
 import pytest
 from harness.places import Place, PostgresPlace, SqlitePlace
 from harness.postgres_server import PostgresServer, shared_server, why_not
+from rigs.database_copy import copy_database
 from rigs.memory_folder import memory_folder
 
 from service.origin import Origin
@@ -33,6 +35,16 @@ def deploy() -> Path:
 def plant_text() -> str:
     """The demonstration plant: two units, each with channels, bearings and simulation."""
     return (DEPLOY / "demo.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def plant_path(plant_text: str, tmp_path: Path) -> Path:
+    """A file of that plant, with its data in a folder that is not there yet."""
+    path, old = tmp_path / "plant.toml", 'data_folder = "var/demo"'
+    assert old in plant_text
+    new = f'data_folder = "{tmp_path / "data"}"'
+    path.write_text(plant_text.replace(old, new), encoding="utf-8")
+    return path
 
 
 @pytest.fixture
@@ -105,6 +117,13 @@ def database_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("database") / "padwatch.sqlite3"
     SqliteStore(path).close()
     return path
+
+
+@pytest.fixture
+def store(database_file: Path, tmp_path: Path) -> Iterator[SqliteStore]:
+    """An open, empty store, whose file is ``padwatch.sqlite3`` in the folder of the test."""
+    with closing(SqliteStore(copy_database(database_file, tmp_path))) as opened:
+        yield opened
 
 
 @pytest.fixture

@@ -36,13 +36,6 @@ def monitor() -> UnitMonitor:
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Iterator[SqliteStore]:
-    opened = SqliteStore(tmp_path / "padwatch.sqlite3")
-    yield opened
-    opened.close()
-
-
-@pytest.fixture
 def in_force(monitor: UnitMonitor, store: SqliteStore, stepped_clock: Clock) -> ReferencesInForce:
     return ReferencesInForce({"U1": monitor}, store, stepped_clock)
 

@@ -237,13 +237,6 @@ def read_only(
 
 
 @pytest.fixture
-def store(database_file: Path, tmp_path: Path) -> Iterator[SqliteStore]:
-    opened = SqliteStore(copy_database(database_file, tmp_path))
-    yield opened
-    opened.close()
-
-
-@pytest.fixture
 async def service(plant: PlantFile, store: SqliteStore, tmp_path: Path) -> AsyncIterator[Service]:
     """A service of the test's own that has just started."""
     built = await build(plant, store, tmp_path)

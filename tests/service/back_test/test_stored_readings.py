@@ -62,15 +62,6 @@ def film_reading(n: int, bearing: str) -> FilmReading:
 
 
 @pytest.fixture
-def plant_path(plant_text: str, tmp_path: Path) -> Path:
-    path, folder = tmp_path / "plant.toml", tmp_path / "data"
-    old = 'data_folder = "var/demo"'
-    assert old in plant_text
-    path.write_text(plant_text.replace(old, f'data_folder = "{folder}"'), encoding="utf-8")
-    return path
-
-
-@pytest.fixture
 def filled(plant_path: Path) -> Path:
     """A plant file whose database has readings of two bearings."""
     store = SqliteStore(plant_path.parent / "data" / "padwatch.sqlite3")

@@ -52,19 +52,6 @@ def test_a_port_in_use_is_one_line_and_exit_1(plant_path: Path, tmp_path: Path) 
     assert not (tmp_path / "data").exists()
 
 
-def test_a_database_of_another_program_is_one_line_and_exit_1(
-    plant_path: Path, tmp_path: Path
-) -> None:
-    plant_path.write_text(plant_path.read_text().replace("port = 0", "port = 502"))
-    database = tmp_path / "data" / "padwatch.sqlite3"
-    database.parent.mkdir()
-    database.write_bytes(b"not a database at all, but some text" * 100)
-
-    result = padwatch_program("run", plant_path, "--port", "0")
-
-    assert result == (1, "", f"padwatch: {database}: file is not a database\n")
-
-
 def test_the_example_is_a_plant_file_that_passes_the_check(tmp_path: Path) -> None:
     path = tmp_path / "plant.toml"
     path.write_text(padwatch("config", "example").stdout, encoding="utf-8")

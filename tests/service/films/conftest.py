@@ -1,7 +1,6 @@
 """Films in a real store, with readings of a made-up machine."""
 
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -17,17 +16,9 @@ from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingLimits, OperatingState
 from core.machine.unit import Estimator
 from core.quality import Reason
-from service.store.sqlite import SqliteStore
 
 OPERATING = OperatingLimits(92.3, 330.0, warm_up_s=3600.0)
 NOTHING_SAID = FilmFinding(Verdict.NO_BASELINE)
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[SqliteStore]:
-    opened = SqliteStore(tmp_path / "padwatch.sqlite3")
-    yield opened
-    opened.close()
 
 
 @pytest.fixture

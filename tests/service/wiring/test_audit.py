@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -16,12 +15,6 @@ from service.settings.plant import PlantFile
 from service.store.audit_port import AuditQuery
 from service.store.sqlite import SqliteStore
 from service.wiring.audit import ServiceTrail
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[SqliteStore]:
-    with closing(SqliteStore(tmp_path / "padwatch.sqlite3")) as opened:
-        yield opened
 
 
 @pytest.fixture
