@@ -8,6 +8,7 @@ from typing import Any
 from zoneinfo import ZoneInfo
 
 import pytest
+from harness.waiting import until
 from rigs.tiers import fast_and_long
 
 from core.limits import AlarmLevel, Condition
@@ -198,9 +199,7 @@ async def test_a_clock_that_is_set_gives_nothing_up(
 
 
 async def until_quiet(sender: Any) -> None:
-    async with asyncio.timeout(30):
-        while sender.status.state is not SenderState.QUIET:
-            await asyncio.sleep(0)
+    await until(lambda: sender.status.state is SenderState.QUIET)
 
 
 async def test_quiet_hours_hold_what_is_no_danger_and_a_danger_ends_them_in_order(
@@ -233,9 +232,7 @@ async def test_a_disk_that_refuses_to_note_a_delivery_never_makes_it_happen_twic
     sender = room.sender(server, store)
 
     async with room.running(sender):
-        async with asyncio.timeout(30):
-            while room.clock.slept_s.count(1.0) < 3:
-                await asyncio.sleep(0)
+        await until(lambda: room.clock.slept_s.count(1.0) >= 3)
         assert sender.status.state is SenderState.STORE_FAILS
         with store._writing() as writer:
             writer.execute("DROP TRIGGER refuse")

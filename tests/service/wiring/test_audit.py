@@ -10,16 +10,10 @@ import pytest
 from acquisition.clock import SystemClock
 from service.audit.entry import AuditEntry
 from service.origin import Origin
-from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.audit_port import AuditQuery
 from service.store.sqlite import SqliteStore
 from service.wiring.audit import ServiceTrail
-
-
-@pytest.fixture
-def plant(deploy: Path) -> PlantFile:
-    return load_plant_file(deploy / "demo.toml")
 
 
 def told(store: SqliteStore) -> list[AuditEntry]:

@@ -1,6 +1,5 @@
 """Evidence of a film that has changed: document, page, bundle, whatever people write."""
 
-import asyncio
 import io
 import json
 import zipfile
@@ -12,6 +11,7 @@ from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
+from harness.waiting import at_work, until
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmKind, AlarmRule
 from core.alarms.event import AlarmNews
@@ -28,10 +28,8 @@ HOSTILE = '<script>alert("1")</script><img src=x onerror=alert(2)>'
 
 @asynccontextmanager
 async def keeping(service: Any) -> AsyncIterator[None]:
-    task = asyncio.create_task(service.evidence.run())
-    yield
-    task.cancel()
-    await asyncio.wait([task])
+    async with at_work(service.evidence.run()):
+        yield
     await service.evidence.close()
 
 
@@ -51,9 +49,8 @@ def raised(service: Any, machine: Any) -> AlarmNews:
 async def alarmed(service: Any, machine: Any) -> AlarmNews:
     """The same, and its evidence has been written."""
     news = raised(service, machine)
-    async with keeping(service), asyncio.timeout(60):
-        while service.evidence.n_written < 1:
-            await asyncio.sleep(0.001)
+    async with keeping(service):
+        await until(lambda: service.evidence.n_written)
     return news
 
 
