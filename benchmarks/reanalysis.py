@@ -50,9 +50,7 @@ def main() -> None:
         wall_s = time.monotonic() - start_s
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     used_s = used.ru_utime + used.ru_stime
-    print(
-        f"{SECONDS / 60:g} min, the newest results printed: {wall_s:.2f} s, {used_s:.2f} s of one core"
-    )
+    print(f"{SECONDS / 60:g} min, newest results: {wall_s:.2f} s, {used_s:.2f} s of one core")
     print(f"  {SECONDS / used_s:.0f} times real time per core")
 
 

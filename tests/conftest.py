@@ -13,8 +13,11 @@ sys.dont_write_bytecode = False
 import asyncio
 import gc
 import re
+import shutil
+import subprocess
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -182,6 +185,20 @@ def counts_calibration() -> Callable[..., UnitCalibration]:
 def assessment() -> Callable[..., Assessment]:
     """Builds assessments; keywords are readings."""
     return build_assessment
+
+
+@pytest.fixture(scope="session")
+def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A certificate of 127.0.0.1, which only itself vouches for, and its key."""
+    if shutil.which("openssl") is None:
+        pytest.skip("needs openssl")
+    folder = tmp_path_factory.mktemp("tls")
+    files = folder / "a.crt", folder / "a.key"
+    command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256"]
+    names = ["-subj", "/CN=test", "-addext", "subjectAltName=IP:127.0.0.1", "-days", "2"]
+    out = ["-nodes", "-out", str(files[0]), "-keyout", str(files[1])]
+    subprocess.run([*command, *names, *out], check=True, capture_output=True)
+    return files
 
 
 FilmLife = Callable[..., StiffnessHistory]

@@ -2,22 +2,37 @@
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from itertools import count
 from pathlib import Path
 
+import numpy as np
 import pytest
 from harness.places import Place, PostgresPlace, SqlitePlace
 from harness.postgres_server import PostgresServer, shared_server, why_not
+from rigs.database_copy import copy_database
 from rigs.memory_folder import memory_folder
 
+from core.baseline.history import ReadingOutcome, StiffnessHistory
+from core.change.backtest import operation_history
+from core.change.decision import INITIAL_DECISION, Verdict
+from core.change.film_judge import FilmFinding, FilmNews
+from core.change.film_reading import FilmReading, FilmValue
+from core.condition.cells import BearingCondition
+from core.condition.operating_state import OperatingLimits, OperatingState
+from core.machine.unit import Estimator
+from core.quality import Reason
 from service.origin import Origin
 from service.settings.loading import PlantFileError, load_plant_file
+from service.settings.plant import PlantFile
+from service.settings.units import UnitSettings
 from service.store.postgres.address import PostgresAddress
 from service.store.postgres.database import PostgresDatabase
 from service.store.sqlite import SqliteStore
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 
+OPERATING = OperatingLimits(92.3, 330.0, warm_up_s=3600.0)
 TEMPLATE = "padwatch_template"
 NUMBERS = count()
 PLACES = ("sqlite", "postgres")
@@ -33,6 +48,28 @@ def deploy() -> Path:
 def plant_text() -> str:
     """The demonstration plant: two units, each with channels, bearings and simulation."""
     return (DEPLOY / "demo.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def plant() -> PlantFile:
+    """The same, loaded: U1 at part load, U2 at full load."""
+    return load_plant_file(DEPLOY / "demo.toml")
+
+
+@pytest.fixture(scope="session")
+def unit(plant: PlantFile) -> UnitSettings:
+    """Unit U1 of it."""
+    return plant.unit[0]
+
+
+@pytest.fixture
+def plant_path(plant_text: str, tmp_path: Path) -> Path:
+    """A file of that plant, with its data in a folder that is not there yet."""
+    path, old = tmp_path / "plant.toml", 'data_folder = "var/demo"'
+    assert old in plant_text
+    new = f'data_folder = "{tmp_path / "data"}"'
+    path.write_text(plant_text.replace(old, new), encoding="utf-8")
+    return path
 
 
 @pytest.fixture
@@ -61,6 +98,58 @@ def mistakes(tmp_path: Path) -> Callable[[str | bytes], list[str]]:
         return [line.removeprefix(f"{path}:") for line in lines]
 
     return refused
+
+
+@pytest.fixture(scope="session")
+def film_news() -> Callable[..., list[FilmNews]]:
+    """Makes news, without any verdict, of the readings of a history under operating limits."""
+
+    def tell(
+        history: StiffnessHistory, limits: OperatingLimits = OPERATING, bearing: str = "UJB"
+    ) -> list[FilmNews]:
+        found = operation_history(history.time_ns, history.speed_rpm, history.power_mw, limits)
+        said = FilmFinding(Verdict.NO_BASELINE)
+        return [
+            FilmNews(
+                reading_at(history, i, bearing, int(found.state[i]), bool(found.is_settled[i])),
+                (said, said),
+                (INITIAL_DECISION, INITIAL_DECISION),
+            )
+            for i in range(len(history))
+        ]
+
+    return tell
+
+
+def reading_at(
+    history: StiffnessHistory, i: int, bearing: str, state: int, is_settled: bool
+) -> FilmReading:
+    x, y = (
+        FilmValue(
+            float(history.ln_k[row, i]),
+            float(history.u_random[row, i]),
+            float(history.shaft_um_pk[row, i]),
+            float(history.bearing_um_pk[row, i]),
+            ReadingOutcome.MEASURED
+            if np.isfinite(history.ln_k[row, i])
+            else ReadingOutcome.BAD_QUALITY,
+            Reason.OK if np.isfinite(history.ln_k[row, i]) else Reason.LOW_COVERAGE,
+        )
+        for row in range(2)
+    )
+    numbers = (
+        *("speed_rpm", "power_mw", "eccentricity_ratio", "u_eccentricity"),
+        *("attitude_deg", "oil_temperature_c"),
+    )
+    return FilmReading(
+        "U1",
+        bearing,
+        Estimator.DYNAMIC,
+        int(history.time_ns[i]),
+        BearingCondition(OperatingState(state), is_settled, None),
+        **{name: float(getattr(history, name)[i]) for name in numbers},
+        values=(x, y),
+    )
 
 
 @pytest.fixture(scope="session")
@@ -105,6 +194,13 @@ def database_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("database") / "padwatch.sqlite3"
     SqliteStore(path).close()
     return path
+
+
+@pytest.fixture
+def store(database_file: Path, tmp_path: Path) -> Iterator[SqliteStore]:
+    """An open, empty store, whose file is ``padwatch.sqlite3`` in the folder of the test."""
+    with closing(SqliteStore(copy_database(database_file, tmp_path))) as opened:
+        yield opened
 
 
 @pytest.fixture

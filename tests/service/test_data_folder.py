@@ -1,8 +1,10 @@
-"""A service keeps its results only where they are kept."""
+"""A service keeps its results only where they are kept, and alone."""
 
+import os
 from pathlib import Path
 
 import pytest
+from rigs.command_line import padwatch
 from structlog.testing import capture_logs
 
 from service.instance import only_one
@@ -29,3 +31,11 @@ def test_a_data_folder_that_may_forget_is_warned_of_and_a_local_disk_is_not(tmp_
             pass
         warned = [(entry["log_level"], entry["why"]) for entry in logs]
         assert warned == ([("warning", found.warning)] if found.warning else [])
+
+
+def test_a_second_service_on_the_same_data_is_refused_in_one_line(plant_path: Path) -> None:
+    plant_path.write_text(plant_path.read_text().replace("port = 0", "port = 9"))
+    with only_one(plant_path.parent / "data" / "padwatch.sqlite3"):
+        found = padwatch("run", plant_path, "--port", "0")
+    assert (found.exit_code, found.stderr.count("\n")) == (1, 1)
+    assert f"another padwatch (process {os.getpid()}) works with" in found.stderr

@@ -19,17 +19,11 @@ from core.monitor.settings import AnalysisSettings
 from core.samples.blocks import Rejection
 from service.conversion import calibration_of, machine_of
 from service.reanalysis import LastAverages, assessment_model, assessments, calibration_differences
-from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
 from service.wiring.recordings import recording_of, recording_source, recording_writer, selection_of
 from service.wiring.simulations import simulated_feed
 
 ANALYSIS = AnalysisSettings(segment_samples=1024, n_segments=4)
-
-
-@pytest.fixture
-def unit(deploy: Path) -> UnitSettings:
-    return load_plant_file(deploy / "demo.toml").unit[0]
 
 
 def rough_ride(unit: UnitSettings, clock) -> Iterator[RawBlock]:

@@ -1,12 +1,12 @@
 """References: refused with the reason, or stored and taken over while the service runs."""
 
-import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import structlog
+from harness.waiting import at_work, until
 
 from acquisition.clock import Clock
 from core.machine.channel import Channel, Measurand
@@ -37,13 +37,6 @@ def monitor() -> UnitMonitor:
 
 
 @pytest.fixture
-def store(tmp_path: Path) -> Iterator[SqliteStore]:
-    opened = SqliteStore(tmp_path / "padwatch.sqlite3")
-    yield opened
-    opened.close()
-
-
-@pytest.fixture
 def in_force(monitor: UnitMonitor, store: SqliteStore, stepped_clock: Clock) -> ReferencesInForce:
     return ReferencesInForce({"U1": monitor}, store, stepped_clock)
 
@@ -56,12 +49,6 @@ def logged() -> Iterator[list[Any]]:
 
 def watched(monitor: UnitMonitor) -> dict[str, tuple[float, float]]:
     return {bearing.id: bearing.gap_reference_um for bearing in monitor.unit.bearings}
-
-
-async def until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(30):
-        while not condition():
-            await asyncio.sleep(0.001)
 
 
 async def test_a_bearing_is_watched_with_the_reference_set_last(
@@ -85,14 +72,13 @@ async def test_a_reference_set_while_the_service_runs_is_taken_over_at_the_next_
     stepped_clock: Clock,
     logged: list[Any],
 ) -> None:
-    running = asyncio.create_task(in_force.run())
-    for x_um in (1990.0, 1991.0, 1992.0):
-        store.add_reference(reference(x_um=x_um))
-        await until(lambda x_um=x_um: watched(monitor)["UJB"][0] == x_um)
-    taken_s = stepped_clock.monotonic_s()
-    await until(lambda: stepped_clock.monotonic_s() >= taken_s + 3 * LOOK_EVERY_S)  # nothing new
-    running.cancel()
-    await asyncio.wait([running])
+    async with at_work(in_force.run()):
+        for x_um in (1990.0, 1991.0, 1992.0):
+            store.add_reference(reference(x_um=x_um))
+            await until(lambda x_um=x_um: watched(monitor)["UJB"][0] == x_um)
+        taken_s = stepped_clock.monotonic_s()
+        quiet_s = 3 * LOOK_EVERY_S
+        await until(lambda: stepped_clock.monotonic_s() >= taken_s + quiet_s)  # nothing new
 
     assert stepped_clock.monotonic_s() % LOOK_EVERY_S == 0.0
     assert LOOK_EVERY_S <= 5.0

@@ -1,8 +1,6 @@
 """The program with logins: over TLS, over a unix socket, and its first account."""
 
-import shutil
 import ssl
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,20 +13,6 @@ from .conftest import PATIENCE_S, Start
 Write = Callable[..., Path]
 
 PASSWORD = "the river is high in may"  # noqa: S105
-
-
-@pytest.fixture(scope="session")
-def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """A certificate for 127.0.0.1 and its key."""
-    if shutil.which("openssl") is None:
-        pytest.skip("needs openssl")
-    folder = tmp_path_factory.mktemp("tls")
-    files = folder / "padwatch.crt", folder / "padwatch.key"
-    command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256"]
-    names = ["-subj", "/CN=padwatch", "-addext", "subjectAltName=IP:127.0.0.1", "-days", "2"]
-    out = ["-nodes", "-out", str(files[0]), "-keyout", str(files[1])]
-    subprocess.run([*command, *names, *out], check=True, capture_output=True)
-    return files
 
 
 @pytest.fixture

@@ -14,17 +14,6 @@ from .conftest import Program, Start
 Children = Callable[[int], list[int]]
 Gone = Callable[[int], Awaitable[None]]
 
-FILMS_N_PER_M = {"UJB": 0.69e9, "LJB": 0.37e9, "TJB": 1.5e9}
-K_EFF = "order1_k_eff_xx_n_per_m"
-
-
-def has_results(overview: Any) -> bool:
-    return all(
-        bearing["readings"][K_EFF]["value"] is not None
-        for unit in overview["units"]
-        for bearing in unit["bearings"]
-    )
-
 
 def all_are(state: str) -> Callable[[Any], bool]:
     return lambda units: all(unit["source"]["state"] == state for unit in units)
@@ -38,28 +27,6 @@ async def demo(start: Start, tmp_path: Path) -> AsyncIterator[Program]:
     await program.wait_for_url()
     yield program
     os.umask(before)
-
-
-@pytest.mark.long
-async def test_the_demo_shows_the_stiffness_of_its_films(demo: Program) -> None:
-    overview = await demo.until("/api/v1/overview", has_results)
-
-    for unit in overview["units"]:
-        assert unit["source"]["state"] == "connected"
-        for bearing in unit["bearings"]:
-            film = FILMS_N_PER_M[bearing["bearing"]]
-            assert bearing["readings"][K_EFF]["value"] == pytest.approx(film, rel=0.3)
-    trend = await demo.get(
-        "/api/v1/units/U1/bearings/UJB/trends",
-        quantity=K_EFF,
-        start="2000-01-01T00:00:00Z",
-        end="2200-01-01T00:00:00Z",
-    )
-    first = overview["units"][0]["bearings"][0]["readings"][K_EFF]["value"]
-    assert first in trend["series"][K_EFF]["mean"]
-    assert await demo.end(signal.SIGTERM) == 0
-    assert demo.errors.count('"event": "connected"') >= 2
-    assert '"level": "error"' not in demo.errors
 
 
 async def test_the_demo_ends_with_ctrl_c_in_order_and_takes_its_daq_along(

@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 from acquisition.delivery.calibration import calibrate
-from acquisition.simulated.plant.faults import Fault, FaultKind
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.scenario import (
     BearingScenario,
@@ -175,16 +174,3 @@ def test_runout_that_is_taken_off_no_longer_silences_the_line(
         assert speaking.readings[name].value == pytest.approx(0.5e9, rel=0.05)
         runout = [line for line in speaking.budgets[name].lines if line.name == "runout"]
         assert all(line.contribution == 0.0 for line in runout)
-
-
-@pytest.mark.parametrize("kind", [FaultKind.STUCK, FaultKind.DEAD])
-def test_a_pick_up_that_fails_leaves_the_speed_channel_and_no_phase_reference(
-    settings: UnitSettings, unit: Unit, kind: FaultKind
-) -> None:
-    broken = record(settings, {"kp": ChannelScenario(faults=(Fault(kind, 30_000),))}, 90)
-    found = upper(with_runout_limit(unit, 10.0), broken, min_coherence=0.0)
-    assert found.speed_source is SpeedSource.SLOW_CHANNEL
-    assert set(found.runout.values()) == {RunoutVerdict.NO_PHASE_REFERENCE}
-    # some of the averaged segments still hold the runout, and so the line says nothing
-    silent = bad(Reason.INSUFFICIENT_EXCITATION)
-    assert found.readings["order1_k_eff_xx_n_per_m"].quality == silent

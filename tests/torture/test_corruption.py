@@ -17,13 +17,14 @@ from rigs.recording import recorded
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.reader import open_recording
+from acquisition.recordings.summary import summary_of
 from acquisition.recordings.writer import RecordingWriter
 from service.store.port import StoreError
 from service.store.seals.table import SealedTable
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.checking import findings
 
-N_STORES, N_RECORDINGS = 1600, 400
+N_STORES, N_RECORDINGS = 1600, 5000
 N_DEEDS = 60
 DATABASE = "padwatch.sqlite3"
 TARGETS = (
@@ -142,7 +143,8 @@ def read(folder: Path) -> bytes:
         f"{b.epoch} {b.first_index} {b.start_ns} {b.ok} {b.slow}".encode() + b.counts.tobytes()
         for b in opened.raw_blocks()
     ]
-    return repr(opened.manifest.calibration).encode() + b"".join(blocks)
+    told = f"{opened.manifest} {summary_of(opened).n_samples}"
+    return told.encode() + b"".join(blocks)
 
 
 def test_no_wrong_sample_is_read_from_a_damaged_recording(
@@ -157,4 +159,4 @@ def test_no_wrong_sample_is_read_from_a_damaged_recording(
             assert read(tmp_path / "run") == content, done
         except ConfigError:
             n_refused += 1
-    assert n_refused
+    assert n_refused > 0.9 * torture.times(N_RECORDINGS)

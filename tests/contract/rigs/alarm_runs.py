@@ -15,7 +15,6 @@ from service.store.port import AlarmQuery
 Make = Callable[..., Any]
 
 PROBE = "U1:sx:channel_not_ok"
-AMPLITUDE = "U1:UJB:order1_shaft_x"
 LINK = "U1:link:link_lost"
 BLOCK_NS = 1_280_000_000
 T0 = 1_767_225_600_000_000_000

@@ -11,6 +11,7 @@ from typing import Any
 import httpx2
 import pytest
 from fastapi import FastAPI
+from harness.waiting import at_work
 from rigs.capturing import ALERT, T0
 from rigs.database_copy import copy_database
 from rigs.described import described_app
@@ -39,7 +40,6 @@ from service.parked_rows import FILE, ParkedRows
 from service.recorder import Recorder
 from service.references import ReferencesInForce
 from service.security.roles import Role
-from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
 from service.wiring.captures import captures_of
@@ -72,12 +72,6 @@ class SetClock:
         """Let time pass by both clocks of the host, as it does where nobody sets one."""
         self.ns += duration_ns
         self.s += duration_ns / 1e9
-
-
-@pytest.fixture(scope="session")
-def plant() -> PlantFile:
-    """The demonstration plant: U1 at part load, U2 at full load."""
-    return load_plant_file(DEMO)
 
 
 @pytest.fixture(scope="session")
@@ -237,20 +231,11 @@ def read_only(
 
 
 @pytest.fixture
-def store(database_file: Path, tmp_path: Path) -> Iterator[SqliteStore]:
-    opened = SqliteStore(copy_database(database_file, tmp_path))
-    yield opened
-    opened.close()
-
-
-@pytest.fixture
 async def service(plant: PlantFile, store: SqliteStore, tmp_path: Path) -> AsyncIterator[Service]:
     """A service of the test's own that has just started."""
     built = await build(plant, store, tmp_path)
-    recording = asyncio.create_task(built.recorder.run())
-    yield built
-    recording.cancel()
-    await asyncio.wait([recording])
+    async with at_work(built.recorder.run()):
+        yield built
 
 
 @pytest.fixture

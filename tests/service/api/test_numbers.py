@@ -46,10 +46,18 @@ async def test_a_parameter_that_is_no_number_is_named(read_only: Any) -> None:
             assert name in {mistake["parameter"].split(".")[0] for mistake in problem["errors"]}
 
 
-async def test_a_body_with_a_number_that_is_none_is_refused(read_only: Any) -> None:
+async def test_a_body_with_a_number_that_is_none_or_without_a_shape_is_refused(
+    read_only: Any,
+) -> None:
     path = "/api/v1/alarms/U1:ujb_shaft_x:channel_not_ok/shelve"
-    for written in ("NaN", "Infinity", "-Infinity", "1e999", '"nan"'):
-        body = f'{{"actor": "A. Name", "reason": "test", "duration_s": {written}}}'
+    whole = '{"actor": "A. Name", "reason": "test", "duration_s": %s}'
+    numbers = ("NaN", "Infinity", "-Infinity", "1e999", '"nan"')
+    reasons = (r'"a\ud800"', r'"a\u0000b"')
+    for body in (
+        *("", "null", whole[:-1] % 60.0),
+        *(whole % written for written in numbers),
+        *(whole.replace('"test"', reason) % 60.0 for reason in reasons),
+    ):
         headers = {"content-type": "application/json"}
         answer = await read_only.client.post(path, content=body, headers=headers)
-        assert answer.status_code == 422, written
+        assert answer.status_code == 422, body

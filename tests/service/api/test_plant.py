@@ -1,5 +1,6 @@
-"""What the API says of the plant as a whole."""
+"""What the API says of the plant as a whole, its configuration and the health of its service."""
 
+import json
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,9 @@ from core.quality import GOOD
 from core.samples.account import Gap, SampleAccount
 from core.samples.blocks import SampleBlock
 from core.samples.device_clock import DeviceClock, StampFault
+from service.evidence.configuration import Configuration
+from service.live import LinkState
+from service.settings.schema import plant_file_schema
 from service.store.port import UnitGap
 
 
@@ -97,3 +101,63 @@ async def test_the_overview_shows_each_bearing_and_the_catalogue_every_quantity(
     assert await read_only.json("/api/v1/quantities") == [
         {"name": q.name, "unit": q.unit, "label": q.label} for q in CATALOGUE
     ]
+
+
+async def test_the_configuration_is_the_plant_file_under_the_version_of_its_evidence(
+    read_only: Any,
+) -> None:
+    body = await read_only.json("/api/v1/configuration")
+
+    settings = body["settings"]
+    assert settings["plant"] == {"name": "Demo plant"}
+    assert [unit["id"] for unit in settings["unit"]] == ["U1", "U2"]
+    document = {
+        "format": "padwatch-configuration",
+        "version": 1,
+        "padwatch": body["padwatch"],
+        "commit": body["commit"],
+        "settings": settings,
+    }
+    text = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
+    assert body["version"] == Configuration(text.encode()).version
+    meaning = await read_only.get(body["json_schema"])
+    assert meaning.headers["content-type"] == "application/schema+json"
+    assert meaning.json() == plant_file_schema()
+
+
+async def test_a_service_that_works_is_alive_and_ready(read_only: Any) -> None:
+    assert (await read_only.json("/livez"))["status"] == "ok"
+    ready = await read_only.json("/readyz")
+
+    assert ready == {
+        "status": "ok",
+        "checks": {
+            "unit U1": "connected",
+            "unit U2": "not_connected",
+            "store": "ok",
+            "database": "sqlite",
+            "stored data": "ok",
+        },
+    }
+
+
+async def test_a_full_disk_and_a_dead_loop_are_named_and_make_it_unready_but_not_dead(
+    running: Any,
+) -> None:
+    running.live.set_link("U1", LinkState.NOT_CONNECTED, "timed out")
+    assert (await running.json("/readyz"))["status"] == "ok"  # a DAQ that is away is no reason
+    running.live.store_error, running.live.n_unstored = "disk I/O error", 3
+    full = await running.get("/readyz")
+    overview = await running.json("/api/v1/overview")
+    assert (await running.get("/livez")).status_code == 200
+    running.live.store_error = None
+    running.loops |= {"record": None, "alarms": "has ended"}
+    response = await running.get("/readyz")
+
+    assert (full.status_code, full.json()["status"]) == (503, "not ready")
+    assert full.json()["checks"]["store"] == "disk I/O error"
+    assert overview["store"] == {"error": "disk I/O error", "n_unstored": 3}
+    assert (response.status_code, response.json()["status"]) == (503, "not ready")
+    assert response.json()["checks"]["loop record"] == "alive"
+    assert response.json()["checks"]["loop alarms"] == "has ended"
+    assert (await running.get("/livez")).status_code == 200

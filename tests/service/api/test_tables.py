@@ -7,6 +7,10 @@ from typing import Any
 import pyarrow.parquet as pq
 
 HOUR_NS = 3_600_000_000_000
+NASTY = (
+    *("'; DROP TABLE assessment; --", '<script>alert("1")</script>', "-2+3", "@SUM(A1:A9)"),
+    *('=HYPERLINK("http://evil.example")', "+1+cmd|' /C calc'!A0", "{{7*7}} ${7*7} %s %n"),
+)
 RANGE = {"start": "2026-01-01T00:00:00Z", "end": "2026-02-01T00:00:00Z"}
 
 
@@ -42,6 +46,22 @@ async def test_the_history_of_alarms_is_the_same_as_csv(service: Any) -> None:
     assert rows[0]["reason"] == "'＝1+1"  # no spreadsheet takes it for a formula
     page = await service.get("/api/v1/alarms/events", limit=1, format="csv")
     assert page.headers["padwatch-next-cursor"] == str(events[0]["id"])
+
+
+async def test_words_with_code_in_them_stay_words_and_are_no_formula_in_a_csv_file(
+    service: Any,
+) -> None:
+    path = f"/api/v1/alarms/{await unanswered(service)}/comment"
+    for words in NASTY:
+        body = {"actor": words, "text": words}
+        assert (await service.client.post(path, json=body)).status_code == 200
+    events = (await service.json("/api/v1/alarms/events", limit=len(NASTY)))["events"]
+    assert [event["actor"] for event in events] == [*reversed(NASTY)]
+    assert [event["reason"] for event in events] == [*reversed(NASTY)]
+    for table in ("/api/v1/alarms/events", "/api/v1/audit"):
+        cells = {cell for row in await rows_of(service, table) for cell in row.values()}
+        assert f"'{NASTY[4]}" in cells
+        assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@"))]
 
 
 async def test_the_audit_trail_is_the_same_as_csv(service: Any) -> None:

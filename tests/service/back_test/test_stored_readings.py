@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow.csv as pacsv
 import pytest
 from click.testing import Result
-from typer.testing import CliRunner
+from rigs.command_line import padwatch
 
 from core.baseline.history import ReadingOutcome
 from core.change.decision import INITIAL_DECISION, Verdict
@@ -18,7 +18,6 @@ from core.machine.unit import Estimator
 from core.quality import Reason
 from service.back_test import stored
 from service.back_test.reading import read_histories
-from service.cli import readings as commands
 from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000
@@ -60,15 +59,6 @@ def film_reading(n: int, bearing: str) -> FilmReading:
 
 
 @pytest.fixture
-def plant_path(plant_text: str, tmp_path: Path) -> Path:
-    path, folder = tmp_path / "plant.toml", tmp_path / "data"
-    old = 'data_folder = "var/demo"'
-    assert old in plant_text
-    path.write_text(plant_text.replace(old, f'data_folder = "{folder}"'), encoding="utf-8")
-    return path
-
-
-@pytest.fixture
 def filled(plant_path: Path) -> Path:
     """A plant file whose database has readings of two bearings."""
     store = SqliteStore(plant_path.parent / "data" / "padwatch.sqlite3")
@@ -82,7 +72,7 @@ def filled(plant_path: Path) -> Path:
 
 
 def export(*arguments: object) -> Result:
-    return CliRunner().invoke(commands.app, ["export", *map(str, arguments)])
+    return padwatch("readings", "export", *arguments)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
@@ -132,10 +122,3 @@ def test_what_cannot_be_written_is_said_and_leaves_nothing_behind(
     out.write_text("mine", encoding="utf-8")
     assert export(filled, out).exit_code == 1
     assert out.read_text(encoding="utf-8") == "mine"
-
-
-def test_a_plant_without_a_database_gets_none_by_looking(plant_path: Path, tmp_path: Path) -> None:
-    result = export(plant_path, tmp_path / "readings.csv")
-    assert result.exit_code == 1
-    assert "there is no database" in result.output
-    assert not (tmp_path / "data").exists()

@@ -212,14 +212,6 @@ def test_an_overhaul_begins_a_new_baseline_of_its_bearing(
     )
 
 
-def test_an_event_of_a_bearing_without_readings_is_refused(
-    two_units: Any, histories: Histories, learning: Learning
-) -> None:
-    event = MachineEvent("U3", None, two_units.damaged_ns, "overhaul")
-    with pytest.raises(ReadingsError, match="event of U3: there are no readings of it"):
-        run_back_test(histories, BackTestRules(learning, events=[event]))
-
-
 def test_without_attitude_or_shaft_motion_less_is_known_and_said(
     histories: Histories, learning: Learning
 ) -> None:
@@ -301,15 +293,3 @@ def test_a_bearing_that_is_never_warm_is_said_to_be(
     (doubt,) = found.doubts
     assert doubt.startswith("U1 TJB: none of ")
     assert "each run ends before the oil temperature has settled" in doubt
-
-
-def test_readings_that_are_further_apart_than_told_are_doubted(
-    histories: Histories, learning: Learning
-) -> None:
-    place = ("U1", "TJB")
-    rules = BackTestRules(learning, baseline=BaselineSettings(reading_h=1.0))
-    found = run_back_test({place: histories[place]}, rules)
-    assert found.doubts == [
-        "U1 TJB: readings are 10 min apart and are taken to stand for 60 min each;"
-        " set reading_period_s"
-    ]

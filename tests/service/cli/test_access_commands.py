@@ -141,20 +141,6 @@ def test_what_cannot_be_done_ends_with_one_sentence_and_changes_nothing(
     assert access.accounts.all() == before
 
 
-def test_looking_creates_no_database(padwatch: Padwatch, plant_path: Path) -> None:
-    for group, command, *arguments in (
-        ("users", "list"),
-        ("users", "remove", "anna"),
-        ("users", "role", "anna", "admin"),
-        ("keys", "list"),
-        ("keys", "revoke", "0" * 12),
-    ):
-        found = padwatch(group, command, *arguments)
-        assert found.exit_code == 1
-        assert "there is no such database" in found.stderr
-    assert not (plant_path.parent / "data").exists()
-
-
 def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
     padwatch: Padwatch, access: AccessStore, plant_path: Path
 ) -> None:

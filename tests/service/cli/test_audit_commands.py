@@ -89,14 +89,3 @@ def test_an_export_never_overwrites(plant_path: Path, database: Path) -> None:
     assert audit("export", plant_path, out.with_suffix(".xls")).exit_code == 2
     assert out.read_text() == "mine"
     assert database.exists()
-
-
-def test_where_there_is_no_database_that_is_said(plant_path: Path) -> None:
-    for arguments in (
-        ("verify", plant_path),
-        ("export", plant_path, plant_path.with_name("a.csv")),
-    ):
-        said = audit(*arguments)
-        assert said.exit_code == 1
-        assert "there is no database" in said.stderr
-    assert sorted(path.name for path in plant_path.parent.iterdir()) == ["plant.toml"]

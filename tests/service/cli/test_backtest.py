@@ -123,11 +123,3 @@ def test_states_are_neither_guessed_nor_needed_where_speed_and_power_tell(
     rated = "rated_power_mw = 700.0\nrated_speed_rpm"
     plant_path.write_text(plant_path.read_text().replace("rated_speed_rpm", rated, 1))
     assert padwatch("backtest", readings, "--plant", plant_path).exit_code == 0
-
-
-def test_a_missing_file_is_said(tmp_path: Path) -> None:
-    result = padwatch("backtest", tmp_path / "none.csv")
-    assert result.exit_code == 1
-    assert (
-        result.stderr == f"padwatch backtest: {tmp_path / 'none.csv'}: No such file or directory\n"
-    )

@@ -52,17 +52,23 @@ def test_a_port_in_use_is_one_line_and_exit_1(plant_path: Path, tmp_path: Path) 
     assert not (tmp_path / "data").exists()
 
 
-def test_a_database_of_another_program_is_one_line_and_exit_1(
-    plant_path: Path, tmp_path: Path
+@pytest.mark.parametrize(
+    "command",
+    [
+        *("users list PLANT", "users remove PLANT anna", "users role PLANT anna admin"),
+        *("keys list PLANT", "keys revoke PLANT 000000000000"),
+        *("audit verify PLANT", "audit export PLANT OUT.csv"),
+        *("store check PLANT", "readings export PLANT OUT.csv"),
+    ],
+)
+def test_a_command_that_looks_says_that_there_is_no_database_and_makes_none(
+    plant_path: Path, command: str
 ) -> None:
-    plant_path.write_text(plant_path.read_text().replace("port = 0", "port = 502"))
-    database = tmp_path / "data" / "padwatch.sqlite3"
-    database.parent.mkdir()
-    database.write_bytes(b"not a database at all, but some text" * 100)
-
-    result = padwatch_program("run", plant_path, "--port", "0")
-
-    assert result == (1, "", f"padwatch: {database}: file is not a database\n")
+    places = {"PLANT": plant_path, "OUT.csv": plant_path.with_name("out.csv")}
+    result = padwatch(*(places.get(word, word) for word in command.split()))
+    assert result.exit_code == 1
+    assert re.search("there is no (such )?database", result.stderr)
+    assert [path.name for path in plant_path.parent.iterdir()] == ["plant.toml"]
 
 
 def test_the_example_is_a_plant_file_that_passes_the_check(tmp_path: Path) -> None:

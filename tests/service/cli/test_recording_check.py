@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from rigs.command_line import padwatch
 
 from acquisition.clock import SystemClock
 from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
-from service.cli.commands import app
 from service.settings.loading import load_plant_file
 from service.wiring.recorded_units import recorded_unit
 from service.wiring.stores import open_store
@@ -48,7 +47,7 @@ def plant(plant_path: Path) -> Path:
 
 
 def run(plant: Path, *options: str) -> Any:
-    return CliRunner().invoke(app, ["recording", "check", str(plant), *options])
+    return padwatch("recording", "check", plant, *options)
 
 
 def test_a_plant_whose_recordings_are_whole_is_said_to_be(plant: Path) -> None:

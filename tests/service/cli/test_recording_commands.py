@@ -216,13 +216,6 @@ def test_a_recording_of_something_else_is_refused_naming_both(
     assert result.stderr.count("\n") == 1
 
 
-def test_a_damaged_recording_is_one_line_and_exit_1(plant_path: Path, recording: Path) -> None:
-    (recording / "samples.parquet").write_bytes(b"PAR1")
-    result = padwatch("reanalyse", recording, "--plant", plant_path)
-    assert (result.exit_code, result.stdout) == (1, ""), result.stderr
-    assert result.stderr.startswith(f"padwatch reanalyse: {recording}/samples.parquet: 4 bytes, ")
-
-
 def test_a_recording_too_short_for_a_segment_says_so(
     plant: PlantFile, plant_path: Path, tmp_path: Path
 ) -> None:

@@ -6,12 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import Result
-from typer.testing import CliRunner
+from rigs.command_line import padwatch
 
 from acquisition.delivery.calibration import calibrate
 from acquisition.delivery.raw import RawBlock
 from core.samples.blocks import Rejection
-from service.cli import recording as commands
 from service.conversion import calibration_of
 from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
@@ -21,7 +20,7 @@ START_NS = 1_767_225_600_000_000_000
 
 
 def padwatch_recording(*arguments: object) -> Result:
-    return CliRunner().invoke(commands.app, [str(argument) for argument in arguments])
+    return padwatch("recording", *arguments)
 
 
 @pytest.fixture

@@ -78,12 +78,3 @@ def test_a_service_that_writes_meanwhile_is_no_fault(
         result = padwatch("store", "check", plant)
 
     assert result.exit_code == 0, result.output
-
-
-def test_a_plant_without_a_database_is_told(plant: Path) -> None:
-    (plant.parent / "data" / "padwatch.sqlite3").unlink()
-
-    result = padwatch("store", "check", plant)
-
-    assert result.exit_code == 1
-    assert "there is no database" in result.stderr

@@ -1,11 +1,11 @@
 """A tape with its writer running, fed block by block with samples that are their own numbers."""
 
-import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
 
 import pytest
+from harness.waiting import at_work
 from rigs import capturing
 from rigs.capturing import Rig, block
 from rigs.standing_clock import StandingClock
@@ -49,10 +49,8 @@ def running() -> Running:
     @asynccontextmanager
     async def run(root: Path, units: tuple[str, ...] = ("U1",)) -> AsyncIterator[TapeRig]:
         rig = TapeRig(root, units)
-        task = asyncio.create_task(rig.tape.run())
-        yield rig
-        task.cancel()
-        await asyncio.wait([task])
+        async with at_work(rig.tape.run()):
+            yield rig
         await rig.tape.close()
 
     return run

@@ -120,9 +120,18 @@ def test_packed_and_plain_are_the_same_file_with_different_tags(client) -> None:
     assert packed.headers["etag"] != plain.headers["etag"]
 
 
-@pytest.mark.parametrize("path", ["nothing.js", "../routes.py", "%2e%2e/routes.py", "charts", ""])
+@pytest.mark.parametrize(
+    "path",
+    [
+        *("nothing.js", "../routes.py", "%2e%2e/routes.py", "charts", ""),
+        *("%2e%2e/%2e%2e/%2e%2e/%2e%2e/etc/passwd", "..%2f..%2f..%2f..%2fetc%2fpasswd"),
+        *("%252e%252e%252fetc/passwd", "..\\..\\..\\etc\\passwd", "/etc/passwd", "%00"),
+    ],
+)
 def test_nothing_else_is_served(client, path) -> None:
-    assert client.get(FILES + path).status_code == 404
+    answer = client.get(FILES + path)
+    assert answer.status_code == 404
+    assert "root:" not in answer.text
 
 
 def test_every_answer_names_the_edition_even_a_refusal() -> None:

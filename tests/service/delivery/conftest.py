@@ -3,13 +3,13 @@
 import asyncio
 import itertools
 import ssl
-import subprocess
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
+from harness.waiting import at_work
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
@@ -165,42 +165,12 @@ async def serving(
         await server.wait_closed()
 
 
-@pytest.fixture(scope="session")
-def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A certificate of 127.0.0.1 with its key, in one file; nobody vouches for it but itself."""
-    both = tmp_path_factory.mktemp("tls") / "both.pem"
-    subprocess.run(
-        [
-            *("openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256"),
-            *("-nodes", "-keyout", both, "-out", both, "-days", "2", "-subj", "/CN=test"),
-            *("-addext", "subjectAltName=IP:127.0.0.1"),
-        ],
-        check=True,
-        capture_output=True,
-    )
-    return both
-
-
 @pytest.fixture
-def server_tls(certificate: Path) -> ssl.SSLContext:
+def server_tls(certificate: tuple[Path, Path]) -> ssl.SSLContext:
     """What a server needs for TLS."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-    context.load_cert_chain(certificate)
+    context.load_cert_chain(*certificate)
     return context
-
-
-@asynccontextmanager
-async def at_work(*senders: Sender) -> AsyncIterator[None]:
-    """Senders that run for a while; an error of one fails the test."""
-    tasks = [asyncio.create_task(sender.run()) for sender in senders]
-    try:
-        yield
-    finally:
-        for task in tasks:
-            task.cancel()
-        await asyncio.wait(tasks)
-        for task in tasks:  # also where the test has failed: it may have failed by this
-            assert task.cancelled(), task.exception()
 
 
 class Room:
@@ -209,12 +179,16 @@ class Room:
     answers = staticmethod(answer)
     news = staticmethod(news)
     routed = staticmethod(route)
-    running = staticmethod(at_work)
     serving = staticmethod(serving)
 
     def __init__(self, path: Path, stack: AsyncExitStack) -> None:
         self.clock = HandClock()
         self.path, self._stack = path, stack
+
+    @staticmethod
+    def running(*senders: Sender) -> AbstractAsyncContextManager[None]:
+        """Let senders run for a while; an error of one fails the test."""
+        return at_work(*(sender.run() for sender in senders))
 
     async def web(self, *behaviours: Behaviour, context: ssl.SSLContext | None = None) -> WebServer:
         """Start a web server."""

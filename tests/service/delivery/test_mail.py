@@ -169,7 +169,7 @@ async def test_a_mail_that_was_taken_is_delivered_whatever_comes_after(
 
 
 async def test_login_and_mail_pass_only_under_tls_with_a_certificate_that_is_believed(
-    serve: ServeMail, server_tls: ssl.SSLContext, certificate: Path, tmp_path: Path
+    serve: ServeMail, server_tls: ssl.SSLContext, certificate: tuple[Path, Path], tmp_path: Path
 ) -> None:
     server = await serve(tls=server_tls)
     (tmp_path / "password").write_text("geheim\n")
@@ -181,11 +181,11 @@ async def test_login_and_mail_pass_only_under_tls_with_a_certificate_that_is_bel
     assert server.commands[-1] == "STARTTLS"
 
     without_tls = await serve()
-    in_the_clear = await mail_to(without_tls, certificate, **login).carry(MESSAGE, BODY)
+    in_the_clear = await mail_to(without_tls, certificate[0], **login).carry(MESSAGE, BODY)
     assert isinstance(in_the_clear, Failed)
     assert [line.split()[0] for line in without_tls.commands if line[:4] in ("AUTH", "MAIL")] == []
 
-    taken = await mail_to(server, certificate, **login).carry(MESSAGE, BODY)
+    taken = await mail_to(server, certificate[0], **login).carry(MESSAGE, BODY)
     assert taken == Delivered("taken as 4711")
     assert server.commands[-5] == "AUTH PLAIN AHBhZHdhdGNoAGdlaGVpbQ=="
 

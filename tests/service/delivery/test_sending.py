@@ -1,18 +1,24 @@
-"""From the outbox to a web server that does all that web servers do, or answers for ever."""
+"""From the outbox to a web server that does all that web servers do; waits; secrets."""
 
 import asyncio
 import json
 import random
 from datetime import time
+from pathlib import Path
 from typing import Any
 from zoneinfo import ZoneInfo
 
 import pytest
+from harness.waiting import until
+from hypothesis import given
+from hypothesis import strategies as st
 from rigs.tiers import fast_and_long
 
 from core.limits import AlarmLevel, Judgement
+from service.delivery.backoff import wait_s
 from service.delivery.outcome import Failed
 from service.delivery.quiet import QuietHours
+from service.delivery.secret import Secret, SecretError
 from service.delivery.sender import SenderState
 from service.store.outbox_port import LetterState
 
@@ -198,9 +204,7 @@ async def test_a_clock_that_is_set_gives_nothing_up(
 
 
 async def until_quiet(sender: Any) -> None:
-    async with asyncio.timeout(30):
-        while sender.status.state is not SenderState.QUIET:
-            await asyncio.sleep(0)
+    await until(lambda: sender.status.state is SenderState.QUIET)
 
 
 async def test_quiet_hours_hold_what_is_no_danger_and_a_danger_ends_them_in_order(
@@ -233,9 +237,7 @@ async def test_a_disk_that_refuses_to_note_a_delivery_never_makes_it_happen_twic
     sender = room.sender(server, store)
 
     async with room.running(sender):
-        async with asyncio.timeout(30):
-            while room.clock.slept_s.count(1.0) < 3:
-                await asyncio.sleep(0)
+        await until(lambda: room.clock.slept_s.count(1.0) >= 3)
         assert sender.status.state is SenderState.STORE_FAILS
         with store._writing() as writer:
             writer.execute("DROP TRIGGER refuse")
@@ -307,3 +309,40 @@ async def test_a_flood_is_left_after_some_bytes_and_not_after_some_time(
     outcome = await sender.receiver.carrier.carry({"id": "1"}, "{}")
 
     assert outcome == Failed("the answer is longer than 32768 bytes")
+
+
+SHARES = st.floats(0.0, 1.0)
+LONGEST_S = st.floats(1.0, 86_400.0)
+
+
+@given(n=st.integers(1, 10**6), share=SHARES, longest_s=LONGEST_S, asked_s=st.floats(0.0, 1e12))
+def test_a_wait_is_never_longer_than_its_limit_nor_shorter_than_half_a_second(
+    n: int, share: float, longest_s: float, asked_s: float
+) -> None:
+    waited_s = wait_s(n, asked_s, longest_s, lambda: share)
+
+    assert 0.5 <= waited_s <= longest_s
+    assert waited_s >= min(asked_s, longest_s)
+
+
+@given(n=st.integers(1, 20), share=SHARES)
+def test_no_wait_is_shorter_than_one_before_it_could_have_been(n: int, share: float) -> None:
+    assert wait_s(n + 1, None, 1e9, lambda: 1.0) >= wait_s(n, None, 1e9, lambda: share) * 0.999
+
+
+def test_a_secret_loses_the_end_of_its_line_and_nothing_else(tmp_path: Path) -> None:
+    (tmp_path / "key").write_text("s3cret with spaces\r\n")
+
+    assert Secret(tmp_path / "key").read() == "s3cret with spaces"
+
+
+@pytest.mark.parametrize("content", [None, b"", b"\n", b"a\nb", b"\xff\xfe", b"a\x00b"])
+def test_what_is_no_line_of_text_is_refused_without_being_shown(
+    content: bytes | None, tmp_path: Path
+) -> None:
+    if content is not None:
+        (tmp_path / "key").write_bytes(content)
+
+    with pytest.raises(SecretError, match="No such file" if content is None else None) as refusal:
+        Secret(tmp_path / "key").read()
+    assert str(tmp_path / "key") in str(refusal.value)

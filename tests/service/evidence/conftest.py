@@ -1,12 +1,12 @@
 """A plant with results, alarms that are raised on it, and the keeper of their evidence."""
 
-import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from harness.waiting import at_work, until
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
@@ -48,6 +48,8 @@ def news_of(
 class Rig:
     """A plant's evidence on a real disk beside a real store."""
 
+    until = staticmethod(until)
+
     def __init__(
         self, plant: PlantFile, clock: Any, films: FilmKeeper, store: SqliteStore, live: LiveView
     ) -> None:
@@ -61,11 +63,6 @@ class Rig:
         """Let it happen: seen, and stored."""
         self.keeper.see([news])
         self.store.append([], [], [news])
-
-    async def until(self, condition: Callable[[], bool]) -> None:
-        async with asyncio.timeout(60):
-            while not condition():
-                await asyncio.sleep(0.001)
 
     async def written(self, n: int) -> None:
         await self.until(lambda: self.keeper.n_written == n and self.keeper.n_pending == 0)
@@ -90,10 +87,8 @@ class Rig:
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        task = asyncio.create_task(self.keeper.run())
-        yield
-        task.cancel()
-        await asyncio.wait([task])
+        async with at_work(self.keeper.run()):
+            yield
         await self.keeper.close()
 
 

@@ -48,14 +48,14 @@ def query(**changes: object) -> FilmQuery:
 
 
 def test_readings_are_read_back_to_the_last_bit(
-    store: SqliteStore, told: Tell, film_life: FilmLife
+    store: SqliteStore, film_news: Tell, film_life: FilmLife
 ) -> None:
     history = film_life(2, days=3)
     ln_k = history.ln_k.copy()
     ln_k[0, 5] = np.nan
     outcome = np.where(np.isnan(ln_k), 2, 0).astype(np.int8)
     history = replace(history, ln_k=ln_k, outcome=outcome)
-    news = told(history)
+    news = film_news(history)
     news[7] = replace(news[7], findings=(FOUND, FilmFinding(Verdict.NORMAL, baseline_version=3)))
 
     store.append([], [], [], news)
@@ -78,10 +78,10 @@ def test_readings_are_read_back_to_the_last_bit(
 
 
 def test_readings_are_picked_by_time_state_and_condition(
-    store: SqliteStore, told: Tell, film_life: FilmLife
+    store: SqliteStore, film_news: Tell, film_life: FilmLife
 ) -> None:
     history = film_life(2, days=3)
-    store.append([], [], [], told(history))
+    store.append([], [], [], film_news(history))
     e, oil, time_ns = history.eccentricity_ratio, history.oil_temperature_c, history.time_ns
 
     inside = query(
@@ -103,9 +103,9 @@ def test_readings_are_picked_by_time_state_and_condition(
 
 
 def test_what_is_written_twice_counts_once_and_simulated_readings_stay_marked(
-    store: SqliteStore, told: Tell, film_life: FilmLife
+    store: SqliteStore, film_news: Tell, film_life: FilmLife
 ) -> None:
-    news = told(film_life(2, days=1))
+    news = film_news(film_life(2, days=1))
     store.films.add_simulated(news[:40])
     store.append([], [], [], news)
     store.append([], [], [], news)
@@ -113,9 +113,9 @@ def test_what_is_written_twice_counts_once_and_simulated_readings_stay_marked(
 
 
 def test_decisions_go_on_where_they_stood(
-    store: SqliteStore, told: Tell, film_life: FilmLife
+    store: SqliteStore, film_news: Tell, film_life: FilmLife
 ) -> None:
-    first, second, *_ = told(film_life(2, days=1))
+    first, second, *_ = film_news(film_life(2, days=1))
     store.append([], [], [], [replace(first, findings=(FOUND, FOUND))])
     store.append(
         [], [], [], [replace(second, decisions=(DECISION, DECISION), findings=(FOUND,) * 2)]

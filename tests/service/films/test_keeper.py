@@ -31,8 +31,8 @@ Tell = Callable[..., list[FilmNews]]
 class Plant:
     """A unit with one bearing whose days pass when told."""
 
-    def __init__(self, store: SqliteStore, told: Tell, clock: Any) -> None:
-        self.store, self.told, self.clock = store, told, clock
+    def __init__(self, store: SqliteStore, film_news: Tell, clock: Any) -> None:
+        self.store, self.film_news, self.clock = store, film_news, clock
 
     async def start(self, **settings: Any) -> FilmKeeper:
         """A keeper as after a start."""
@@ -53,7 +53,7 @@ class Plant:
         """Let days pass: readings are judged as the keeper does, if wanted; stored, learned."""
         judge: FilmJudge = keeper._films["U1"].watch.judge
         for day in range(*days, every):
-            today = self.told(days_of(history, day, min(day + every, days[1])))
+            today = self.film_news(days_of(history, day, min(day + every, days[1])))
             if judged:
                 today = [news for told in today for news in judge.judge([told.reading])]
             self.store.append([], [], [], today)
@@ -71,8 +71,8 @@ class Plant:
 
 
 @pytest.fixture
-def plant(store: SqliteStore, told: Tell, stepped_clock: Any) -> Plant:
-    return Plant(store, told, stepped_clock)
+def plant(store: SqliteStore, film_news: Tell, stepped_clock: Any) -> Plant:
+    return Plant(store, film_news, stepped_clock)
 
 
 def unit() -> Unit:
@@ -152,7 +152,7 @@ async def test_a_restart_goes_on_with_the_same_baseline_and_decisions(
 
     again = await plant.start(learn_every_days=100)
     after = again._films["U1"].watch.judge
-    for told_next in plant.told(days_of(history, 25, 26)):
+    for told_next in plant.film_news(days_of(history, 25, 26)):
         [went_on], [through] = (judge.judge([told_next.reading]) for judge in (after, before))
         assert went_on.findings == through.findings
     assert in_force(again) == in_force(keeper) == 1

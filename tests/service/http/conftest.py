@@ -2,11 +2,9 @@
 
 import asyncio
 import socket
-import subprocess
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import pytest
 from starlette.types import Receive, Scope, Send
@@ -119,17 +117,6 @@ class Running:
         while self.now_s < until_s:
             self.now_s = min(self.now_s + 0.5, until_s)
             self.server.open.sweep()
-
-
-@pytest.fixture(scope="session")
-def certificate(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """A certificate that the server signed itself, and its key."""
-    folder = tmp_path_factory.mktemp("tls")
-    files = folder / "a.crt", folder / "a.key"
-    command = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256"]
-    out = ["-nodes", "-subj", "/CN=a", "-out", str(files[0]), "-keyout", str(files[1])]
-    subprocess.run([*command, *out], check=True, capture_output=True)
-    return files
 
 
 Start = Callable[..., Awaitable[Running]]

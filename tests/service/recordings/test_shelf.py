@@ -3,13 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
+from rigs.capturing import block, recorded_unit
 
-from acquisition.delivery.raw import RawBlock
-from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
-from core.machine.channel import Measurand
 from service.recordings.shelf import Shelf
 from service.store.waveform_port import WaveformKind
 
@@ -21,13 +18,10 @@ LONGER = "U1-2-20260101T000100.000Z-continuous"
 
 
 def make(folder: Path) -> None:
-    limits = {"full_scale_v": 10.0, "unit_per_v": 1.0, "ok_min_v": -10.0, "ok_max_v": 10.0}
-    channel = RecordedChannel(id="a", measurand=Measurand.DISPLACEMENT_UM, **limits)
-    unit = RecordedUnit(unit=folder.name[:2], rate_hz=50.0, channels=(channel,), slow_channels=())
+    unit = folder.name[:2]
     folder.parent.mkdir(exist_ok=True)
-    with RecordingWriter(folder, unit, "a test") as writer:
-        counts = np.zeros((1, 50), dtype=np.int16)
-        writer.write(RawBlock(1, 0, 1_767_225_600_000_000_000, 50.0, counts, (True,), ()))
+    with RecordingWriter(folder, recorded_unit(unit), "a test") as writer:
+        writer.write_calibrated(block(0, unit))
 
 
 @pytest.fixture

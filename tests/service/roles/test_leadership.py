@@ -4,9 +4,10 @@ import asyncio
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
 
 import pytest
+from harness.waiting import at_work, until
+from rigs.standing_clock import StandingClock
 
 from service.delivery.deliveries import Deliveries
 from service.delivery.outcome import Delivered
@@ -55,24 +56,11 @@ class Held:
         return self._name.holder is self
 
 
-class QuickClock:
-    """Waits for nobody, but lets others have their turn."""
-
-    def now_ns(self) -> int:
-        return 0
-
-    def monotonic_s(self) -> float:
-        return 0.0
-
-    async def sleep(self, _: float) -> None:
-        await asyncio.sleep(0)
-
-
 class Process:
     """One that would lead."""
 
     def __init__(self, name: Name) -> None:
-        clock = QuickClock()
+        clock = StandingClock()
         self.beats = Heartbeats(clock)
         self.n_working = 0
         self.leadership = Leadership(name.hold, {"gather": self._work}, self.beats, clock)
@@ -92,12 +80,6 @@ class Process:
             await asyncio.Event().wait()
         finally:
             self.n_working -= 1
-
-
-async def until(condition: Any) -> None:
-    async with asyncio.timeout(30):
-        while not condition():
-            await asyncio.sleep(0.001)
 
 
 @pytest.fixture
@@ -140,7 +122,7 @@ async def test_work_that_fails_ends_the_process(name: Name) -> None:
     async def broken(_: Pulse) -> None:
         raise ZeroDivisionError
 
-    clock = QuickClock()
+    clock = StandingClock()
     leadership = Leadership(name.hold, {"gather": broken}, Heartbeats(clock), clock)
     with pytest.raises(ExceptionGroup):
         await leadership.run(UNHEARD)
@@ -150,7 +132,7 @@ async def test_work_that_fails_ends_the_process(name: Name) -> None:
 async def test_senders_of_a_process_that_lost_the_name_do_not_count_as_dead(
     name: Name, tmp_path: Path
 ) -> None:
-    clock = QuickClock()
+    clock = StandingClock()
     beats = Heartbeats(clock)
     with closing(SqliteStore(tmp_path / "padwatch.sqlite3")) as store:
         deliveries = Deliveries([SHIFT], store.outbox, clock)
@@ -159,10 +141,8 @@ async def test_senders_of_a_process_that_lost_the_name_do_not_count_as_dead(
             await deliveries.run(beats)
 
         leadership = Leadership(name.hold, {"deliver": deliver}, beats, clock)
-        task = asyncio.create_task(leadership.run(UNHEARD))
-        await until(lambda: "deliver shift" in beats.look())
-        name.holder, name.is_away = None, True
-        await until(lambda: not leadership.is_leading)
-        assert beats.look() == {}
-        task.cancel()
-        await asyncio.wait([task])
+        async with at_work(leadership.run(UNHEARD)):
+            await until(lambda: "deliver shift" in beats.look())
+            name.holder, name.is_away = None, True
+            await until(lambda: not leadership.is_leading)
+            assert beats.look() == {}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
@@ -43,22 +44,16 @@ Step = BaseException | SampleBlock
 """What a scripted plant does next: deliver a block or fail."""
 
 
-class RecordingClock:
+class RecordingClock(StandingClock):
     """Time that passes at once when somebody waits, and remembers for how long."""
 
     def __init__(self) -> None:
-        self.elapsed_s = 0.0
+        super().__init__()
         self.slept_s: list[float] = []
-
-    def now_ns(self) -> int:
-        return T0 + round(self.elapsed_s * 1e9)
-
-    def monotonic_s(self) -> float:
-        return self.elapsed_s
 
     async def sleep(self, duration_s: float) -> None:
         self.slept_s.append(duration_s)
-        self.elapsed_s += duration_s
+        self.s += duration_s
         await asyncio.sleep(0)
 
 

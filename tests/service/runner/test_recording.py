@@ -13,6 +13,7 @@ from typing import Any
 import httpx2
 import pytest
 import structlog
+from harness.waiting import until
 from rigs.alarm_runs import PROBE, Make, changes, play
 from rigs.assessments import assessment
 from rigs.store_fixtures import at, gap
@@ -44,12 +45,6 @@ def run_sql(path: Path, script: str) -> None:
 def stored(plant: Any, unit: str = "U1") -> list[float | None]:
     query = TrendQuery(unit, "UJB", (K,), 0, 2**62, 5000, 2**62)
     return list(plant.store.trend(query).series[K].mean)
-
-
-async def until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(60):
-        while not condition():
-            await asyncio.sleep(0)
 
 
 def break_store(plant: Any) -> None:

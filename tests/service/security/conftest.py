@@ -1,18 +1,19 @@
-"""Doors on a real database, with hashes that cost little."""
+"""Doors on both databases, with hashes that cost little."""
 
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 from argon2 import PasswordHasher
-from rigs.database_copy import copy_database
+from harness.places import Place, SqlitePlace
 
 from service.security.backoff import Backoff
 from service.security.doors import Doors
 from service.security.passwords import Hashing
 from service.security.people import People
 from service.store.access_port import AccessStore
-from service.store.sqlite import SqliteStore
+from service.store.sql_store import SqlStore
 
 
 class CountingHasher(PasswordHasher):
@@ -28,19 +29,19 @@ class CountingHasher(PasswordHasher):
 
 
 @pytest.fixture
-def database(database_file: Path, tmp_path: Path) -> Path:
-    return copy_database(database_file, tmp_path)
+def path(sqlite_place: SqlitePlace) -> Path:
+    """Where the file is, for tests of that alone."""
+    return sqlite_place.path
 
 
 @pytest.fixture
-def store(database: Path) -> Iterator[SqliteStore]:
-    opened = SqliteStore(database)
-    yield opened
-    opened.close()
+def store(store_place: Place) -> Iterator[SqlStore]:
+    with closing(store_place.open()) as opened:
+        yield opened
 
 
 @pytest.fixture
-def access(store: SqliteStore) -> AccessStore:
+def access(store: SqlStore) -> AccessStore:
     return store.access
 
 

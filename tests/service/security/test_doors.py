@@ -60,13 +60,13 @@ def test_a_wrong_name_is_refused_as_a_wrong_password_is_and_costs_as_many_hashes
 
 @pytest.mark.usefixtures("anna")
 def test_neither_password_nor_token_nor_key_is_in_the_database(
-    doors: Doors, access: AccessStore, database: Path
+    doors: Doors, access: AccessStore, path: Path
 ) -> None:
     token = log_in(doors)
     _, key = create_key(access, "historian", Role.VIEWER, (), 30, T0)
-    with closing(sqlite3.connect(database)) as connection:
+    with closing(sqlite3.connect(path)) as connection:
         stored = "\n".join(connection.iterdump())
-    files = b"".join(path.read_bytes() for path in database.parent.glob("padwatch.sqlite3*"))
+    files = b"".join(file.read_bytes() for file in path.parent.glob("padwatch.sqlite3*"))
 
     assert digest(token).hex().upper() in stored.upper()
     for secret in (PASSWORD, token, key):
@@ -183,12 +183,12 @@ def test_an_account_has_only_so_many_logins_and_the_oldest_goes(doors: Doors) ->
 
 @pytest.mark.usefixtures("anna")
 def test_old_logins_are_forgotten_when_somebody_logs_in(
-    doors: Doors, people: People, database: Path
+    doors: Doors, people: People, path: Path
 ) -> None:
     people.add("berta", Role.VIEWER, PASSWORD, T0)
     log_in(doors)
     log_in(doors, T0 + 13 * H, "berta")
-    with closing(sqlite3.connect(database)) as connection:
+    with closing(sqlite3.connect(path)) as connection:
         assert connection.execute("SELECT account FROM session").fetchall() == [("berta",)]
 
 

@@ -14,8 +14,6 @@ from rigs.memory_folder import memory_folder, path_in_memory  # noqa: F401 - a f
 from core.quality import GOOD, Reading, Reason, missing, uncertain
 from core.samples.blocks import Rejection, SampleBlock
 from core.samples.device_clock import DeviceClock, StampFault
-from service.settings.loading import load_plant_file
-from service.settings.plant import PlantFile
 from service.stream.identity import UnitIdentity, fingerprint
 
 SHORT = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)
@@ -48,11 +46,6 @@ def block() -> SampleBlock:
         clock=DeviceClock(0.1, -3.5, None, 2),
         stamp_fault=StampFault.JUMPED,
     )
-
-
-@pytest.fixture
-def plant() -> PlantFile:
-    return load_plant_file(Path(__file__).parents[3] / "deploy" / "demo.toml")
 
 
 @pytest.fixture

@@ -1,5 +1,5 @@
 import asyncio
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -8,6 +8,7 @@ import nats
 import numpy as np
 import pytest
 from harness.nats_server import NatsServer, nats_server
+from harness.waiting import at_work, until
 from nats.errors import ConnectionClosedError
 from nats.js.client import JetStreamContext
 
@@ -43,12 +44,8 @@ def publisher(plant: PlantFile, url: str, **settings: object) -> Publisher:
 
 @asynccontextmanager
 async def running(publisher: Publisher) -> AsyncIterator[Publisher]:
-    task = asyncio.create_task(publisher.run())
-    try:
+    async with at_work(publisher.run()):
         yield publisher
-    finally:
-        task.cancel()
-        await asyncio.wait([task])
 
 
 async def published(out: Publisher, *blocks: SampleBlock) -> None:
@@ -171,12 +168,6 @@ async def test_a_full_stream_refuses_aloud_and_drops_nothing(
         await _publish_all(tight, plant, 8)
         await until(lambda: "is full" in (tight.trouble or ""))
     assert numbers(await kept(plant, server))[0] == 0
-
-
-async def until(so: Callable[[], bool]) -> None:
-    async with asyncio.timeout(WAIT_S):
-        while not so():
-            await asyncio.sleep(0.02)
 
 
 def test_news_of_a_link_do_not_pile_up_while_the_servers_are_away(plant: PlantFile) -> None:

@@ -51,6 +51,8 @@ async def test_every_task_of_the_program_has_a_pulse(
     url = await asyncio.wait_for(said.get(), 60)
     async with httpx2.AsyncClient(base_url=url, trust_env=False, timeout=60.0) as client:
         answer = await client.get("/readyz")
+        nested = await client.post("/api/v1/session", content=b"[" * 20_000 + b"]" * 20_000)
+        foreign = await client.get("/livez", headers={"Host": "evil.example"})
     names = await _lasting(asyncio.all_tasks() - before)
     stopped.set()
     await asyncio.wait_for(service, 60)
@@ -62,3 +64,5 @@ async def test_every_task_of_the_program_has_a_pulse(
     assert names - NOT_LOOPS <= heard
     assert heard <= names
     assert {"acquire U1", "acquire U2", "analyse", "record", "alarms", "load", "serve"} <= heard
+    assert "references" in heard
+    assert (nested.status_code, foreign.status_code) == (400, 421)  # its guards are in their places

@@ -1,6 +1,5 @@
 """Who must log in, by what a plant file says, and where nothing starts at all."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,13 +15,6 @@ from service.wiring.access import access_desk
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 TLS = TlsSettings(certificate="a.crt", key="a.key")
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[SqliteStore]:
-    opened = SqliteStore(tmp_path / "padwatch.sqlite3")
-    yield opened
-    opened.close()
 
 
 def plant_with(login: bool = False, **service: object) -> PlantFile:

@@ -2,7 +2,6 @@
 
 import asyncio
 import json
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -11,22 +10,10 @@ import pytest
 from acquisition.clock import SystemClock
 from service.audit.entry import AuditEntry
 from service.origin import Origin
-from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.audit_port import AuditQuery
 from service.store.sqlite import SqliteStore
 from service.wiring.audit import ServiceTrail
-
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[SqliteStore]:
-    with closing(SqliteStore(tmp_path / "padwatch.sqlite3")) as opened:
-        yield opened
-
-
-@pytest.fixture
-def plant(deploy: Path) -> PlantFile:
-    return load_plant_file(deploy / "demo.toml")
 
 
 def told(store: SqliteStore) -> list[AuditEntry]:

@@ -1,4 +1,4 @@
-"""The same simulated machine through a rack, through queues and as waveforms tells the same."""
+"""A simulated machine says the same by a rack, by queues and as waveforms; retries."""
 
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
@@ -34,6 +34,7 @@ from service.wiring.registers import (
     vector_source,
 )
 from service.wiring.simulations import simulated_feed
+from service.wiring.sources import retry_s
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 N_SEGMENTS = 6
@@ -152,3 +153,19 @@ def test_how_long_a_connection_is_kept_reaches_the_adapter(use: ConnectionUse) -
 
     assert polled_settings(device).connection is use
     assert link_settings_of(device).connection is use
+
+
+RING = load_plant_file(DEMO).unit[0].source
+QUEUE = ModbusFifoSettings(kind="modbus_fifo", host="127.0.0.1", addresses=[1000])
+"""A queue that is emptied all the time is not called all the time."""
+
+
+@pytest.mark.parametrize(
+    ("source", "expected_s"),
+    [
+        *((RING.model_copy(update={"poll_period_s": s}), s) for s in (0.05, 0.25, 1.0)),
+        (QUEUE, 0.25),
+    ],
+)
+def test_a_device_is_called_once_a_poll_period(settings, source, expected_s) -> None:
+    assert retry_s(settings.model_copy(update={"source": source})) == expected_s

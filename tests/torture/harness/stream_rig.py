@@ -17,6 +17,7 @@ from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer
+from harness.waiting import at_work
 from service.analyse_program import Analysing
 from service.bus import Bus
 from service.delivery.facts import Around
@@ -94,14 +95,10 @@ async def publish(plant: PlantFile, sent: Iterable[SampleBlock]) -> None:
     assert plant.stream is not None
     identities = {unit.id: identity_of(plant, unit) for unit in plant.unit}
     publisher = Publisher(plant, plant.stream, identities, SystemClock())
-    running = asyncio.create_task(publisher.run())
-    try:
+    async with at_work(publisher.run()):
         for block in sent:
             await publisher.publish(block)
         await asyncio.wait_for(publisher.waiting.drained(), WAIT_S)
-    finally:
-        running.cancel()
-        await asyncio.wait([running])
 
 
 def ground_of(plant: PlantFile, clock: Clock, store: Store) -> tuple[Ground, Monitors]:

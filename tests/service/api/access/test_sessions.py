@@ -71,11 +71,15 @@ async def test_in_the_demonstration_nobody_here_has_to_log_in_but_who_comes_thro
     assert len(said["permissions"]) == 5
     over = await read_only.client.get(UNITS, headers=cookie("C" * 43))
     assert over.status_code == 200  # a login that is over is none
-    wrong_key = {"Authorization": "Bearer pw_nonsense"}
+    wrong = ("pw_nonsense", "x", "A" * 8000, "pw_' OR 1=1 --", "eyJhbGciOiJub25lIn0.e30.")
     passed_on = ("X-Forwarded-For", "Forwarded", "Via", "X-Real-IP")  # by a proxy
-    for headers in (wrong_key, *({header: "127.0.0.1"} for header in passed_on)):
+    for headers in (
+        *({"Authorization": f"Bearer {key}"} for key in wrong),
+        *({header: "127.0.0.1"} for header in passed_on),
+    ):
         answer = await read_only.client.get(UNITS, headers=headers)
         assert answer.status_code == 401, headers
+        assert not any(key in answer.text for key in wrong[2:])
 
 
 async def test_a_login_of_the_proxy_hides_neither_a_session_nor_a_key(

@@ -9,16 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.baseline.history import DIRECTIONS, ReadingOutcome, StiffnessHistory, Watched
-from core.change.backtest import operation_history
-from core.change.decision import INITIAL_DECISION, Verdict
-from core.change.film_judge import FilmFinding, FilmNews
-from core.change.film_reading import FilmReading, FilmValue
-from core.condition.cells import BearingCondition
-from core.condition.operating_state import OperatingState
+from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched
+from core.change.film_judge import FilmNews
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
-from core.quality import GOOD, Quality, Reading, Reason
+from core.quality import GOOD, Quality, Reading
 from service.films.learning import FilmPlace, Learner
 from service.live import LinkState
 from service.settings.loading import load_plant_file
@@ -29,7 +24,6 @@ DEMO = Path(__file__).parents[4] / "deploy" / "demo.toml"
 UJB = FilmPlace("U1", "UJB", Estimator.DYNAMIC)
 N_DAYS = 60
 PERIOD_NS = 600 * 10**9
-NOTHING_SAID = FilmFinding(Verdict.NO_BASELINE)
 CONDITION_COLUMNS = (
     *("speed_rpm", "power_mw", "eccentricity_ratio", "u_eccentricity"),
     *("attitude_deg", "oil_temperature_c"),
@@ -54,21 +48,16 @@ def lived(film_life: Callable[..., StiffnessHistory]) -> StiffnessHistory:
 
 @pytest.fixture(scope="session")
 def database_file(
-    tmp_path_factory: pytest.TempPathFactory, plant: PlantFile, lived: StiffnessHistory
+    tmp_path_factory: pytest.TempPathFactory,
+    plant: PlantFile,
+    lived: StiffnessHistory,
+    film_news: Callable[..., list[FilmNews]],
 ) -> Path:
     """A database with these days and the baseline that was learned of them, for copies."""
     path = tmp_path_factory.mktemp("learned") / "padwatch.sqlite3"
     store = SqliteStore(path)
     limits = plant.films.operating.limits(92.3, 330.0)
-    found = operation_history(lived.time_ns, lived.speed_rpm, lived.power_mw, limits)
-    store.films.add_simulated(
-        FilmNews(
-            stored_reading(lived, i, OperatingState(found.state[i]), bool(found.is_settled[i])),
-            (NOTHING_SAID, NOTHING_SAID),
-            (INITIAL_DECISION, INITIAL_DECISION),
-        )
-        for i in range(len(lived))
-    )
+    store.films.add_simulated(film_news(lived, limits))
     assert Learner(store.films, plant.films).learn(UJB, int(lived.time_ns[-1])) is not None
     store.close()
     return path
@@ -78,26 +67,6 @@ def database_file(
 def learned(serve: Any, plant: PlantFile, database_file: Path) -> Any:
     """A service over these days, for tests that change nothing of it."""
     return serve(plant, database_file)
-
-
-def stored_reading(
-    lived: StiffnessHistory, i: int, state: OperatingState, is_settled: bool
-) -> FilmReading:
-    x, y = (
-        FilmValue(
-            float(lived.ln_k[row, i]),
-            float(lived.u_random[row, i]),
-            float(lived.shaft_um_pk[row, i]),
-            float(lived.bearing_um_pk[row, i]),
-            ReadingOutcome.MEASURED,
-            Reason.OK,
-        )
-        for row in range(2)
-    )
-    condition = BearingCondition(state, is_settled, None)
-    numbers = {name: float(getattr(lived, name)[i]) for name in CONDITION_COLUMNS}
-    time_ns = int(lived.time_ns[i])
-    return FilmReading("U1", "UJB", Estimator.DYNAMIC, time_ns, condition, **numbers, values=(x, y))
 
 
 class Machine:

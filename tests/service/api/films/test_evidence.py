@@ -1,17 +1,15 @@
 """Evidence of a film that has changed: document, page, bundle, whatever people write."""
 
-import asyncio
 import io
 import json
 import zipfile
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from html.parser import HTMLParser
 from importlib.metadata import version
 from typing import Any
 
 import pyarrow.parquet as pq
 import pytest
+from harness.waiting import at_work, until
 
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
@@ -25,15 +23,6 @@ PATH = f"/api/v1/alarms/{ALARM}/evidence"
 HOSTILE = '<script>alert("1")</script><img src=x onerror=alert(2)>'
 
 
-@asynccontextmanager
-async def keeping(service: Any) -> AsyncIterator[None]:
-    task = asyncio.create_task(service.evidence.run())
-    yield
-    task.cancel()
-    await asyncio.wait([task])
-    await service.evidence.close()
-
-
 def raised(service: Any, machine: Any) -> AlarmNews:
     """A film that has lost a third raises its alarm."""
     machine.run(30, ln_change=-0.4)
@@ -44,15 +33,6 @@ def raised(service: Any, machine: Any) -> AlarmNews:
     news = AlarmNews(*update(alarm, condition, machine.time_ns, AlarmRule()))
     service.evidence.see([news])
     service.store.append([], [], [news])
-    return news
-
-
-async def alarmed(service: Any, machine: Any) -> AlarmNews:
-    """The same, and its evidence has been written."""
-    news = raised(service, machine)
-    async with keeping(service), asyncio.timeout(60):
-        while service.evidence.n_written < 1:
-            await asyncio.sleep(0.001)
     return news
 
 
@@ -76,7 +56,10 @@ class Tags(HTMLParser):
 
 async def test_the_evidence_of_a_changed_film(service: Any, machine: Any) -> None:
     """Its document, its page and its bundle; one service, because the film takes long to change."""
-    news = await alarmed(service, machine)
+    news = raised(service, machine)
+    async with at_work(service.evidence.run()):
+        await until(lambda: service.evidence.n_written)
+    await service.evidence.close()
 
     await require_a_document_of_what_the_film_was_compared_with(service)
     await require_a_report_of_everything_without_a_script(service)

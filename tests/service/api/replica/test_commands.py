@@ -6,6 +6,7 @@ from typing import Any
 
 import httpx2
 import pytest
+from harness.waiting import at_work
 
 from core.alarms.operation import Comment
 from service.replica.asking import WAIT_S, Asking
@@ -22,10 +23,8 @@ async def answered(pair: Any, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[
     """The process that analyses looks for commands; there is time enough by the set clock."""
     monkeypatch.setattr("service.replica.asking.WAIT_S", 1e12)
     monkeypatch.setattr("service.replica.asking.EXPIRES_S", 1e9)
-    looking = asyncio.create_task(pair.carrying_out.run())
-    yield pair
-    looking.cancel()
-    await asyncio.wait([looking])
+    async with at_work(pair.carrying_out.run()):
+        yield pair
 
 
 async def raise_alarm(pair: Any) -> None:
@@ -165,10 +164,8 @@ async def test_a_store_that_comes_back_late_is_told_of(
     monkeypatch.setattr(pair.service.alarms, "_put", lambda _: None)
     monkeypatch.setattr(pair.service.recorder, "stored", _never)
     monkeypatch.setattr(Asking, "_give_up", _after(pair))
-    looking = asyncio.create_task(pair.carrying_out.run())
-    answer = await post(pair, "acknowledge", occurrence=1)
-    looking.cancel()
-    await asyncio.wait([looking])
+    async with at_work(pair.carrying_out.run()):
+        answer = await post(pair, "acknowledge", occurrence=1)
 
     assert answer.status_code == 503
     assert "not on the disk yet" in answer.json()["detail"]

@@ -76,14 +76,6 @@ def test_a_mark_that_is_much_older_than_the_database_is_told() -> None:
     assert (found.kind, found.n_missing) == (Kind.MARK_BEHIND, 0)
 
 
-@pytest.mark.parametrize("why", ["is not there", "is damaged"])
-def test_a_mark_that_says_nothing_is_told(why: str) -> None:
-    found = only(compared(why, mark(), "host"))
-
-    assert (found.kind, found.n_missing) == (Kind.MARK_LOST, None)
-    assert why in found.detail
-
-
 @pytest.mark.parametrize(
     ("before", "now", "kinds"),
     [

@@ -8,7 +8,6 @@ from harness.postgres_server import PostgresServer
 from rigs.assessments import assessment
 from rigs.memory_folder import memory_folder
 
-from service.origin import Origin
 from service.store import schema
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore, connection
@@ -79,11 +78,6 @@ def test_a_database_of_a_newer_padwatch_is_refused(postgres_place: PostgresPlace
     said = refused(postgres_place.address)
 
     assert f"has schema {newest + 1}, this padwatch knows up to {newest}; run the padwatch" in said
-
-
-def test_live_and_replayed_results_never_share_a_database(postgres_place: PostgresPlace) -> None:
-    with pytest.raises(StoreError, match="holds live results and is not opened for replay ones"):
-        postgres_place.open(Origin.REPLAY)
 
 
 def test_a_migration_that_fails_leaves_the_database_as_it_was(
