@@ -68,10 +68,17 @@ class BudgetLine:
 
 @dataclass(frozen=True)
 class Budget:
-    """A result with everything that makes it uncertain."""
+    """A result with everything that makes it uncertain.
+
+    Parameters
+    ----------
+    bounded_interval
+        95 % interval of a result that is not normal because it lies between bounds; None of others.
+    """
 
     value: float
     lines: tuple[BudgetLine, ...]
+    bounded_interval: tuple[float, float] | None = None
 
     @property
     def random(self) -> float:
@@ -91,7 +98,7 @@ class Budget:
     @property
     def interval(self) -> tuple[float, float]:
         """Interval that holds the truth with 95 %."""
-        return _interval(self.value, self.lines)
+        return self.bounded_interval or _interval(self.value, self.lines)
 
     @property
     def random_interval(self) -> tuple[float, float]:
@@ -119,6 +126,13 @@ def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE)
     freedoms = _root_sum(lines) ** 4 / fourth if fourth > 0.0 else math.inf
     quantile = 0.5 + confidence / 2.0
     return float(ndtri(quantile) if math.isinf(freedoms) else stdtrit(freedoms, quantile))
+
+
+def proportional(value: float, budget: Budget) -> Budget:
+    """Budget of a value that is in an exactly known proportion to the result of another."""
+    factor = value / budget.value
+    lines = (replace(line, sensitivity=factor * line.sensitivity) for line in budget.lines)
+    return Budget(value, tuple(lines))
 
 
 def _interval(value: float, lines: Sequence[BudgetLine]) -> tuple[float, float]:

@@ -37,12 +37,13 @@ from core.spectra.cross_spectrum import (
 from core.spectra.runout import RunoutVerdict
 from core.spectra.segments import ORDER1, VORTEX, Segment
 from core.stiffness.agreement import contradicting
+from core.stiffness.channel_budget import frequency_budget
 from core.stiffness.dynamic import DynamicStiffness
 from core.stiffness.estimators import preferred_stiffness
 from core.stiffness.film_results import film_results
 from core.stiffness.line_results import OrderLine, other_line_hz
 from core.stiffness.polarity import signs_checked
-from core.uncertainty import Budget
+from core.uncertainty import Budget, with_budgets
 
 
 class BearingResults:
@@ -115,11 +116,13 @@ class BearingResults:
         phases, budgets_ph = phase_results(
             self._segments, self._rows, self._line_quality, self._order_line(ORDER1).runout_um_pk
         )
+        speed = self._segments[-1].speed
+        speeds, budgets_n = with_budgets({"speed_rpm": speed.rpm}, {"speed_rpm": speed.budget})
         number = self._unit.bearings.index(self._bearing)
         overall, budgets_o = overall_results(self._segments, self._rows, self._bearing, number)
         readings = signs_checked(
             {
-                "speed_rpm": self._segments[-1].speed.rpm,
+                **speeds,
                 **slow,
                 **position,
                 **order1,
@@ -130,6 +133,7 @@ class BearingResults:
             }
         )
         budgets = {
+            **budgets_n,
             **budgets_s,
             **budgets_p,
             **budgets1,
@@ -205,9 +209,13 @@ class BearingResults:
         order = self._order_line(line)
         stiffness, budgets = order.stiffness()
         amplitudes, amplitude_budgets = order.amplitudes()
-        readings = {**amplitudes, **stiffness}
-        readings |= {"frequency_hz": self._frequency(line), "roundness": order.roundness()}
-        budgets = {**amplitude_budgets, **budgets}
+        frequency, roundness = self._frequency(line), order.roundness()
+        others, other_budgets = with_budgets(
+            {"frequency_hz": frequency[0], "roundness": roundness[0]},
+            {"frequency_hz": frequency[1], "roundness": roundness[1]},
+        )
+        readings = {**amplitudes, **stiffness, **others}
+        budgets = {**amplitude_budgets, **budgets, **other_budgets}
         return (
             {f"{prefix}_{name}": reading for name, reading in readings.items()},
             {f"{prefix}_{name}": budget for name, budget in budgets.items()},
@@ -244,20 +252,24 @@ class BearingResults:
         x, y = (self._unit.channels[self._rows[place]] for place in (BEARING_X, BEARING_Y))
         return x.measurand.n_integrations, y.measurand.n_integrations
 
-    def _frequency(self, line: int) -> Reading:
-        speed = self._segments[-1].speed.rpm
-        if speed.value is None:
-            return speed
+    def _frequency(self, line: int) -> tuple[Reading, Budget | None]:
+        speed, frequency_hz = self._segments[-1].speed, float(self._orders.frequency_hz[line])
+        each_hz = np.array([segment.order_frequency_hz[line] for segment in self._segments])
+        if speed.rpm.value is None:
+            return speed.rpm, None
         if line == ORDER1:
-            return Reading(float(self._orders.frequency_hz[line]), speed.quality)
+            budget = frequency_budget(frequency_hz, each_hz, speed)
+            return Reading(frequency_hz, speed.rpm.quality), budget
         qualities = [self._vortex_quality(shaft) for shaft in (SHAFT_X, SHAFT_Y)]
         known = [q for q in qualities if isinstance(q, Quality)]
         quality = known[0] if known else qualities[0]
         if quality == missing(Reason.OUTSIDE_BAND):
-            return Reading(self._other_line_hz, uncertain(Reason.OUTSIDE_BAND))
+            return Reading(self._other_line_hz, uncertain(Reason.OUTSIDE_BAND)), None
         if isinstance(quality, Reading):
-            return quality
-        return Reading(float(self._orders.frequency_hz[line]), speed.quality)
+            return quality, None
+        return Reading(frequency_hz, speed.rpm.quality), frequency_budget(
+            frequency_hz, each_hz, None
+        )
 
     def _vortex_quality(self, *places: int) -> Quality | Reading:
         """As `_line_quality`, at the vortex: nothing is read where there is none."""

@@ -19,12 +19,13 @@ from core.spectra.recent import RecentReadings
 from core.spectra.segments import ORDER1, VORTEX
 from core.spectra.vector_polls import Poll
 from core.spectra.vector_settings import VectorSettings
+from core.stiffness.channel_budget import frequency_budget
 from core.stiffness.estimators import STIFFNESS_OF, preferred_stiffness
 from core.stiffness.film_results import NAMES as DYNAMIC_NAMES
 from core.stiffness.polarity import signs_checked
 from core.stiffness.vector_budget import n_independent
 from core.stiffness.vector_line import VectorLine
-from core.uncertainty import Budget
+from core.uncertainty import Budget, with_budgets
 
 NO_WAVEFORM = missing(Reason.NOT_MEASURED)
 
@@ -111,9 +112,11 @@ class VectorResults:
             [poll.gaps for poll in self._polls], slow_channels(self._unit, self._bearing)
         )
         phases, budgets_ph = self._line(ORDER1).phases()
+        speed = self._polls[-1].speed
+        speeds, budgets_n = with_budgets({"speed_rpm": speed.rpm}, {"speed_rpm": speed.budget})
         readings = signs_checked(
             {
-                "speed_rpm": self._polls[-1].speed.rpm,
+                **speeds,
                 **slow,
                 **position,
                 **order1,
@@ -122,7 +125,7 @@ class VectorResults:
                 **dict.fromkeys((*DYNAMIC_NAMES, *OVERALL_NAMES), NO_WAVEFORM),
             }
         )
-        budgets = {**budgets_s, **budgets_p, **budgets1, **budgets_ph, **budgets_v}
+        budgets = {**budgets_n, **budgets_s, **budgets_p, **budgets1, **budgets_ph, **budgets_v}
         self.budgets = {name: b for name, b in budgets.items() if readings[name].value is not None}
         chosen = {axes: self._preferred(readings, axes) for axes in ("xx", "yy")}
         self.estimators = {axes: estimator for axes, (_, estimator) in chosen.items()}
@@ -155,19 +158,27 @@ class VectorResults:
         order = self._line(line)
         stiffness, budgets = order.stiffness()
         amplitudes, amplitude_budgets = order.amplitudes()
-        readings = {**amplitudes, **stiffness}
-        readings |= {"frequency_hz": self._frequency(line, order), "roundness": order.roundness()}
-        budgets = {**amplitude_budgets, **budgets}
+        frequency, roundness = self._frequency(line, order), order.roundness()
+        others, other_budgets = with_budgets(
+            {"frequency_hz": frequency[0], "roundness": roundness[0]},
+            {"frequency_hz": frequency[1], "roundness": roundness[1]},
+        )
+        readings = {**amplitudes, **stiffness, **others}
+        budgets = {**amplitude_budgets, **budgets, **other_budgets}
         return (
             {f"{prefix}_{name}": reading for name, reading in readings.items()},
             {f"{prefix}_{name}": budget for name, budget in budgets.items()},
         )
 
-    def _frequency(self, line: int, order: VectorLine) -> Reading:
-        speed = self._polls[-1].speed.rpm
+    def _frequency(self, line: int, order: VectorLine) -> tuple[Reading, Budget | None]:
+        speed = self._polls[-1].speed
         if line == VORTEX and not self._unit.has_vortex:
-            return missing(Reason.SWITCHED_OFF)
-        return speed if speed.value is None else Reading(order.frequency_hz, speed.quality)
+            return missing(Reason.SWITCHED_OFF), None
+        if speed.rpm.value is None:
+            return speed.rpm, None
+        each_hz = np.array([poll.order_frequency_hz[line] for poll in self._polls])
+        budget = frequency_budget(order.frequency_hz, each_hz, speed)
+        return Reading(order.frequency_hz, speed.rpm.quality), budget
 
     def _steadiness(self) -> Quality:
         power = self._unit.power_channel

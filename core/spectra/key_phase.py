@@ -50,10 +50,16 @@ class KeyPhase:
         Angle that it has turned at the first sample since the mark passed the pick-up, 0 to 2π.
     speed_rpm
         Mean over the segment.
+    u_relative
+        Standard uncertainty of the speed, relative, by how far the pulses lie from an even turning.
+    n_pulses
+        Pulses in the segment.
     """
 
     shaft_angle_rad: float
     speed_rpm: float
+    u_relative: float = 0.0
+    n_pulses: int = 0
 
 
 def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | KeyPhaseFault:
@@ -78,13 +84,18 @@ def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | KeyPhaseFau
     turns = np.arange(edges.size) - (edges.size - 1) / 2.0
     samples_per_turn = float(turns @ edges / (turns @ turns))
     middle = float(edges.mean())
-    departure = np.abs(edges - middle - samples_per_turn * turns) / samples_per_turn
-    if departure.max() > MAX_DEPARTURE_TURNS:
+    departure = (edges - middle - samples_per_turn * turns) / samples_per_turn
+    if np.abs(departure).max() > MAX_DEPARTURE_TURNS:
         return KeyPhaseFault.IRREGULAR
+    # slope of a line (Bevington and Robinson 2003, equation 6.23); an edge is known to a sample
+    resolution = samples_per_turn**-2 / 12.0
+    variance = float(departure @ departure) / (edges.size - 2) + resolution
     turns_at_start = -middle / samples_per_turn - float(turns[0])  # since the first pulse
     return KeyPhase(
         shaft_angle_rad=2.0 * math.pi * (turns_at_start % 1.0),
         speed_rpm=rpm_from_hz(rate_hz / samples_per_turn),
+        u_relative=math.sqrt(variance / (turns @ turns)),
+        n_pulses=edges.size,
     )
 
 

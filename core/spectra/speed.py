@@ -8,11 +8,12 @@ from enum import StrEnum
 import numpy as np
 
 from core.arrays import FloatArray
-from core.checks.sensor_checks import checked_speed
+from core.checks.sensor_checks import SURE, checked_speed
 from core.machine.unit import Unit
-from core.quality import Reading, Reason, missing, uncertain
+from core.quality import GOOD, Reading, Reason, missing, uncertain
 from core.spectra.key_phase import KeyPhase
 from core.spectra.lines import SegmentSettings, peak_frequency_hz
+from core.uncertainty import Budget, random_line, systematic_line
 from core.units import hz_from_rpm, rpm_from_hz
 
 LINE_SEARCH = (0.85, 1.15)
@@ -46,10 +47,17 @@ class SpeedSource(StrEnum):
 
 @dataclass(frozen=True)
 class Speed:
-    """Running speed in r/min; without a value when the machine stands."""
+    """Running speed in r/min; without a value when the machine stands.
+
+    Parameters
+    ----------
+    budget
+        Its uncertainty; None for the rated speed and for a speed that another contradicts.
+    """
 
     rpm: Reading
     source: SpeedSource
+    budget: Budget | None = None
 
 
 def running_speed(
@@ -92,11 +100,13 @@ def running_speed(
             line.u_relative if line else 0.0,
         )
         if checked.value is not None:
-            return Speed(checked, source)
+            pulses = key_phase if source is SpeedSource.KEY_PHASE else None
+            return Speed(checked, source, _budget(checked, pulses, line, settings))
     doubtful = uncertain(Reason.SPEED_UNKNOWN)
     line = _line(unit.rated_speed_rpm, frequency_hz, shaft_power, settings)
     if line is not None:
-        return Speed(Reading(line.rpm, doubtful), SpeedSource.LINE)
+        budget = Budget(line.rpm, (random_line("1× line", line.rpm * line.u_relative),))
+        return Speed(Reading(line.rpm, doubtful), SpeedSource.LINE, budget)
     return Speed(Reading(unit.rated_speed_rpm, doubtful), SpeedSource.RATED)
 
 
@@ -110,6 +120,26 @@ def _pulsed(key_phase: KeyPhase | None, slow_rpm: Reading | None) -> Reading | N
     ):
         return Reading(key_phase.speed_rpm)
     return Reading(key_phase.speed_rpm, uncertain(Reason.SPEED_IMPLAUSIBLE))
+
+
+def _budget(
+    speed: Reading, pulses: KeyPhase | None, line: _Line | None, settings: SegmentSettings
+) -> Budget | None:
+    """Uncertainty of a measured speed: of its pulses, or of a speed channel's reading.
+
+    A speed channel is as good as its agreement with the 1× line, where there is one.
+    """
+    if speed.value is None or speed.quality != GOOD:
+        return None
+    if pulses is not None:
+        if not pulses.u_relative > 0.0:
+            return None
+        std_rpm = speed.value * pulses.u_relative
+        return Budget(speed.value, (random_line("key-phase", std_rpm, pulses.n_pulses - 2.0),))
+    tolerance = KEY_PHASE_TOLERANCE
+    if line is not None:
+        tolerance = math.hypot(settings.sensors.speed_tolerance, SURE * line.u_relative)
+    return Budget(speed.value, (systematic_line("speed channel", tolerance, speed.value),))
 
 
 def _line(

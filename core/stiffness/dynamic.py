@@ -23,6 +23,7 @@ from core.spectra.spectral_statistics import (
 from core.stiffness.dynamic_settings import DynamicSettings
 from core.stiffness.film_covariance import BracketChanges, FilmFit
 from core.stiffness.film_fit import (
+    coherence_segments,
     explained_share,
     lack_of_fit,
     line_weights,
@@ -78,6 +79,8 @@ class DynamicStiffness:
     coherence : (2,)
         Multiple coherence of each bearing channel with the shaft's motion through the fitted film,
         over the used lines as they are weighted; 0 to 1.
+    coherence_segments : (2,)
+        Independent segments that would make that of a single line as certain.
     lack_of_fit : (2,)
         About 1 if the film is as constant over frequency as the model says, else more.
     frequency_hz : (n_used,)
@@ -101,6 +104,7 @@ class DynamicStiffness:
     per_delay: FilmChange
     delay_per_damping: float
     coherence: FloatArray
+    coherence_segments: FloatArray
     lack_of_fit: FloatArray
     frequency_hz: FloatArray
     probe_noise_um2_per_hz: FloatArray
@@ -286,6 +290,9 @@ def _result(
         per_delay=per(DELAY),
         delay_per_damping=0.0 if delay is None else float(changes.follow(DAMPING, with_delay)[0]),
         coherence=explained_share(weight, fit.residual, equations.force_power),
+        coherence_segments=coherence_segments(
+            weight, fit.residual, equations.force_power, fit.smoothing, fit.n_segments
+        ),
         lack_of_fit=lack_of_fit(equations, unknowns, weight, fit.n_segments),
         frequency_hz=spectrum.frequency_hz[fit.lines],
         probe_noise_um2_per_hz=equations.noise_power / phasor_power_per_density(bin_hz),

@@ -7,6 +7,7 @@ import numpy as np
 
 from core.arrays import ComplexArray, FloatArray
 from core.spectra.cross_spectrum import BEARING_X
+from core.spectra.spectral_statistics import CORRELATED_LINES
 from core.stiffness.normal_equations import NormalEquations
 from core.stiffness.probe_noise import conditional_power
 
@@ -109,6 +110,28 @@ def explained_share(
     whole = (weight * force_power).sum(axis=0)
     share: FloatArray = 1.0 - (weight * residual).sum(axis=0) / whole
     return np.minimum(np.maximum(share, 0.0), 1.0)
+
+
+def coherence_segments(
+    weight: FloatArray,
+    residual: FloatArray,
+    force_power: FloatArray,
+    smoothing: FloatArray,
+    n_segments: float,
+) -> FloatArray:
+    """Segments by which one line's coherence would be as certain as that of all lines, (2,).
+
+    The share that is left, residual over whole, moves with the relative errors of each line's
+    residual and power, ``1 / √n`` each and common to both as far as the residual is all of it. The
+    residual moves it a second time through the weights.
+    """
+    left = weight * residual / (weight * residual).sum(axis=0)
+    whole = weight * force_power / (weight * force_power).sum(axis=0)
+    moves = left + smoothing.T @ (whole - left)
+    squares = (moves**2 + whole**2 - 2.0 * moves * whole * residual / force_power).sum(axis=0)
+    variance = CORRELATED_LINES * squares / (n_segments - 2.0)  # two fitted signals
+    found: FloatArray = 1.0 + 2.0 * explained_share(weight, residual, force_power) / variance
+    return found
 
 
 def lack_of_fit(

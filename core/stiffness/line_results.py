@@ -19,14 +19,16 @@ from core.spectra.vortex import roundness, vortex_frequency_hz
 from core.stiffness.channel_budget import (
     amplitude_budget,
     amplitude_lines,
+    coherence_budget,
     phase_budget,
     phase_lines,
+    roundness_budget,
 )
 from core.stiffness.evidence import EvidenceSettings, LineLimits, chance_coherence, line_excitation
 from core.stiffness.ratio import effective_stiffness_n_per_m
 from core.stiffness.stiffness_budget import ratio_budget, transfer_budgets
 from core.stiffness.transfer import line_transfer
-from core.uncertainty import Budget, reading_of, with_budgets
+from core.uncertainty import Budget, reading_of, stated, with_budgets
 
 FLOOR_REACH = 12
 """Bins to each side of a line in which its surroundings are judged."""
@@ -104,12 +106,16 @@ class OrderLine:
         cross = complex(self.orders.matrix[self.line, x, y])
         return backward_share(float(power[x, y]), float(power[y, x]), cross)
 
-    def roundness(self) -> Reading:
+    def roundness(self) -> tuple[Reading, Budget | None]:
         """How round the shaft's orbit is at the line, and in which sense."""
         quality = self.quality(SHAFT_X, SHAFT_Y)
         if isinstance(quality, Reading):
-            return quality
-        return Reading(roundness(self.orders, self.line), quality)
+            return quality, None
+        found = roundness(self.orders, self.line)
+        shafts = [SHAFT_X, SHAFT_Y]
+        counted = self.phasors_um_pk[self.usable[:, shafts].all(axis=1)][:, shafts]
+        runout_um_pk = tuple(self.runout_um_pk(place) for place in shafts)
+        return Reading(found, quality), roundness_budget(self.bearing, found, counted, runout_um_pk)
 
     def stiffness(self) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
         """Coherence, equation (5) and transfer in both directions, and their budgets."""
@@ -142,8 +148,12 @@ class OrderLine:
         n_segments = int(self.orders.n_segments[shaft, bearing])
         few = n_segments < self.settings.min_segments
         coherence = float(self.orders.coherence(shaft, bearing)[self.line])
-        shown = missing(Reason.FEW_SEGMENTS) if few else Reading(coherence, quality)
         independent = independent_segments(n_segments, self.settings.overlap)
+        shown = missing(Reason.FEW_SEGMENTS)
+        if not few:
+            budget = coherence_budget(coherence, independent)
+            shown = stated(Reading(coherence, quality), budget)
+            budgets |= {f"coherence_{axes}": budget} if budget else {}
         reason = self._why_silent(shaft, bearing, independent, few)
         if reason is not Reason.OK:
             return (shown, *[missing(reason)] * 3)

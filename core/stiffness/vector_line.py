@@ -20,7 +20,7 @@ from core.spectra.cross_spectrum import (
 )
 from core.spectra.segments import ORDER1
 from core.spectra.vortex import roundness
-from core.stiffness.channel_budget import amplitude_budget, amplitude_lines
+from core.stiffness.channel_budget import amplitude_budget, amplitude_lines, roundness_budget
 from core.stiffness.evidence import EvidenceSettings, LineLimits, line_excitation
 from core.stiffness.line_results import AMPLITUDES, DIRECTIONS, PHASES, Vectors, phase_readings
 from core.stiffness.ratio import effective_stiffness_n_per_m
@@ -102,17 +102,19 @@ class VectorLine:
         runout_um_pk = self._runout_um_pk() if place in (SHAFT_X, SHAFT_Y) else 0.0
         return Vectors(self.phasors_um_pk[counted, place], quality, runout_um_pk)
 
-    def roundness(self) -> Reading:
+    def roundness(self) -> tuple[Reading, Budget | None]:
         """How round the shaft's orbit is, where the phases of both probes are known."""
         quality = self.quality(self.line, SHAFT_X, SHAFT_Y)
         if isinstance(quality, Reading):
-            return quality
-        phased = self._phased(SHAFT_X, SHAFT_Y)
-        return (
-            missing(Reason.NOT_MEASURED)
-            if phased is None
-            else Reading(roundness(phased, 0), quality)
-        )
+            return quality, None
+        phased, shafts = self._phased(SHAFT_X, SHAFT_Y), [SHAFT_X, SHAFT_Y]
+        if phased is None:
+            return missing(Reason.NOT_MEASURED), None
+        found = roundness(phased, 0)
+        known = (self.usable & self.has_phase)[:, shafts].all(axis=1)
+        counted, runout_um_pk = self.phasors_um_pk[known][:, shafts], self._runout_um_pk()
+        budget = roundness_budget(self.bearing, found, counted, (runout_um_pk, runout_um_pk))
+        return Reading(found, quality), budget
 
     def axes_quality(self, rotation_sense: int) -> Quality:
         """Whether shaft and bearing whirl with the rotation, where that can be told."""
