@@ -36,7 +36,7 @@ from core.spectra.cross_spectrum import (
 from core.spectra.segments import ORDER1, VORTEX, SegmentTransform
 from core.spectra.vortex import whirl
 from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
 from core.stiffness.transfer import line_transfer
 

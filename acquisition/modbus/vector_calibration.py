@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from acquisition.delivery.calibration import ChannelCalibration, UnitCalibration
-from core.spectra.vector_rows import VectorPart, VectorRow
+from core.spectra.polls import VectorPart, VectorRow
 
 _UNLIMITED = ChannelCalibration(
     full_scale_v=float(np.finfo(np.float32).max),

@@ -30,7 +30,7 @@ from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
 from core.quality import Quality, Reading, Reason, missing, worst
 from core.samples.blocks import SampleBlock
-from core.stiffness.line_results import AMPLITUDES, DIRECTIONS
+from core.stiffness.order_line import AMPLITUDES, DIRECTIONS
 from core.stiffness.polarity import is_reversed
 from core.units import NS_PER_S
 

@@ -5,7 +5,6 @@ What standards of the ISO 20816 family judge; nothing else in padwatch is made o
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +12,9 @@ import numpy.typing as npt
 from core.arrays import ComplexArray, FloatArray
 from core.machine.transducers import displacement_factor
 from core.machine.unit import Measurand, Unit
+from core.spectra.cross_spectrum import NOISE_BANDWIDTH_BINS
 from core.spectra.lines import SegmentSettings
 from core.units import hz_from_rpm
-
-HANN_NOISE_BINS = 1.5
-"""Equivalent noise bandwidth of Hann's taper (Harris 1978, table I): what its lines share."""
 
 MM_FROM_UM = 1e-3
 
@@ -42,11 +39,6 @@ class Overall:
     peak_to_peak_um: FloatArray
     orbit_um_pk: FloatArray
     velocity_mm_s_rms: FloatArray
-
-    @classmethod
-    def of_nothing(cls, n_channels: int, n_bearings: int) -> Self:
-        """What is known without waveforms."""
-        return cls(*(np.full(n, np.nan) for n in (n_channels, n_bearings, n_channels)))
 
 
 class OverallTransform:
@@ -90,7 +82,7 @@ class OverallTransform:
         """
         span = np.where(self._is_displacement, np.ptp(samples, axis=1), np.nan)
         speed = self._mm_s * np.abs(phasors[:, self._band])
-        power = (speed**2).sum(axis=1) / (2.0 * HANN_NOISE_BINS)
+        power = (speed**2).sum(axis=1) / (2.0 * NOISE_BANDWIDTH_BINS)
         return Overall(span, self._orbits(samples), np.sqrt(power))
 
     def _orbits(self, samples: FloatArray) -> FloatArray:

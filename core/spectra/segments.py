@@ -1,8 +1,10 @@
 """Segments: each stretch of samples is transformed once, here, and averaged elsewhere."""
 
+import cmath
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 import numpy.typing as npt
@@ -24,8 +26,7 @@ from core.spectra.key_phase import KeyPhase, read_key_phase
 from core.spectra.lines import SegmentSettings, bin_phasors, exact_phasors, tapered
 from core.spectra.overall import Overall, OverallTransform
 from core.spectra.recent import RecentVibration, parts_of
-from core.spectra.runout import RunoutVerdict
-from core.spectra.segment_runout import shaft_angle_rad, without_runout
+from core.spectra.runout import RunoutVerdict, shaft_angle_rad, without_runout
 from core.spectra.speed import Speed, running_speed
 from core.spectra.vortex import vortex_frequency_hz
 from core.units import hz_from_rpm
@@ -39,36 +40,49 @@ ORDER1, VORTEX = range(2)
 """Where the two order lines stand in `Segment.order_phasors_um_pk`."""
 
 
+class Evidence(StrEnum):
+    """What results are made of. The names appear in the API."""
+
+    WAVEFORMS = "waveforms"
+    AMPLITUDE_AND_PHASE = "amplitude_and_phase"
+    AMPLITUDE_ONLY = "amplitude_only"
+
+
 @dataclass(frozen=True)
 class Segment:
-    """One transformed segment of a unit.
+    """One transformed segment of a unit, or one poll of its rack.
 
     Parameters
     ----------
     channel_quality
-        One for each channel, throughout the segment.
+        One for each channel, throughout the segment; of a poll, that of the gaps.
+    usable : (n_channels,)
+        Whether the samples of each channel may be believed.
     mean
         (n_channels,) mean of the samples, engineering units of each channel.
     bin_phasors_um_pk
-        (n_channels, n_lines) displacement phasors at the bins above zero.
+        (n_channels, n_lines) displacement phasors at the bins above zero; None of a poll.
     order_frequency_hz
         (2,) exact frequencies of 1× and of the vortex; of its nominal order where there is no peak.
     has_vortex_peak
         Whether a line that bearings share has its peak in the vortex band, up to this segment.
     order_phasors_um_pk
         (n_channels, 2) displacement phasors at exactly these, 1× without runout where that can be
-        taken off.
+        taken off; finite also where not usable. Without a phase they are amplitudes.
+    order_quality
+        (2, n_channels) qualities of these.
+    order_usable, has_phase : (2, n_channels)
+        Whether each may be believed, and whether its phase is known.
+    at_mark_um_pk : (n_channels,)
+        1× phasors when the shaft's mark passes the pick-up; None where no key-phase says when.
     runout
-        Whether it was, by shaft channel.
+        Whether runout was taken off 1×, by shaft channel.
     overall
-        Broad-band vibration.
+        Broad-band vibration; None of a poll.
     clipped_share
         (n_channels,) share of the samples at an end of the converter's range.
-    shaft_angle_rad
-        Angle that the shaft has turned at the first sample since its mark passed the pick-up; None
-        where no key-phase says so.
     recent
-        Vibration of the newest parts; None without waveforms.
+        Vibration of the newest parts; None of a poll.
     """
 
     epoch: int
@@ -76,31 +90,74 @@ class Segment:
     stop_index: int
     stop_ns: int
     channel_quality: tuple[Quality, ...]
+    usable: npt.NDArray[np.bool_]
     slow: Mapping[str, Reading]
     mean: FloatArray
     speed: Speed
-    bin_phasors_um_pk: ComplexArray
+    bin_phasors_um_pk: ComplexArray | None
     order_frequency_hz: FloatArray
     has_vortex_peak: bool
     order_phasors_um_pk: ComplexArray
+    order_quality: tuple[tuple[Quality, ...], tuple[Quality, ...]]
+    order_usable: npt.NDArray[np.bool_]
+    has_phase: npt.NDArray[np.bool_]
+    at_mark_um_pk: ComplexArray | None
     runout: Mapping[str, RunoutVerdict]
-    overall: Overall
+    overall: Overall | None
     clipped_share: FloatArray
-    shaft_angle_rad: float | None = None
-    recent: RecentVibration | None = None
-
-    @property
-    def usable(self) -> npt.NDArray[np.bool_]:
-        """(n_channels,) whether each channel may be believed."""
-        return _usable(self.channel_quality)
+    recent: RecentVibration | None
 
     def is_grazed(self, row: int) -> bool:
         """Whether a channel is left out for a few clipped samples alone."""
         few = 0.0 < self.clipped_share[row] <= MAX_CLIPPED_SHARE
         return bool(few) and self.channel_quality[row] == CLIPPED
 
+    def line_quality(self, row: int, line: int) -> Quality:
+        """Quality of a channel at a line; a few clipped samples leave the segments before."""
+        return uncertain(Reason.CLIPPED) if self.is_grazed(row) else self.order_quality[line][row]
 
-class SegmentTransform:
+
+class KeptSegments:
+    """The segments or polls that are averaged.
+
+    Parameters
+    ----------
+    n_segments
+        How many make a full average.
+    segment_samples, hop_samples
+        Samples of one, and from the start of one to that of the next.
+    result_samples
+        Results come with the first segment that ends at or after each multiple of this.
+    n_rows
+        Rows of a block.
+    """
+
+    result_samples = 1
+
+    def __init__(
+        self, n_rows: int, n_segments: int, segment_samples: int = 1, hop_samples: int = 1
+    ) -> None:
+        self.n_rows, self.n_segments = n_rows, n_segments
+        self.segment_samples, self.hop_samples = segment_samples, hop_samples
+        self.segments: deque[Segment] = deque(maxlen=n_segments)
+
+    def clear(self) -> None:
+        """Forget all segments: the device counts anew."""
+        self.segments.clear()
+
+    def keep(self, segment: Segment) -> Segment:
+        """Keep a segment, and drop what has left the averaging time."""
+        self.segments.append(segment)
+        self.drop_before(segment.first_index - self.n_segments * self.hop_samples + 1)
+        return segment
+
+    def drop_before(self, first_index: int) -> None:
+        """Drop segments that begin before a sample."""
+        while self.segments and self.segments[0].first_index < first_index:
+            self.segments.popleft()
+
+
+class SegmentTransform(KeptSegments):
     """Transforms windows of one unit and keeps the ones that are averaged.
 
     Parameters
@@ -110,6 +167,12 @@ class SegmentTransform:
     """
 
     def __init__(self, unit: Unit, settings: SegmentSettings) -> None:
+        super().__init__(
+            len(unit.channels),
+            settings.n_segments,
+            settings.segment_samples,
+            settings.hop_samples,
+        )
         self._unit = unit
         self._settings = settings
         bin_hz = unit.rate_hz / settings.segment_samples
@@ -122,11 +185,6 @@ class SegmentTransform:
         ids = [channel.id for channel in unit.channels]
         self._key_phase_row = ids.index(unit.key_phase) if unit.key_phase else None
         self._bearing_rows = [[ids.index(i) for i in b.channels] for b in unit.bearings]
-        self.segments: deque[Segment] = deque(maxlen=settings.n_segments)
-
-    def clear(self) -> None:
-        """Forget all segments: the device counts anew."""
-        self.segments.clear()
 
     def add(self, window: SampleBlock) -> Segment:
         """Transform a window, keep it, and drop what has left the averaging time.
@@ -134,7 +192,7 @@ class SegmentTransform:
         Nothing older than the averaging time counts, also not for where its vortex is looked for:
         behind a gap it may be of any time.
         """
-        self._drop_before(window.first_index - self._span)
+        self.drop_before(window.first_index - self.n_segments * self.hop_samples)
         finite: npt.NDArray[np.bool_] = np.all(np.isfinite(window.samples), axis=1)
         quality = tuple(
             q if good or q.level is Level.BAD else bad(Reason.NOT_FINITE)
@@ -153,12 +211,14 @@ class SegmentTransform:
         vortex_hz = self._vortex_hz(turn_hz, bins, _usable(quality))
         order_hz = np.array([turn_hz, vortex_hz or self._settings.vortex_order * turn_hz])
         orders, runout = self._orders(prepared, window.rate_hz, order_hz, speed, key_phase)
+        angle_rad, usable = shaft_angle_rad(speed, key_phase), _usable(quality)
         segment = Segment(
             epoch=window.epoch,
             first_index=window.first_index,
             stop_index=window.stop_index,
             stop_ns=window.stop_ns,
             channel_quality=quality,
+            usable=usable,
             slow=window.slow,
             mean=mean,
             speed=speed,
@@ -166,23 +226,16 @@ class SegmentTransform:
             order_frequency_hz=order_hz,
             has_vortex_peak=vortex_hz is not None,
             order_phasors_um_pk=orders,
+            order_quality=(quality, quality),
+            order_usable=np.array([usable, usable]),
+            has_phase=np.ones((2, usable.size), dtype=np.bool_),
+            at_mark_um_pk=None if angle_rad is None else _turned(orders[:, ORDER1], -angle_rad),
             runout=runout,
             overall=self._overall.of(samples, lines),
             clipped_share=clipped,
             recent=self._recent(samples, window.rate_hz, turn_hz, speed, key_phase),
-            shaft_angle_rad=shaft_angle_rad(speed, key_phase),
         )
-        self.segments.append(segment)
-        self._drop_before(window.first_index - self._span + 1)
-        return segment
-
-    @property
-    def _span(self) -> int:
-        return self._settings.n_segments * self._settings.hop_samples
-
-    def _drop_before(self, first_index: int) -> None:
-        while self.segments and self.segments[0].first_index < first_index:
-            self.segments.popleft()
+        return self.keep(segment)
 
     def _judged(
         self,
@@ -285,7 +338,8 @@ class SegmentTransform:
             (self.frequency_hz > band_hz[0] - margin_hz)
             & (self.frequency_hz < band_hz[1] + margin_hz)
         )
-        phasors = np.array([*(s.bin_phasors_um_pk[:, near] for s in self.segments), bins[:, near]])
+        before = [s.bin_phasors_um_pk for s in self.segments if s.bin_phasors_um_pk is not None]
+        phasors = np.array([part[:, near] for part in (*before, bins)])
         counted = np.array([*(s.usable for s in self.segments), usable])
         spectra = [
             average(self.frequency_hz[near], phasors[:, rows], counted[:, rows])
@@ -296,6 +350,11 @@ class SegmentTransform:
 
 def _usable(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
     return np.array([quality.level is not Level.BAD for quality in qualities])
+
+
+def _turned(phasors: ComplexArray, angle_rad: float) -> ComplexArray:
+    factor = cmath.exp(1j * angle_rad)
+    return np.array([phasor * factor for phasor in phasors.tolist()])
 
 
 def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:

@@ -14,25 +14,25 @@ import numpy.typing as npt
 from core.arrays import FloatArray
 from core.machine.bracket import BracketDynamics
 from core.quality import Reason
-from core.spectra.cross_spectrum import BEARING_X, CrossSpectrum
-from core.spectra.spectral_statistics import (
+from core.spectra.cross_spectrum import (
+    BEARING_X,
     SMEAR_BINS_SQUARED,
+    CrossSpectrum,
     independent_segments,
     phasor_power_per_density,
 )
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.dynamic_lines import DynamicSettings, between_harmonics, little_leakage
 from core.stiffness.film_covariance import BracketChanges, FilmFit
 from core.stiffness.film_fit import (
     coherence_segments,
     explained_share,
     lack_of_fit,
     line_weights,
+    normal_equations,
     signal_share,
     smoother,
 )
-from core.stiffness.normal_equations import normal_equations
 from core.stiffness.probe_noise import probe_noise_power
-from core.stiffness.usable_lines import between_harmonics, little_leakage
 
 MAX_INERTIA_SHARE = 0.8
 """Largest mass that is sought takes so much of the bracket's stiffness away at the highest line."""

@@ -39,6 +39,8 @@ def preferred_stiffness(
     Without any number: why the first choice has none, and no estimator.
     """
     found = [(readings[STIFFNESS_OF[e].format(axes=axes)], e) for e in preference]
+    measured = [(r, e) for r, e in found if r.quality.reason is not Reason.NOT_MEASURED]
+    found = measured or found
     numbers = [
         (reading, estimator)
         for reading, estimator in found

@@ -12,14 +12,14 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
-from core.spectra.spectral_statistics import (
+from core.spectra.cross_spectrum import (
     SMEARED_APART,
     SMEARED_IN_PHASE,
     SMEARED_IN_QUADRATURE,
     WHITE_PRODUCTS,
     correlated_sum,
 )
-from core.stiffness.normal_equations import NormalEquations
+from core.stiffness.film_fit import NormalEquations
 
 
 @dataclass(frozen=True)

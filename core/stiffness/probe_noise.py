@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
-from core.spectra.cross_spectrum import BEARING_X, CrossSpectrum
-from core.spectra.spectral_statistics import CORRELATED_LINES
+from core.spectra.cross_spectrum import BEARING_X, CORRELATED_LINES, CrossSpectrum
 
 N_BLOCKS = 4
 """Parts of the quiet band, in case the shaft moves unseen in some of them."""

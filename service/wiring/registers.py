@@ -11,8 +11,9 @@ from acquisition.modbus.slow_values import PolledSlowValues
 from acquisition.modbus.vector_calibration import vector_calibration
 from acquisition.source import SampleSource
 from core.machine.unit import Unit
+from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
-from core.monitor.vector_monitor import VectorMonitor
+from core.spectra.polls import PollTransform
 from service.settings.modbus_sources import (
     MappedDeviceSettings,
     ModbusFifoSettings,
@@ -62,9 +63,11 @@ def vector_source(
 
 def vector_monitor(
     source: ModbusVectorSettings, unit: Unit, settings: AnalysisSettings
-) -> VectorMonitor:
+) -> UnitMonitor:
     """The monitor of a unit with a vector rack."""
-    return VectorMonitor(at_poll_rate(source, unit), source.rows, settings, source.averaging)
+    unit = at_poll_rate(source, unit)
+    transform = PollTransform(unit, source.rows, settings, source.averaging)
+    return UnitMonitor(unit, settings, transform)
 
 
 def fifo_source(

@@ -12,7 +12,7 @@ from acquisition.simulated.devices.map_device import MapDevice, in_units
 from acquisition.simulated.feed import Ledger
 from core.arrays import FloatArray
 from core.spectra.lines import exact_phasors, tapered
-from core.spectra.vector_rows import VectorPart, VectorRow
+from core.spectra.polls import VectorPart, VectorRow
 from core.units import hz_from_rpm
 
 

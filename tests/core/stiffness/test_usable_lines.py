@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from core.spectra.lines import bin_phasors, tapered
-from core.spectra.spectral_statistics import (
+from core.spectra.cross_spectrum import (
     BIN_CORRELATION,
     CORRELATED_LINES,
     SMEAR_BINS_SQUARED,
@@ -17,7 +16,8 @@ from core.spectra.spectral_statistics import (
     leakage_kernel,
     phasor_power_per_density,
 )
-from core.stiffness.usable_lines import LineSelection, between_harmonics, little_leakage
+from core.spectra.lines import bin_phasors, tapered
+from core.stiffness.dynamic_lines import LineSelection, between_harmonics, little_leakage
 
 FREQUENCY_HZ = 600.0 / 8192 * np.arange(1, 342)
 BIN_HZ = float(FREQUENCY_HZ[0])

@@ -22,7 +22,7 @@ from core.arrays import FloatArray
 from core.machine.unit import Unit
 from core.quality import Level
 from core.samples.blocks import SampleBlock
-from core.stiffness.ratio import effective_stiffness_n_per_m
+from core.stiffness.transfer import effective_stiffness_n_per_m
 from core.units import hz_from_rpm
 
 BuildUnit = Callable[..., SimulatedUnit]

@@ -11,14 +11,13 @@ from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
 from core.machine.unit import Channel, Measurand, Unit
-from core.monitor.assessment import Evidence
 from core.monitor.catalogue import CATALOGUE
+from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
-from core.monitor.vector_monitor import VectorMonitor
 from core.quality import GOOD, Level, Reading, Reason, bad, missing
+from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow
+from core.spectra.segments import Evidence
 from core.spectra.speed import SpeedSource
-from core.spectra.vector_rows import VectorPart, VectorRow
-from core.spectra.vector_settings import VectorSettings
 
 
 def test_equation_5_is_computed_from_the_amplitudes_of_a_rack(rack) -> None:
@@ -75,9 +74,8 @@ def test_velocity_and_acceleration_become_displacement_at_the_speed_of_the_poll(
         Channel("bx", Measurand.VELOCITY_MM_S),
         Channel("by", Measurand.ACCELERATION_M_S2),
     )
-    monitor = VectorMonitor(
-        replace(unit, rate_hz=RATE_HZ, channels=channels), AMPLITUDES, AnalysisSettings()
-    )
+    unit, settings = replace(unit, rate_hz=RATE_HZ, channels=channels), AnalysisSettings()
+    monitor = UnitMonitor(unit, settings, PollTransform(unit, AMPLITUDES, settings))
     newest = watch(monitor, polls(60, 60, 20e-3 * omega, 20e-6 * omega**2, noise=0.0, n=12))[-1]
 
     assert newest.readings["order1_bearing_x_um_pk"].value == pytest.approx(20.0, rel=1e-5)
@@ -224,7 +222,7 @@ def test_a_step_of_vibration_is_an_alarm_within_half_a_minute_and_its_delay(
 ) -> None:
     limits = LimitRule(Limits(100.0), rule_of(delay_s, 30.0))
     board = UnitAlarms(unit, UnitRules(bearings={"UJB": BearingRules(shaft_order1=limits)}))
-    monitor, n_before = rack(averaging=VectorSettings()), 40 + first
+    monitor, n_before = rack(averaging=PollSettings()), 40 + first
     values = np.repeat([[60.0], [50.0], [20.0], [10.0]], n_before + 12, axis=1)
     values[0, n_before:] = 120.0
     raised = {

@@ -11,7 +11,7 @@ from core.spectra.cross_spectrum import CrossSpectrum
 from core.stiffness.agreement import FALSE_ALARM
 from core.stiffness.channel_budget import coherence_budget
 from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.stiffness_budget import (
     BRACKET,
     DAMPING,
@@ -41,7 +41,7 @@ NAMES = (
 )
 
 
-def film_results(
+def dynamic_readings(
     bearing: Bearing,
     spectrum: CrossSpectrum | None,
     turn_hz: tuple[float, float],

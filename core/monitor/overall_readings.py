@@ -1,18 +1,14 @@
-"""Broad-band vibration and 1× phases of one bearing over some segments."""
+"""Broad-band vibration of one bearing over some segments, and vibration of the newest."""
 
-import cmath
 import math
-from collections.abc import Callable, Mapping, Sequence
-
-import numpy as np
+from collections.abc import Mapping, Sequence
 
 from core.machine.unit import Bearing
-from core.quality import Quality, Reading, Reason, current_mean, missing, worst
+from core.quality import Level, Reading, Reason, current_mean, missing, worst
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.spectra.recent import RecentReadings
 from core.spectra.segments import ORDER1, Segment
 from core.stiffness.channel_budget import amplitude_lines
-from core.stiffness.line_results import PHASES, Vectors, phase_readings
 from core.uncertainty import Budget, mean_budget, numbers, with_budgets
 from core.units import ns_from_s
 
@@ -31,7 +27,7 @@ OVERALL_NAMES = (*SHAFT_SPANS, ORBIT, *BEARING_SPEEDS)
 """Broad-band quantities of the catalogue."""
 
 
-def overall_results(
+def overall_readings(
     segments: Sequence[Segment], rows: Sequence[int], bearing: Bearing, number: int
 ) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
     """Broad-band vibration, averaged over the segments, and its budgets, by quantity.
@@ -45,6 +41,8 @@ def overall_results(
     number
         The bearing's place in the unit.
     """
+    if segments[-1].overall is None:
+        return dict.fromkeys(OVERALL_NAMES, missing(Reason.NOT_MEASURED)), {}
     readings: dict[str, Reading] = {}
     found: dict[str, Budget | None] = {}
     grazed = [segments[-1].is_grazed(row) or segments[-1].usable[row] for row in rows]
@@ -63,7 +61,7 @@ def overall_results(
     return with_budgets(readings, found)
 
 
-def recent_results(
+def recent_readings(
     segment: Segment, rows: Sequence[int], rate_hz: float
 ) -> tuple[RecentReadings, ...]:
     """Shaft vibration of the newest parts of a segment, and bearing velocity of all of it.
@@ -73,15 +71,15 @@ def recent_results(
     rows
         Of the bearing's four channels.
     """
-    recent, found = segment.recent, []
-    if recent is None:
+    recent, overall, found = segment.recent, segment.overall, []
+    if recent is None or overall is None:
         return ()
     for part, stop in enumerate(recent.stop.tolist()):
         behind_ns = ns_from_s((segment.stop_index - segment.first_index - stop) / rate_hz)
         readings = {}
         for place, name in SHAFTS.items():
             row = rows[place]
-            is_span = not math.isnan(segment.overall.peak_to_peak_um[row])
+            is_span = not math.isnan(overall.peak_to_peak_um[row])
             span = recent.peak_to_peak_um[part, row] if is_span else math.nan
             readings[f"overall_{name}_um_pp"] = _reading(segment, (row,), span)
             readings[f"order1_{name}_um_pk"] = _turning(
@@ -93,48 +91,39 @@ def recent_results(
     return (*found[:-1], RecentReadings(newest.time_ns, {**newest.readings, **speeds}))
 
 
+def polled_readings(polls: Sequence[Segment], rows: Sequence[int]) -> tuple[RecentReadings, ...]:
+    """Shaft vibration at 1× of each of some polls.
+
+    Parameters
+    ----------
+    rows
+        Of the bearing's four channels.
+    """
+    return tuple(
+        RecentReadings(
+            poll.stop_ns,
+            {
+                f"order1_{name}_um_pk": _turning(poll, _polled(poll, rows[place]))
+                for place, name in SHAFTS.items()
+            },
+        )
+        for poll in polls
+    )
+
+
+def _polled(poll: Segment, row: int) -> Reading:
+    quality = poll.order_quality[ORDER1][row]
+    if quality.level is Level.BAD:
+        return missing(quality.reason)
+    return Reading(float(abs(poll.order_phasors_um_pk[row, ORDER1])), quality)
+
+
 def _turning(segment: Segment, amplitude: Reading) -> Reading:
     """An amplitude at 1×, as far as the speed is known."""
     speed = segment.speed.rpm
     if speed.value is None or amplitude.value is None:
         return speed if speed.value is None else amplitude
     return Reading(amplitude.value, worst((amplitude.quality, speed.quality)))
-
-
-def phase_results(
-    segments: Sequence[Segment],
-    rows: Sequence[int],
-    quality: Callable[..., Quality | Reading],
-    runout_um_pk: Callable[[int], float],
-) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
-    """Phase of each channel's mean 1× vector when the mark passes the pick-up, 0 to 360°.
-
-    Parameters
-    ----------
-    quality
-        Of what is read from a channel at 1×; without a number, why.
-    runout_um_pk
-        What is left of the runout in a channel.
-    """
-    return phase_readings(
-        {
-            name: _vectors(segments, rows[place], quality(place), runout_um_pk(place))
-            for name, place in PHASES.items()
-        }
-    )
-
-
-def _vectors(
-    segments: Sequence[Segment], row: int, quality: Quality | Reading, runout_um_pk: float
-) -> Vectors:
-    if not isinstance(quality, Reading) and segments[-1].shaft_angle_rad is None:
-        quality = missing(Reason.NOT_MEASURED)
-    turned = [
-        complex(s.order_phasors_um_pk[row, ORDER1]) * cmath.exp(-1j * s.shaft_angle_rad)
-        for s in segments
-        if s.shaft_angle_rad is not None and s.usable[row]
-    ]
-    return Vectors(np.array(turned, np.complex128), quality, runout_um_pk)
 
 
 def _mean_budget(
@@ -148,15 +137,18 @@ def _mean_budget(
 
 
 def _span(segment: Segment, row: int) -> Reading:
-    return _reading(segment, (row,), segment.overall.peak_to_peak_um[row])
+    overall = segment.overall
+    return _reading(segment, (row,), overall.peak_to_peak_um[row] if overall else math.nan)
 
 
 def _speed(segment: Segment, row: int) -> Reading:
-    return _reading(segment, (row,), segment.overall.velocity_mm_s_rms[row])
+    overall = segment.overall
+    return _reading(segment, (row,), overall.velocity_mm_s_rms[row] if overall else math.nan)
 
 
 def _orbit(segment: Segment, rows: Sequence[int], bearing: int) -> Reading:
-    return _reading(segment, rows, segment.overall.orbit_um_pk[bearing])
+    overall = segment.overall
+    return _reading(segment, rows, overall.orbit_um_pk[bearing] if overall else math.nan)
 
 
 def _reading(segment: Segment, rows: Sequence[int], value: float) -> Reading:
