@@ -30,8 +30,8 @@ from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
 from core.quality import Quality, Reading, Reason, missing, worst
 from core.samples.blocks import SampleBlock
+from core.stiffness.estimators import is_reversed
 from core.stiffness.order_line import AMPLITUDES, DIRECTIONS
-from core.stiffness.polarity import is_reversed
 from core.units import NS_PER_S
 
 NOT_THERE = missing(Reason.NOT_MEASURED)

@@ -42,9 +42,8 @@ from core.stiffness.channel_budget import frequency_budget
 from core.stiffness.dynamic import DynamicStiffness
 from core.stiffness.dynamic_readings import NAMES as DYNAMIC_NAMES
 from core.stiffness.dynamic_readings import dynamic_readings
-from core.stiffness.estimators import preferred_stiffness
+from core.stiffness.estimators import preferred_stiffness, signs_checked
 from core.stiffness.order_line import Found, OrderLine, other_line_hz
-from core.stiffness.polarity import signs_checked
 from core.uncertainty import Budget, with_budgets
 
 
