@@ -6,8 +6,9 @@ in a channel's own trend. A budget lists both and combines them.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtri, stdtrit
@@ -26,14 +27,13 @@ class Distribution(StrEnum):
 
 
 class Kind(StrEnum):
-    """Whether a contribution is drawn anew in every averaging time."""
+    """Whether a contribution changes from one averaging time to the next."""
 
     RANDOM = "random"
     SYSTEMATIC = "systematic"
 
 
-@dataclass(frozen=True)
-class BudgetLine:
+class BudgetLine(NamedTuple):
     """One contribution to the uncertainty of a result.
 
     Parameters
@@ -100,6 +100,15 @@ class Budget:
         """Interval that holds the truth with 95 %."""
         return self.bounded_interval or _interval(self.value, self.lines)
 
+    def reading(self, quality: Quality) -> Reading:
+        """The result with its standard uncertainties and interval."""
+        parts = [(line.kind, line.contribution, line.freedoms) for line in self.lines]
+        random = math.sqrt(sum(part**2 for kind, part, _ in parts if kind is Kind.RANDOM))
+        systematic = math.sqrt(sum(part**2 for kind, part, _ in parts if kind is Kind.SYSTEMATIC))
+        half = _half_width([(part, freedoms) for _, part, freedoms in parts], CONFIDENCE)
+        interval = self.bounded_interval or (self.value - half, self.value + half)
+        return Reading(self.value, quality, random, systematic, interval)
+
     @property
     def random_interval(self) -> tuple[float, float]:
         """The same if transducers and bracket were known exactly."""
@@ -122,21 +131,32 @@ def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE)
     Student's distribution with the effective degrees of freedom of Welch and Satterthwaite (GUM,
     G.4.1); 1.96 when all widths are known.
     """
-    fourth = sum(line.contribution**4 / line.freedoms for line in lines)
-    freedoms = _root_sum(lines) ** 4 / fourth if fourth > 0.0 else math.inf
+    return _coverage_factor([(line.contribution, line.freedoms) for line in lines], confidence)
+
+
+def _coverage_factor(parts: Sequence[tuple[float, float]], confidence: float) -> float:
+    """The same of contributions with their degrees of freedom."""
+    fourth = sum(part**4 / freedoms for part, freedoms in parts)
+    root = math.sqrt(sum(part**2 for part, _ in parts))
+    freedoms = root**4 / fourth if fourth > 0.0 else math.inf
     quantile = 0.5 + confidence / 2.0
     return float(ndtri(quantile) if math.isinf(freedoms) else stdtrit(freedoms, quantile))
+
+
+def _half_width(parts: Sequence[tuple[float, float]], confidence: float) -> float:
+    root = math.sqrt(sum(part**2 for part, _ in parts))
+    return _coverage_factor(parts, confidence) * root
 
 
 def proportional(value: float, budget: Budget) -> Budget:
     """Budget of a value that is in an exactly known proportion to the result of another."""
     factor = value / budget.value
-    lines = (replace(line, sensitivity=factor * line.sensitivity) for line in budget.lines)
+    lines = (line._replace(sensitivity=factor * line.sensitivity) for line in budget.lines)
     return Budget(value, tuple(lines))
 
 
 def _interval(value: float, lines: Sequence[BudgetLine]) -> tuple[float, float]:
-    half = coverage_factor(lines) * _root_sum(lines)
+    half = _half_width([(line.contribution, line.freedoms) for line in lines], CONFIDENCE)
     return value - half, value + half
 
 
@@ -151,7 +171,7 @@ MIN_EFFECTIVE = 2.0
 
 
 def effective_number(values: FloatArray) -> float:
-    """How many independent values would say as much as these (n,), at least 2 of 2 or more.
+    """Number of independent values with as much information as these (n,), at least 2 of 2 or more.
 
     Segments overlap, and what they show wanders: neighbours share much. For a first-order process
     ``n (1 - r) / (1 + r)`` are left, r the correlation of neighbours (Bayley and Hammersley 1946);
@@ -187,7 +207,7 @@ def mean_budget(
     Returns
     -------
     None where fewer than two values are known, or where they never differ: a transmitter that
-    repeats itself says nothing of how well it measures.
+    repeats itself does not show how well it measures.
     """
     known = np.asarray(values, dtype=np.float64)
     if known.size < MIN_EFFECTIVE or not np.ptp(known) > 0.0:
@@ -205,31 +225,26 @@ def numbers(readings: Sequence[Reading]) -> FloatArray:
 def with_budgets(
     readings: Mapping[str, Reading], found: Mapping[str, Budget | None]
 ) -> tuple[dict[str, Reading], dict[str, Budget]]:
-    """Readings that have a number with their uncertainty, and the budgets that say so."""
+    """Readings with their uncertainties, and the budgets of those that have a number."""
     budgets = {
         name: budget
         for name, budget in found.items()
         if budget is not None and readings[name].value is not None
     }
-    told = {name: stated(reading, budgets.get(name)) for name, reading in readings.items()}
-    return told, budgets
+    with_uncertainty = {
+        name: stated(reading, budgets.get(name)) for name, reading in readings.items()
+    }
+    return with_uncertainty, budgets
 
 
 def stated(reading: Reading, budget: Budget | None) -> Reading:
     """The reading with the uncertainty of a budget, where there is one."""
     if budget is None:
         return reading
-    return replace(
-        reading,
-        u_random=budget.random,
-        u_systematic=budget.systematic,
-        interval_95=budget.interval,
+    found = budget.reading(reading.quality)
+    return Reading(
+        reading.value, reading.quality, found.u_random, found.u_systematic, found.interval_95
     )
-
-
-def reading_of(budget: Budget, quality: Quality) -> Reading:
-    """The result of a budget with its standard uncertainties."""
-    return Reading(budget.value, quality, budget.random, budget.systematic, budget.interval)
 
 
 SHAFT_GAIN = "gain of shaft probe"

@@ -8,7 +8,7 @@ from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator
 from core.quality import Quality, Reading
 from core.spectra.cross_spectrum import CrossSpectrum
-from core.spectra.recent import RecentReadings
+from core.spectra.overall import RecentReadings
 from core.spectra.runout import RunoutVerdict
 from core.spectra.segments import Evidence
 from core.spectra.speed import SpeedSource

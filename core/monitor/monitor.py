@@ -23,7 +23,7 @@ from core.samples.ring import Ring
 from core.spectra.polls import PollTransform
 from core.spectra.segments import Segment, SegmentTransform
 from core.stiffness.order_line import AMPLITUDES
-from core.units import hz_from_rpm
+from core.units import hz_from_rpm, ns_from_s
 
 ORBIT_TURNS = 3
 
@@ -240,14 +240,15 @@ class UnitMonitor:
     def _complete_segments(self) -> Iterator[Assessment]:
         start, n_samples = self._next_start or 0, self._transform.segment_samples
         while self._ring.holds(start, start + n_samples):
-            segment = self._transform.add(self._ring.read(start, start + n_samples))
+            window = self._ring.read(start, start + n_samples)
+            segment = self._transform.add(window)
             self._note_start(start)
             self._next_start = start = start + self._transform.hop_samples
             n_results = segment.stop_index // self._transform.result_samples
             if n_results != self._n_results:
                 self._n_results = n_results
                 for bearing in self.unit.bearings:
-                    yield self._assess(bearing, segment)
+                    yield self._assess(bearing, segment, window)
 
     def _note_start(self, start: int) -> None:
         self._starts.append(start)
@@ -255,7 +256,7 @@ class UnitMonitor:
         while self._starts[0] <= start - n_samples:
             self._starts.popleft()
 
-    def _assess(self, bearing: Bearing, newest: Segment) -> Assessment:
+    def _assess(self, bearing: Bearing, newest: Segment, window: SampleBlock) -> Assessment:
         transform, first_index = self._transform, self._transform.segments[0].first_index
         polled = transform if isinstance(transform, PollTransform) else None
         n_possible = 1 + (newest.first_index - self._first_start) // transform.hop_samples
@@ -294,7 +295,7 @@ class UnitMonitor:
             budgets=found.budgets,
             estimators=found.estimators,
             spectrum=found.spectrum,
-            orbit=None if polled else self._orbit(bearing, newest),
+            orbit=None if polled else self._orbit(bearing, newest, window),
             runout={
                 "shaft_x": newest.runout[bearing.shaft_x],
                 "shaft_y": newest.runout[bearing.shaft_y],
@@ -312,17 +313,17 @@ class UnitMonitor:
         by_id = {c.id: n for n, c in enumerate(self.unit.channels)}
         return [by_id[id_] for id_ in bearing.channels]
 
-    def _orbit(self, bearing: Bearing, newest: Segment) -> OrbitTrace | None:
+    def _orbit(self, bearing: Bearing, newest: Segment, window: SampleBlock) -> OrbitTrace | None:
         rows = self._rows(bearing)[:2]
         if newest.speed.rpm.value is None or not newest.usable[rows].all():
             return None
         n_samples = round(ORBIT_TURNS / hz_from_rpm(newest.speed.rpm.value) * self.unit.rate_hz)
-        stop = newest.stop_index
-        window = self._ring.read(max(stop - n_samples, newest.first_index), stop)
+        start = max(window.n_samples - n_samples, 0)
         signs = np.array([[self.unit.channels[row].direction] for row in rows], dtype=np.float32)
-        traces = signs * window.samples[rows]
+        traces = signs * window.samples[rows, start:]
         traces -= traces.mean(axis=1, keepdims=True)
-        return OrbitTrace(window.start_ns, window.rate_hz, traces[0], traces[1])
+        start_ns = window.start_ns + ns_from_s(start / window.rate_hz)
+        return OrbitTrace(start_ns, window.rate_hz, traces[0], traces[1])
 
 
 def _pieces(block: SampleBlock, n_most: int) -> Iterator[SampleBlock]:

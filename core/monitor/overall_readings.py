@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from core.machine.unit import Bearing
 from core.quality import Level, Reading, Reason, current_mean, missing, worst
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
-from core.spectra.recent import RecentReadings
+from core.spectra.overall import RecentReadings
 from core.spectra.segments import ORDER1, Segment
 from core.stiffness.channel_budget import amplitude_lines
 from core.uncertainty import Budget, mean_budget, numbers, with_budgets
@@ -47,14 +47,14 @@ def overall_readings(
     found: dict[str, Budget | None] = {}
     grazed = [segments[-1].is_grazed(row) or segments[-1].usable[row] for row in rows]
     for name, place in SHAFT_SPANS.items():
-        spans = [_span(segment, rows[place]) for segment in segments]
+        spans = [segment.spans_um_pp[rows[place]] for segment in segments]
         readings[name] = current_mean(spans, is_grazed=grazed[place])
         found[name] = _mean_budget(readings[name], spans, bearing, place)
     orbits = [_orbit(segment, rows[:2], number) for segment in segments]
     readings[ORBIT] = current_mean(orbits, is_grazed=all(grazed[:2]))
     found[ORBIT] = _mean_budget(readings[ORBIT], orbits, bearing, SHAFT_X)
     for name, place in BEARING_SPEEDS.items():
-        speeds = [_speed(segment, rows[place]) for segment in segments]
+        speeds = [segment.velocities_mm_s_rms[rows[place]] for segment in segments]
         squares = [r if r.value is None else Reading(r.value**2, r.quality) for r in speeds]
         readings[name] = _root(current_mean(squares, is_grazed=grazed[place]))
         found[name] = _mean_budget(readings[name], squares, bearing, place, is_root=True)
@@ -81,12 +81,14 @@ def recent_readings(
             row = rows[place]
             is_span = not math.isnan(overall.peak_to_peak_um[row])
             span = recent.peak_to_peak_um[part, row] if is_span else math.nan
-            readings[f"overall_{name}_um_pp"] = _reading(segment, (row,), span)
+            readings[f"overall_{name}_um_pp"] = segment.reading((row,), float(span))
             readings[f"order1_{name}_um_pk"] = _turning(
-                segment, _reading(segment, (row,), recent.order1_um_pk[part, row])
+                segment, segment.reading((row,), float(recent.order1_um_pk[part, row]))
             )
         found.append(RecentReadings(segment.stop_ns - behind_ns, readings))
-    speeds = {name: _speed(segment, rows[place]) for name, place in BEARING_SPEEDS.items()}
+    speeds = {
+        name: segment.velocities_mm_s_rms[rows[place]] for name, place in BEARING_SPEEDS.items()
+    }
     newest = found[-1]
     return (*found[:-1], RecentReadings(newest.time_ns, {**newest.readings, **speeds}))
 
@@ -136,27 +138,9 @@ def _mean_budget(
     return mean_budget(reading.value, numbers(parts), lines, sensitivity)
 
 
-def _span(segment: Segment, row: int) -> Reading:
-    overall = segment.overall
-    return _reading(segment, (row,), overall.peak_to_peak_um[row] if overall else math.nan)
-
-
-def _speed(segment: Segment, row: int) -> Reading:
-    overall = segment.overall
-    return _reading(segment, (row,), overall.velocity_mm_s_rms[row] if overall else math.nan)
-
-
 def _orbit(segment: Segment, rows: Sequence[int], bearing: int) -> Reading:
     overall = segment.overall
-    return _reading(segment, rows, overall.orbit_um_pk[bearing] if overall else math.nan)
-
-
-def _reading(segment: Segment, rows: Sequence[int], value: float) -> Reading:
-    if not segment.usable[list(rows)].all():
-        return missing(worst(segment.channel_quality[row] for row in rows).reason)
-    if math.isnan(value):
-        return missing(Reason.NOT_MEASURED)
-    return Reading(float(value), worst(segment.channel_quality[row] for row in rows))
+    return segment.reading(rows, float(overall.orbit_um_pk[bearing]) if overall else math.nan)
 
 
 def _root(mean: Reading) -> Reading:

@@ -1,5 +1,6 @@
 """`CrossSpectrum`: how four signals of a bearing vary together, line by line, and how surely."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -62,6 +63,12 @@ class CrossSpectrum:
         )
         return np.minimum(coherence, 1.0)
 
+    def coherence_at(self, line: int, first: int, second: int) -> float:
+        """Squared coherence of two channels at one line."""
+        product = float(self.power[line, first, second]) * float(self.power[line, second, first])
+        squared = abs(complex(self.matrix[line, first, second])) ** 2
+        return min(squared / product, 1.0) if product > 0.0 else 0.0
+
 
 NO_SPECTRUM = CrossSpectrum(
     np.zeros(0), np.zeros((0, 4, 4), complex), np.zeros((0, 4, 4)), np.zeros((4, 4), np.int64)
@@ -82,17 +89,18 @@ def average(
     usable : (n_segments, n_channels)
         Whether the channel may be believed throughout the segment.
     """
-    counted = phasors_um_pk * usable[:, :, np.newaxis]
+    all_usable = bool(usable.all())
+    counted = phasors_um_pk if all_usable else phasors_um_pk * usable[:, :, np.newaxis]
     by_line = np.ascontiguousarray(counted.transpose(2, 1, 0))  # (n_lines, n_channels, n_segments)
     weight = usable.astype(np.float64)
     n_segments = weight.T @ weight
     divisor = np.maximum(n_segments, 1.0)
     matrix = by_line @ by_line.conj().transpose(0, 2, 1) / divisor
-    own = by_line.real**2 + by_line.imag**2
-    if usable.all():
-        power = np.repeat(own.mean(axis=2)[:, :, np.newaxis], usable.shape[1], axis=2)
+    if all_usable:
+        own = np.diagonal(matrix, axis1=1, axis2=2).real
+        power = np.repeat(own[:, :, np.newaxis], usable.shape[1], axis=2)
     else:
-        power = own @ weight / divisor
+        power = (by_line.real**2 + by_line.imag**2) @ weight / divisor
     return CrossSpectrum(frequency_hz, matrix, power, n_segments.astype(np.int64))
 
 
@@ -151,35 +159,33 @@ SMEAR_BINS_SQUARED = 1.0 / 3.0
 
 
 def correlated_sum(
-    terms: FloatArray | ComplexArray, lines: npt.NDArray[np.int64], products: tuple[float, ...]
+    terms: FloatArray, lines: npt.NDArray[np.int64], products: FloatArray | Sequence[float]
 ) -> FloatArray:
     """Covariance of a sum over lines, each of several terms, whose neighbours are correlated.
 
     Parameters
     ----------
-    terms : (n_lines, n, m)
-        Standard deviations of the n summands' m independent complex parts.
+    terms : (..., n_lines, n, m)
+        Standard deviations of the n summands' m independent real parts.
     lines : (n_lines,)
         Which bins they are, rising.
-    products
-        Correlation of the summands 0, 1, 2, ... bins apart.
+    products : (3, m) or (3,)
+        Correlation of each part, or of all, 0, 1 and 2 bins apart.
 
     Returns
     -------
-    (n, n); with no negative variance, as products are of a real process.
+    (..., n, n); with no negative variance, as products are of a real process.
     """
-    n = terms.shape[1]
-    spread = np.zeros((int(lines[-1] - lines[0]) + 1, n, terms.shape[2]), dtype=np.complex128)
-    spread[lines - lines[0]] = terms
-    covariance = np.zeros((n, n))
-    for distance, correlation in enumerate(products[: spread.shape[0]]):
-        stop = spread.shape[0] - distance
-        left, right = (
-            part.transpose(1, 0, 2).reshape(n, -1) for part in (spread[distance:], spread[:stop])
-        )
-        product = correlation * (left @ right.conj().T).real
-        covariance += product if distance == 0 else product + product.T
-    return covariance
+    *outer, _, n, m = terms.shape
+    spread = np.zeros((*outer, n, int(lines[-1] - lines[0]) + 1, m))
+    spread[..., lines - lines[0], :] = np.swapaxes(terms, -3, -2)
+    here, *apart = np.asarray(products).reshape(3, -1)
+    smoothed = here * spread
+    for distance, correlation in enumerate(apart, 1):
+        smoothed[..., :-distance, :] += 2.0 * correlation * spread[..., distance:, :]
+    flat = (*outer, n, -1)
+    covariance: FloatArray = smoothed.reshape(flat) @ np.swapaxes(spread.reshape(flat), -1, -2)
+    return 0.5 * (covariance + np.swapaxes(covariance, -1, -2))
 
 
 @lru_cache(maxsize=8)

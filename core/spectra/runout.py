@@ -12,8 +12,7 @@ from enum import StrEnum
 from core.arrays import ComplexArray
 from core.machine.unit import MAX_SLOW_ROLL_FRACTION, SlowRollVector, Unit
 from core.quality import GOOD
-from core.spectra.key_phase import KeyPhase
-from core.spectra.speed import Speed, SpeedSource
+from core.spectra.speed import KeyPhase, Speed, SpeedSource
 
 
 class RunoutVerdict(StrEnum):
@@ -113,7 +112,7 @@ def without_runout(
 
 
 def shaft_angle_rad(speed: Speed, key_phase: KeyPhase | None) -> float | None:
-    """Angle of the shaft at a segment's first sample, where phasors can be told by it.
+    """Angle of the shaft at a segment's first sample, or None if phasors cannot refer to it.
 
     A shaft angle without the undoubted speed of the same pulses is none: the phasors' phase would
     drift away from it.

@@ -1,10 +1,12 @@
 """Segments: each stretch of samples is transformed once, here, and averaged elsewhere."""
 
 import cmath
+import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -19,15 +21,20 @@ from core.checks.sensor_checks import (
 )
 from core.machine.transducers import displacement_factor
 from core.machine.unit import Channel, Unit
-from core.quality import GOOD, Level, Quality, Reading, Reason, bad, uncertain, worst
+from core.quality import GOOD, Level, Quality, Reading, Reason, bad, missing, uncertain, worst
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import average
-from core.spectra.key_phase import KeyPhase, read_key_phase
-from core.spectra.lines import SegmentSettings, bin_phasors, exact_phasors, tapered
-from core.spectra.overall import Overall, OverallTransform
-from core.spectra.recent import RecentVibration, parts_of
+from core.spectra.lines import (
+    SegmentSettings,
+    bin_phasors,
+    line_phasors,
+    part_phasors,
+    tapered,
+    turning_factors,
+)
+from core.spectra.overall import Overall, OverallTransform, RecentVibration, parts_of
 from core.spectra.runout import RunoutVerdict, shaft_angle_rad, without_runout
-from core.spectra.speed import Speed, running_speed
+from core.spectra.speed import KeyPhase, Speed, read_key_phase, running_speed
 from core.spectra.vortex import vortex_frequency_hz
 from core.units import hz_from_rpm
 
@@ -74,7 +81,7 @@ class Segment:
     order_usable, has_phase : (2, n_channels)
         Whether each may be believed, and whether its phase is known.
     at_mark_um_pk : (n_channels,)
-        1× phasors when the shaft's mark passes the pick-up; None where no key-phase says when.
+        1× phasors when the shaft's mark passes the pick-up; None without a key-phase.
     runout
         Whether runout was taken off 1×, by shaft channel.
     overall
@@ -116,6 +123,29 @@ class Segment:
         """Quality of a channel at a line; a few clipped samples leave the segments before."""
         return uncertain(Reason.CLIPPED) if self.is_grazed(row) else self.order_quality[line][row]
 
+    @cached_property
+    def spans_um_pp(self) -> tuple[Reading, ...]:
+        """Broad-band displacement of each channel."""
+        return self._of_channels(None if self.overall is None else self.overall.peak_to_peak_um)
+
+    @cached_property
+    def velocities_mm_s_rms(self) -> tuple[Reading, ...]:
+        """Broad-band velocity of each channel."""
+        return self._of_channels(None if self.overall is None else self.overall.velocity_mm_s_rms)
+
+    def _of_channels(self, values: FloatArray | None) -> tuple[Reading, ...]:
+        each = [math.nan] * self.usable.size if values is None else values.tolist()
+        return tuple(self.reading((row,), value) for row, value in enumerate(each))
+
+    def reading(self, rows: Sequence[int], value: float) -> Reading:
+        """A value from some channels, as far as all of them may be believed."""
+        qualities = [self.channel_quality[row] for row in rows]
+        if any(quality.level is Level.BAD for quality in qualities):
+            return missing(worst(qualities).reason)
+        if math.isnan(value):
+            return missing(Reason.NOT_MEASURED)
+        return Reading(value, worst(qualities))
+
 
 class KeptSegments:
     """The segments or polls that are averaged.
@@ -142,7 +172,7 @@ class KeptSegments:
         self.segments: deque[Segment] = deque(maxlen=n_segments)
 
     def clear(self) -> None:
-        """Forget all segments: the device counts anew."""
+        """Drop all segments, after a restart of the sample count."""
         self.segments.clear()
 
     def keep(self, segment: Segment) -> Segment:
@@ -198,7 +228,8 @@ class SegmentTransform(KeptSegments):
             q if good or q.level is Level.BAD else bad(Reason.NOT_FINITE)
             for q, good in zip(window.channel_quality, finite, strict=True)
         )
-        samples = np.where(finite[:, np.newaxis], window.samples, 0.0).astype(np.float64)
+        samples = window.samples.astype(np.float64)
+        samples[~finite] = 0.0
         prepared = tapered(samples)
         lines = bin_phasors(prepared, prepared.shape[1] // 2 - 1)
         bins = lines[:, : self.frequency_hz.size] * self._bin_factor
@@ -210,7 +241,14 @@ class SegmentTransform(KeptSegments):
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
         vortex_hz = self._vortex_hz(turn_hz, bins, _usable(quality))
         order_hz = np.array([turn_hz, vortex_hz or self._settings.vortex_order * turn_hz])
-        orders, runout = self._orders(prepared, window.rate_hz, order_hz, speed, key_phase)
+        factors = _factors(self._unit.channels, order_hz)
+        turn_samples = window.rate_hz / turn_hz
+        turning = turning_factors(samples.shape[1], window.rate_hz, order_hz)
+        orders = factors * line_phasors(prepared, turning)
+        shafts = np.flatnonzero(self._is_shaft).tolist()
+        orders[:, ORDER1], runout = without_runout(
+            orders[:, ORDER1], self._unit, shafts, speed, key_phase
+        )
         angle_rad, usable = shaft_angle_rad(speed, key_phase), _usable(quality)
         segment = Segment(
             epoch=window.epoch,
@@ -233,7 +271,7 @@ class SegmentTransform(KeptSegments):
             runout=runout,
             overall=self._overall.of(samples, lines),
             clipped_share=clipped,
-            recent=self._recent(samples, window.rate_hz, turn_hz, speed, key_phase),
+            recent=self._recent(samples, turn_samples, turning, factors, speed, key_phase),
         )
         return self.keep(segment)
 
@@ -289,39 +327,23 @@ class SegmentTransform(KeptSegments):
             self._unit, window.slow, self.frequency_hz, power, self._settings, key_phase
         )
 
-    def _orders(
-        self,
-        prepared: FloatArray,
-        rate_hz: float,
-        order_hz: FloatArray,
-        speed: Speed,
-        key_phase: KeyPhase | None,
-    ) -> tuple[ComplexArray, Mapping[str, RunoutVerdict]]:
-        phasors = exact_phasors(prepared, rate_hz, order_hz)
-        phasors *= _factors(self._unit.channels, order_hz)
-        rows = np.flatnonzero(self._is_shaft).tolist()
-        phasors[:, ORDER1], runout = without_runout(
-            phasors[:, ORDER1], self._unit, rows, speed, key_phase
-        )
-        return phasors, runout
-
     def _recent(
         self,
         samples: FloatArray,
-        rate_hz: float,
-        turn_hz: float,
+        turn_samples: float,
+        turning: ComplexArray,
+        factors: ComplexArray,
         speed: Speed,
         key_phase: KeyPhase | None,
     ) -> RecentVibration:
-        starts, stops = parts_of(samples.shape[1], self._settings.hop_samples, rate_hz / turn_hz)
-        order_hz, rows = np.array([turn_hz]), np.flatnonzero(self._is_shaft).tolist()
-        factor = _factors(self._unit.channels, order_hz)[:, 0]
+        starts, stops = parts_of(samples.shape[1], self._settings.hop_samples, turn_samples)
+        shafts = np.flatnonzero(self._is_shaft).tolist()
         amplitudes, spans = [], []
         for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
             part = samples[:, start:stop]
-            phasors = factor * exact_phasors(tapered(part), rate_hz, order_hz)[:, 0]
-            phasors *= np.exp(-2j * np.pi * turn_hz * start / rate_hz)  # of the segment's first
-            clean, _ = without_runout(phasors, self._unit, rows, speed, key_phase)
+            at_turn = np.ascontiguousarray(turning[start:stop, ORDER1 : ORDER1 + 1])
+            phasors = factors[:, ORDER1] * part_phasors(part, at_turn)[:, 0]
+            clean, _ = without_runout(phasors, self._unit, shafts, speed, key_phase)
             amplitudes.append(np.abs(clean))
             spans.append(np.ptp(part, axis=1))
         return RecentVibration(stops, np.array(amplitudes), np.array(spans))
@@ -332,12 +354,10 @@ class SegmentTransform(KeptSegments):
         """Where the bearings share a line: over all segments, for one resolves a rope poorly."""
         low, high = self._settings.vortex_band
         band_hz = (low * turn_hz, high * turn_hz)
-        # a bin more on each side, to tell a peak from the flank of one outside
+        # a bin more on each side, to distinguish a peak from the flank of one outside
         margin_hz = 1.5 * self.frequency_hz[0]
-        near = np.flatnonzero(
-            (self.frequency_hz > band_hz[0] - margin_hz)
-            & (self.frequency_hz < band_hz[1] + margin_hz)
-        )
+        first = int(np.searchsorted(self.frequency_hz, band_hz[0] - margin_hz, "right"))
+        near = slice(first, int(np.searchsorted(self.frequency_hz, band_hz[1] + margin_hz)))
         before = [s.bin_phasors_um_pk for s in self.segments if s.bin_phasors_um_pk is not None]
         phasors = np.array([part[:, near] for part in (*before, bins)])
         counted = np.array([*(s.usable for s in self.segments), usable])
@@ -363,5 +383,8 @@ def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
 
 
 def _factors(channels: Sequence[Channel], frequency_hz: FloatArray) -> ComplexArray:
-    """(n_channels, n_lines) displacement per engineering unit."""
-    return np.array([displacement_factor(channel, frequency_hz) for channel in channels])
+    """(n_channels, n_lines) displacement per engineering unit, once for channels that are alike."""
+    kinds = [(c.measurand, c.direction, c.response, c.delay_s) for c in channels]
+    alike = dict(zip(kinds, channels, strict=True))
+    factors = {kind: displacement_factor(channel, frequency_hz) for kind, channel in alike.items()}
+    return np.array([factors[kind] for kind in kinds])

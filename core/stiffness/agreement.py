@@ -136,7 +136,7 @@ def _combined(budgets: Sequence[Budget], factors: FloatArray, covariance: FloatA
         (
             random_line(STATISTICS, random),
             *(
-                replace(lines[0], sensitivity=float(factors @ [line.sensitivity for line in lines]))
+                lines[0]._replace(sensitivity=float(factors @ [line.sensitivity for line in lines]))
                 for lines in systematic
             ),
         ),

@@ -21,7 +21,12 @@ from core.spectra.cross_spectrum import (
     independent_segments,
     phasor_power_per_density,
 )
-from core.stiffness.dynamic_lines import DynamicSettings, between_harmonics, little_leakage
+from core.stiffness.dynamic_lines import (
+    DynamicSettings,
+    between_harmonics,
+    little_leakage,
+    probe_noise_power,
+)
 from core.stiffness.film_covariance import BracketChanges, FilmFit
 from core.stiffness.film_fit import (
     coherence_segments,
@@ -32,14 +37,13 @@ from core.stiffness.film_fit import (
     signal_share,
     smoother,
 )
-from core.stiffness.probe_noise import probe_noise_power
 
 MAX_INERTIA_SHARE = 0.8
 """Largest mass that is sought takes so much of the bracket's stiffness away at the highest line."""
 
 MAX_MASS_STD = 0.5
 """A mass that is not given must be found to that share of what a bracket may be thought to have;
-else the lines say nothing of it, and a film with it would be a guess."""
+else the lines do not determine it, and a film with it would be a guess."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,7 @@ class DynamicStiffness:
     coherence_segments : (2,)
         Independent segments that would make that of a single line as certain.
     lack_of_fit : (2,)
-        About 1 if the film is as constant over frequency as the model says, else more.
+        About 1 if the film is as constant over frequency as the model assumes, else more.
     frequency_hz : (n_used,)
         The lines that were used.
     probe_noise_um2_per_hz : (2,)
@@ -131,7 +135,7 @@ def dynamic_stiffness(
     settings: DynamicSettings,
     n_integrations: tuple[int, int] = (2, 2),
 ) -> DynamicStiffness | Reason:
-    """Estimate a film's coefficients, or say why that is not possible.
+    """Estimate a film's coefficients, or return the reason why that is not possible.
 
     A bracket whose mass is not known has it fitted with the film, one mass for both directions.
 
@@ -225,9 +229,12 @@ def _used_lines(
     used: npt.NDArray[np.bool_] = (
         _inside(spectrum.frequency_hz, settings.band_hz)
         & between_harmonics(spectrum.frequency_hz, turn_hz, selection.guard_bins)
-        & little_leakage(power[:, :BEARING_X], selection.max_leakage)
         & np.all(power > 0.0, axis=1)
     )
+    inside = np.flatnonzero(used)
+    if inside.size:
+        band = slice(int(inside[0]), int(inside[-1]) + 1)
+        used[band] &= little_leakage(power[:, :BEARING_X], selection.max_leakage, band)
     return used
 
 

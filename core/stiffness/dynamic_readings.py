@@ -1,4 +1,4 @@
-"""What the broadband motion of a bearing says: all eight film coefficients as readings."""
+"""All eight film coefficients from the broadband motion of a bearing, as readings."""
 
 import math
 from collections.abc import Mapping
@@ -23,7 +23,6 @@ from core.uncertainty import (
     Budget,
     coverage_factor,
     random_line,
-    reading_of,
     systematic_line,
     with_budgets,
 )
@@ -72,7 +71,7 @@ def dynamic_readings(
         f"dynamic_{name}_{'n_per_m' if name[0] == 'k' else 'n_s_per_m'}": budget
         for name, budget in dynamic_budgets(found, bearing.bracket, bearing.accuracy).items()
     }
-    readings = {name: reading_of(budget, quality) for name, budget in budgets.items()}
+    readings = {name: budget.reading(quality) for name, budget in budgets.items()}
     evidence, others = with_budgets(
         _evidence(found, bearing, quality), _evidence_budgets(found, bearing)
     )

@@ -137,7 +137,7 @@ def signs_checked(readings: Mapping[str, Reading]) -> dict[str, Reading]:
 
 
 def is_reversed(readings: Mapping[str, Reading], axes: str) -> bool | None:
-    """Whether a transducer of a direction is reversed, by the best estimator that can tell.
+    """Whether a transducer of a direction is reversed, by the best estimator that has a result.
 
     Parameters
     ----------

@@ -77,7 +77,7 @@ class LineLimits:
 def line_excitation(
     spectrum: CrossSpectrum, line: int, shaft: int, bearing: int, limits: LineLimits
 ) -> Reason:
-    """Say whether `ratio` and `transfer` may speak at a line, and if not, why.
+    """Whether a line carries enough motion for `ratio` and `transfer`, else the reason.
 
     Returns
     -------
@@ -87,5 +87,5 @@ def line_excitation(
         return Reason.FEW_SEGMENTS  # one segment is coherent with anything
     shaft_um_pk = float(spectrum.amplitude_um_pk(shaft)[line])
     hidden = limits.runout_um_pk > limits.max_runout_share * shaft_um_pk
-    incoherent = float(spectrum.coherence(shaft, bearing)[line]) < limits.min_coherence
+    incoherent = spectrum.coherence_at(line, shaft, bearing) < limits.min_coherence
     return Reason.INSUFFICIENT_EXCITATION if hidden or incoherent else Reason.OK

@@ -14,9 +14,9 @@ import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.spectra.cross_spectrum import BEARING_X, CORRELATED_LINES, CrossSpectrum
-from core.stiffness.probe_noise import conditional_power
+from core.stiffness.dynamic_lines import conditional_power
 
-LEAST_SHARE = 0.05
+MIN_SHARE = 0.05
 """Below this share of motion in the shaft spectra their noise-free part may not be invertible."""
 
 ROUNDING = 1e-12
@@ -68,16 +68,16 @@ class NormalEquations:
         return self.gram - self.noise_gram
 
     def solve(self, weight: FloatArray, right: FloatArray) -> FloatArray:
-        """Unknowns of both rows, (2, 4).
+        """Unknowns of both rows, (..., 2, 4).
 
         Parameters
         ----------
         weight : (n_lines, 2)
-        right : (n_lines, 2, 4)
-            `force`, or a `moment`.
+        right : (..., n_lines, 2, 4)
+            `force`, or moments.
         """
         left = _weighted(weight, self.true_gram)
-        moment = np.einsum("lr,lra->ra", weight, right)
+        moment = (weight[..., np.newaxis] * right).sum(axis=-3)
         unknowns: FloatArray = np.linalg.solve(left, moment[..., np.newaxis])[..., 0]
         return unknowns
 
@@ -141,10 +141,9 @@ def normal_equations(
     cross = matrix[:, BEARING_X:, :BEARING_X]  # bearing times conjugated shaft
     power = np.diagonal(matrix[:, BEARING_X:, BEARING_X:], axis1=1, axis2=2).real
     ratio = omega / omega_unit
-    noise = np.broadcast_to(np.diag(noise_power).astype(np.complex128), shaft.shape)
     return NormalEquations(
         gram=_gram(shaft, ratio),
-        noise_gram=_gram(noise, ratio),
+        noise_gram=_noise_gram(noise_power, ratio),
         force=_moment(bracket_n_per_m[:, np.newaxis, np.newaxis] * cross, ratio),
         force_power=np.abs(bracket_n_per_m[:, np.newaxis]) ** 2 * power,
         shaft=shaft,
@@ -164,6 +163,14 @@ def _gram(shaft: ComplexArray, ratio: FloatArray) -> FloatArray:
     gram[:, :2, 2:] = scale * shaft.imag
     gram[:, 2:, :2] = -gram[:, :2, 2:]
     gram[:, 2:, 2:] = scale**2 * shaft.real
+    return gram
+
+
+def _noise_gram(noise_power: FloatArray, ratio: FloatArray) -> FloatArray:
+    """The same of independent noises of the probes."""
+    gram = np.zeros((ratio.size, N_UNKNOWNS, N_UNKNOWNS))
+    gram[:, (0, 1), (0, 1)] = noise_power
+    gram[:, (2, 3), (2, 3)] = ratio[:, np.newaxis] ** 2 * noise_power
     return gram
 
 
@@ -206,11 +213,11 @@ def line_weights(
     residual = equations.force_power * (1.0 - coherence)
     weight = coherence / _smoothed(smoothing, residual, equations.force_power)
     for _ in range(n_iterations):
-        if signal_share(equations, weight) < LEAST_SHARE:
+        if signal_share(equations, weight) < MIN_SHARE:
             return None
         residual = equations.residual(equations.solve(weight, equations.force))
         weight = 1.0 / _smoothed(smoothing, residual, equations.force_power)
-    return weight if signal_share(equations, weight) >= LEAST_SHARE else None
+    return weight if signal_share(equations, weight) >= MIN_SHARE else None
 
 
 def signal_share(equations: NormalEquations, weight: FloatArray) -> float:

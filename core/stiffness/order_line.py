@@ -41,7 +41,7 @@ from core.stiffness.stiffness_budget import (
     transfer_budgets,
 )
 from core.stiffness.transfer import effective_stiffness_n_per_m, line_transfer
-from core.uncertainty import Budget, reading_of, with_budgets
+from core.uncertainty import Budget, with_budgets
 
 FLOOR_REACH = 12
 """Bins to each side of a line in which its surroundings are judged."""
@@ -262,7 +262,7 @@ class OrderLine:
             return NOT_MEASURED
         if few:
             return missing(Reason.FEW_SEGMENTS), None
-        coherence = float(self.orders.coherence(shaft, bearing)[self.at])
+        coherence = self.orders.coherence_at(self.at, shaft, bearing)
         return Reading(coherence, quality), coherence_budget(coherence, n_segments)
 
     def _ratio(
@@ -276,7 +276,7 @@ class OrderLine:
             )
         else:
             phased = self._phased(shaft, bearing)
-            known = 0.0 if phased is None else float(phased.coherence(shaft, bearing)[self.at])
+            known = 0.0 if phased is None else phased.coherence_at(self.at, shaft, bearing)
             budget = polls_ratio_budget(
                 *self._common(shaft, bearing),
                 self.frequency_hz,
@@ -287,7 +287,7 @@ class OrderLine:
                 self._across(shaft),
             )
         if budget is not None:
-            return reading_of(budget, quality), budget
+            return budget.reading(quality), budget
         ratio = float(self.orders.amplitude_ratio(bearing, shaft)[self.at])
         k_eff = effective_stiffness_n_per_m(ratio, 1.0, self.bearing.bracket_stiffness_n_per_m)
         return Reading(k_eff, quality), None
@@ -305,7 +305,7 @@ class OrderLine:
         of_k, of_c = transfer_budgets(
             found, bracket, self.bearing.accuracy, self._runout_um_pk(shaft)
         )
-        return (reading_of(of_k, quality), of_k), (reading_of(of_c, quality), of_c)
+        return (of_k.reading(quality), of_k), (of_c.reading(quality), of_c)
 
     def _exclusion_reason(self, shaft: int, bearing: int, n_segments: float, few: bool) -> Reason:
         """Why no stiffness may be read from the line; OK if one may."""

@@ -75,7 +75,7 @@ def ratio_budget(
     None without shaft motion, coherence or a second segment.
     """
     counted = float(spectrum.n_segments[shaft, bearing]) if n_segments is None else n_segments
-    coherence = float(spectrum.coherence(shaft, bearing)[line])
+    coherence = spectrum.coherence_at(line, shaft, bearing)
     if coherence <= 0.0 or counted < 2.0:
         return None
     value = float(spectrum.amplitude_ratio(bearing, shaft)[line]) * bracket.stiffness_n_per_m
@@ -165,7 +165,7 @@ def n_changed(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> int:
 
 
 def n_effective(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> float:
-    """How many independent polls would say as much as these, at least 2 of 2 or more.
+    """Number of independent polls with as much information, at least 2 of 2 or more.
 
     A rack averages, perhaps for longer than a poll period: neighbouring polls then share much of
     what they show.

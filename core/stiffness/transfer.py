@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -80,6 +81,12 @@ def motion_across(spectrum: CrossSpectrum, line: int, shaft: int) -> complex:
     return complex(spectrum.matrix[line, across, shaft]) / power if power > 0.0 else 1.0
 
 
+@lru_cache(maxsize=64)
+def _impedance(bracket: BracketDynamics, frequency_hz: float) -> complex:
+    """Dynamic stiffness of a bracket, once for both directions."""
+    return complex(bracket.dynamic_stiffness_n_per_m(np.array([frequency_hz]))[0])
+
+
 def line_transfer(
     spectrum: CrossSpectrum,
     line: int,
@@ -110,9 +117,9 @@ def line_transfer(
     frequency_hz = float(spectrum.frequency_hz[line])
     omega = 2.0 * math.pi * frequency_hz
     ratio = complex(spectrum.matrix[line, bearing, shaft]) / shaft_power
-    impedance = bracket.dynamic_stiffness_n_per_m(np.array([frequency_hz]))[0]
-    film = complex(impedance) * ratio
-    coherence = float(spectrum.coherence(shaft, bearing)[line])
+    impedance = _impedance(bracket, frequency_hz)
+    film = impedance * ratio
+    coherence = spectrum.coherence_at(line, shaft, bearing)
     # Bendat and Piersol, Random Data, 4th ed., table 9.6, with n - 1 for what H1 itself takes up
     bearing_power = float(spectrum.power[line, bearing, shaft])
     left = (1.0 - coherence) * bearing_power / shaft_power

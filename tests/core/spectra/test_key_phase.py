@@ -10,8 +10,15 @@ from core.arrays import FloatArray
 from core.machine.unit import Unit
 from core.monitor.settings import AnalysisSettings
 from core.quality import Level, Reading, Reason, bad, missing
-from core.spectra.key_phase import KeyPhase, KeyPhaseFault, read_key_phase, rising_edges
-from core.spectra.speed import Speed, SpeedSource, running_speed
+from core.spectra.speed import (
+    KeyPhase,
+    KeyPhaseFault,
+    Speed,
+    SpeedSource,
+    read_key_phase,
+    rising_edges,
+    running_speed,
+)
 
 RATE_HZ = 600.0
 N_SAMPLES = 8192

@@ -95,7 +95,7 @@ def test_noise_of_known_density_has_the_power_and_the_correlation_stated() -> No
 
 def test_correlated_lines_and_overlapping_segments_count_for_less() -> None:
     def variance(lines: list[int], products: tuple[float, ...] = WHITE_PRODUCTS) -> float:
-        terms = np.ones((len(lines), 1, 1), dtype=complex)
+        terms = np.ones((len(lines), 1, 1))
         return float(correlated_sum(terms, np.array(lines), products)[0, 0])
 
     assert variance(list(range(2000))) / 2000 == pytest.approx(CORRELATED_LINES, rel=0.001)

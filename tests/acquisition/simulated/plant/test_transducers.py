@@ -14,8 +14,8 @@ from acquisition.simulated.plant.plant import SimulatedPlant
 from acquisition.simulated.plant.scenario import KeyPhasePulse, Scenario, TransducerNoise
 from core.arrays import FloatArray
 from core.machine.unit import Bearing, Channel, Measurand, Unit
-from core.spectra.key_phase import KeyPhase, read_key_phase
 from core.spectra.lines import exact_phasors, tapered
+from core.spectra.speed import KeyPhase, read_key_phase
 
 MachineWith = Callable[[Measurand], Unit]
 
