@@ -105,7 +105,7 @@ class Budget:
         parts = [(line.kind, line.contribution, line.freedoms) for line in self.lines]
         random = math.sqrt(sum(part**2 for kind, part, _ in parts if kind is Kind.RANDOM))
         systematic = math.sqrt(sum(part**2 for kind, part, _ in parts if kind is Kind.SYSTEMATIC))
-        half = _half_width([(part, freedoms) for _, part, freedoms in parts], CONFIDENCE)
+        half = _half_width([(part, freedoms) for _, part, freedoms in parts])
         interval = self.bounded_interval or (self.value - half, self.value + half)
         return Reading(self.value, quality, random, systematic, interval)
 
@@ -131,21 +131,21 @@ def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE)
     Student's distribution with the effective degrees of freedom of Welch and Satterthwaite (GUM,
     G.4.1); 1.96 when all widths are known.
     """
-    return _coverage_factor([(line.contribution, line.freedoms) for line in lines], confidence)
+    parts = [(line.contribution, line.freedoms) for line in lines]
+    return _coverage_factor(parts, confidence, math.sqrt(sum(part**2 for part, _ in parts)))
 
 
-def _coverage_factor(parts: Sequence[tuple[float, float]], confidence: float) -> float:
-    """The same of contributions with their degrees of freedom."""
+def _coverage_factor(parts: Sequence[tuple[float, float]], confidence: float, root: float) -> float:
+    """The same of contributions with their degrees of freedom, and the root of their squares."""
     fourth = sum(part**4 / freedoms for part, freedoms in parts)
-    root = math.sqrt(sum(part**2 for part, _ in parts))
     freedoms = root**4 / fourth if fourth > 0.0 else math.inf
     quantile = 0.5 + confidence / 2.0
     return float(ndtri(quantile) if math.isinf(freedoms) else stdtrit(freedoms, quantile))
 
 
-def _half_width(parts: Sequence[tuple[float, float]], confidence: float) -> float:
+def _half_width(parts: Sequence[tuple[float, float]]) -> float:
     root = math.sqrt(sum(part**2 for part, _ in parts))
-    return _coverage_factor(parts, confidence) * root
+    return _coverage_factor(parts, CONFIDENCE, root) * root
 
 
 def proportional(value: float, budget: Budget) -> Budget:
@@ -156,7 +156,7 @@ def proportional(value: float, budget: Budget) -> Budget:
 
 
 def _interval(value: float, lines: Sequence[BudgetLine]) -> tuple[float, float]:
-    half = _half_width([(line.contribution, line.freedoms) for line in lines], CONFIDENCE)
+    half = _half_width([(line.contribution, line.freedoms) for line in lines])
     return value - half, value + half
 
 

@@ -89,19 +89,14 @@ class FilmFit:
 
     @cached_property
     def own_influences(self) -> ComplexArray:
-        """Influence of the shaft's motion on the unknowns of each row, (2, 2, n_lines, 4, 2).
-
-        First axis: row of the unknowns; second: row whose residual carries the influence.
-        """
+        """Influence of the shaft's motion on the unknowns of each row, (2, n_lines, 4, 2)."""
         inverse = self.equations.inverse(self.weight)
-        own = np.zeros((2, 2, self.lines.size, 4, 2), dtype=np.complex128)
-        for row in (0, 1):
-            own[row, row] = inverse[row] @ self.equations.regressors
+        own: ComplexArray = inverse[:, np.newaxis] @ self.equations.regressors
         return own
 
     def covariance(self) -> FloatArray:
         """Covariance of the unknowns of each row, (2, 4, 4)."""
-        return self.spread(self.own_influences)
+        return self._spread(self.own_influences[:, np.newaxis], np.array([[0], [1]]))
 
     def spread(self, influences: ComplexArray) -> FloatArray:
         """Covariance of groups of n estimates by their influences, (n_groups, n, n).
@@ -111,10 +106,15 @@ class FilmFit:
         influences : (n_groups, 2, n_lines, n, 2)
             Of the shaft's motion on the estimates, through the residual of each row.
         """
-        parts = (influences @ self._parts).view(np.float64)
+        return self._spread(influences, np.array([[0, 1]]))
+
+    def _spread(self, influences: ComplexArray, rows: npt.NDArray[np.int64]) -> FloatArray:
+        """The same through the residuals of some rows, (n_groups or 1, n_rows)."""
+        parts = (influences @ self._parts[rows]).view(np.float64)
         of_rows = correlated_sum(parts, self.lines, PART_PRODUCTS).sum(axis=1)
-        weighted = (self.weight[..., np.newaxis] * self.film).transpose(1, 0, 2)[:, :, np.newaxis]
-        slope = (influences.conj() * weighted).real.sum(axis=(1, 2))  # per unit of noise power
+        weighted = (self.weight[..., np.newaxis] * self.film).transpose(1, 0, 2)[rows]
+        # per unit of noise power
+        slope = (influences.conj() * weighted[..., np.newaxis, :]).real.sum(axis=(1, 2))
         slope = slope * self.equations.noise_power * self.floor_std
         # real part of conj(x) e with circular e: half of its power (Bendat and Piersol, 9.2)
         covariance: FloatArray = of_rows / (2.0 * self.n_segments)
@@ -255,4 +255,6 @@ class BracketEstimate:
     def with_film(self, fit: FilmFit) -> FloatArray:
         """Covariance of the film's unknowns if these are fitted with them, (2, 4, 4)."""
         through = self.per.transpose(1, 2, 0)[:, np.newaxis, np.newaxis] @ self.influences
-        return fit.spread(fit.own_influences + through)
+        for row in (0, 1):
+            through[row, row] += fit.own_influences[row]
+        return fit.spread(through)

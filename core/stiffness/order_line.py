@@ -387,7 +387,8 @@ def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: Float
     near = np.abs(number - (round(line_hz / bin_hz) - 1)) <= FLOOR_REACH
     positions = (lines_hz / bin_hz).round() - 1
     in_lobe = (np.abs(number[:, np.newaxis] - positions) <= MAIN_LOBE).any(axis=1)
-    return float(np.median(bins.power[near & ~in_lobe, place, place]))
+    ordered = np.sort(bins.power[near & ~in_lobe, place, place])
+    return float(ordered[(ordered.size - 1) // 2] + ordered[ordered.size // 2]) / 2.0
 
 
 def other_line_hz(
