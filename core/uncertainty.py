@@ -222,29 +222,30 @@ def numbers(readings: Sequence[Reading]) -> FloatArray:
     return np.array([r.value for r in readings if r.value is not None], np.float64)
 
 
-def with_budgets(
-    readings: Mapping[str, Reading], found: Mapping[str, Budget | None]
-) -> tuple[dict[str, Reading], dict[str, Budget]]:
-    """Readings with their uncertainties, and the budgets of those that have a number."""
-    budgets = {
-        name: budget
-        for name, budget in found.items()
-        if budget is not None and readings[name].value is not None
-    }
-    with_uncertainty = {
-        name: stated(reading, budgets.get(name)) for name, reading in readings.items()
-    }
-    return with_uncertainty, budgets
+Budgeted = tuple[Reading, Budget | None]
+"""A reading with its budget; None if its uncertainty is not known."""
+
+Found = tuple[dict[str, Reading], dict[str, Budget]]
+"""Readings with their uncertainties, and the budgets of those that have one, by quantity."""
 
 
-def stated(reading: Reading, budget: Budget | None) -> Reading:
-    """The reading with the uncertainty of a budget, where there is one."""
-    if budget is None:
-        return reading
-    found = budget.reading(reading.quality)
-    return Reading(
-        reading.value, reading.quality, found.u_random, found.u_systematic, found.interval_95
-    )
+def with_budgets(found: Mapping[str, Budgeted], prefix: str = "") -> Found:
+    """State the uncertainty of readings that have a number and a budget.
+
+    Parameters
+    ----------
+    prefix
+        Put before the name of each.
+    """
+    readings: dict[str, Reading] = {}
+    budgets: dict[str, Budget] = {}
+    for name, (reading, budget) in found.items():
+        if reading.value is None or budget is None:
+            readings[prefix + name] = reading
+        else:
+            budgets[prefix + name] = budget
+            readings[prefix + name] = budget.reading(reading.quality)
+    return readings, budgets
 
 
 SHAFT_GAIN = "gain of shaft probe"

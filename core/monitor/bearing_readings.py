@@ -43,8 +43,8 @@ from core.stiffness.dynamic import DynamicStiffness
 from core.stiffness.dynamic_readings import NAMES as DYNAMIC_NAMES
 from core.stiffness.dynamic_readings import dynamic_readings
 from core.stiffness.estimators import preferred_stiffness, signs_checked
-from core.stiffness.order_line import Found, OrderLine, other_line_hz
-from core.uncertainty import Budget, with_budgets
+from core.stiffness.order_line import OrderLine, other_line_hz
+from core.uncertainty import Budget, Budgeted, Found, with_budgets
 
 
 @dataclass(frozen=True)
@@ -170,15 +170,15 @@ class _Bearing:
         speed = segments[-1].speed
         dynamic, dynamic_budgets, film = self._dynamic()
         parts: list[Found] = [
-            with_budgets({"speed_rpm": speed.rpm}, {"speed_rpm": speed.budget}),
+            with_budgets({"speed_rpm": (speed.rpm, speed.budget)}),
             slow_results(segments, slow_channels(unit, self._bearing)),
             position_results(unit, self._bearing, segments, last_growth),
-            self._order("order1", ORDER1),
-            self._named("order1", self._lines[ORDER1].phases()),
+            self._order("order1_", ORDER1),
+            with_budgets(self._lines[ORDER1].phases(), "order1_"),
             overall_readings(
                 segments, self._rows, self._bearing, unit.bearings.index(self._bearing)
             ),
-            self._order("vortex", VORTEX),
+            self._order("vortex_", VORTEX),
             (dynamic, dynamic_budgets),
         ]
         readings: dict[str, Reading] = {}
@@ -266,19 +266,10 @@ class _Bearing:
         )
 
     def _order(self, prefix: str, line: int) -> Found:
-        readings, budgets = self._lines[line].readings()
-        frequency, budget = self._frequency(line)
-        others, other_budgets = with_budgets({"frequency_hz": frequency}, {"frequency_hz": budget})
-        return self._named(prefix, ({**readings, **others}, {**budgets, **other_budgets}))
+        found = self._lines[line].readings()
+        return with_budgets({**found, "frequency_hz": self._frequency(line)}, prefix)
 
-    def _named(self, prefix: str, found: Found) -> Found:
-        readings, budgets = found
-        return (
-            {f"{prefix}_{name}": reading for name, reading in readings.items()},
-            {f"{prefix}_{name}": budget for name, budget in budgets.items()},
-        )
-
-    def _dynamic(self) -> tuple[dict[str, Reading], Mapping[str, Budget], DynamicStiffness | None]:
+    def _dynamic(self) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
         """All eight coefficients from the segments in which every channel was usable."""
         if self.spectrum is None:
             return dict.fromkeys(DYNAMIC_NAMES, missing(Reason.NOT_MEASURED)), {}, None
@@ -307,7 +298,7 @@ class _Bearing:
         x, y = (self._unit.channels[self._rows[place]] for place in (BEARING_X, BEARING_Y))
         return x.measurand.n_integrations, y.measurand.n_integrations
 
-    def _frequency(self, line: int) -> tuple[Reading, Budget | None]:
+    def _frequency(self, line: int) -> Budgeted:
         speed, frequency_hz = self._segments[-1].speed, float(self._order_hz[line])
         each_hz = np.array([segment.order_frequency_hz[line] for segment in self._segments])
         if self.spectrum is None and line == VORTEX and not self._unit.has_vortex:

@@ -1,7 +1,7 @@
 """Broad-band vibration of one bearing over some segments, and vibration of the newest."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from core.machine.unit import Bearing
 from core.quality import Level, Reading, Reason, current_mean, missing, worst
@@ -9,7 +9,7 @@ from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.spectra.overall import RecentReadings
 from core.spectra.segments import ORDER1, Segment
 from core.stiffness.channel_budget import amplitude_lines
-from core.uncertainty import Budget, mean_budget, numbers, with_budgets
+from core.uncertainty import Budget, Budgeted, Found, mean_budget, numbers, with_budgets
 from core.units import ns_from_s
 
 SHAFT_SPANS = {
@@ -29,7 +29,7 @@ OVERALL_NAMES = (*SHAFT_SPANS, ORBIT, *BEARING_SPEEDS)
 
 def overall_readings(
     segments: Sequence[Segment], rows: Sequence[int], bearing: Bearing, number: int
-) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+) -> Found:
     """Broad-band vibration, averaged over the segments, and its budgets, by quantity.
 
     Peak-to-peak values and the farthest excursions are averaged as they are, velocities as power.
@@ -43,22 +43,21 @@ def overall_readings(
     """
     if segments[-1].overall is None:
         return dict.fromkeys(OVERALL_NAMES, missing(Reason.NOT_MEASURED)), {}
-    readings: dict[str, Reading] = {}
-    found: dict[str, Budget | None] = {}
+    found: dict[str, Budgeted] = {}
     grazed = [segments[-1].is_grazed(row) or segments[-1].usable[row] for row in rows]
     for name, place in SHAFT_SPANS.items():
         spans = [segment.spans_um_pp[rows[place]] for segment in segments]
-        readings[name] = current_mean(spans, is_grazed=grazed[place])
-        found[name] = _mean_budget(readings[name], spans, bearing, place)
+        mean = current_mean(spans, is_grazed=grazed[place])
+        found[name] = mean, _mean_budget(mean, spans, bearing, place)
     orbits = [_orbit(segment, rows[:2], number) for segment in segments]
-    readings[ORBIT] = current_mean(orbits, is_grazed=all(grazed[:2]))
-    found[ORBIT] = _mean_budget(readings[ORBIT], orbits, bearing, SHAFT_X)
+    mean = current_mean(orbits, is_grazed=all(grazed[:2]))
+    found[ORBIT] = mean, _mean_budget(mean, orbits, bearing, SHAFT_X)
     for name, place in BEARING_SPEEDS.items():
         speeds = [segment.velocities_mm_s_rms[rows[place]] for segment in segments]
         squares = [r if r.value is None else Reading(r.value**2, r.quality) for r in speeds]
-        readings[name] = _root(current_mean(squares, is_grazed=grazed[place]))
-        found[name] = _mean_budget(readings[name], squares, bearing, place, is_root=True)
-    return with_budgets(readings, found)
+        mean = _root(current_mean(squares, is_grazed=grazed[place]))
+        found[name] = mean, _mean_budget(mean, squares, bearing, place, is_root=True)
+    return with_budgets(found)
 
 
 def recent_readings(

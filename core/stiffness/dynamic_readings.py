@@ -1,7 +1,6 @@
 """All eight film coefficients from the broadband motion of a bearing, as readings."""
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -47,7 +46,7 @@ def dynamic_readings(
     quality: Quality,
     settings: DynamicSettings,
     n_integrations: tuple[int, int] = (2, 2),
-) -> tuple[dict[str, Reading], Mapping[str, Budget], DynamicStiffness | None]:
+) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
     """Readings of `dynamic`, the budgets of its coefficients, and what it found.
 
     Parameters
@@ -72,8 +71,12 @@ def dynamic_readings(
         for name, budget in dynamic_budgets(found, bearing.bracket, bearing.accuracy).items()
     }
     readings = {name: budget.reading(quality) for name, budget in budgets.items()}
+    of_evidence = _evidence_budgets(found, bearing)
     evidence, others = with_budgets(
-        _evidence(found, bearing, quality), _evidence_budgets(found, bearing)
+        {
+            name: (reading, of_evidence.get(name))
+            for name, reading in _evidence(found, bearing, quality).items()
+        }
     )
     return readings | evidence, budgets | others, found
 

@@ -41,7 +41,7 @@ from core.stiffness.stiffness_budget import (
     transfer_budgets,
 )
 from core.stiffness.transfer import effective_stiffness_n_per_m, line_transfer
-from core.uncertainty import Budget, with_budgets
+from core.uncertainty import Budgeted
 
 FLOOR_REACH = 12
 """Bins to each side of a line in which its surroundings are judged."""
@@ -57,9 +57,6 @@ AMPLITUDES = {
     "bearing_x": BEARING_X,
     "bearing_y": BEARING_Y,
 }
-
-Found = tuple[dict[str, Reading], Mapping[str, Budget]]
-"""Readings and the budgets of those whose uncertainty is known, by quantity."""
 
 
 @dataclass(frozen=True)
@@ -118,24 +115,17 @@ class OrderLine:
         both = self.usable[:, first] & self.usable[:, last]
         return n_changed(*np.abs(self.phasors_um_pk[both][:, [first, last]]).T)
 
-    def readings(self) -> Found:
-        """Amplitudes, roundness, coherence, equation (5) and transfer, and their budgets."""
+    def readings(self) -> dict[str, Budgeted]:
+        """Amplitudes, roundness, coherence, equation (5) and transfer, by quantity."""
         amplitudes = {f"{name}_um_pk": self._amplitude(p) for name, p in AMPLITUDES.items()}
         found = {**amplitudes, "roundness": self._roundness()}
         for axes, (shaft, bearing) in DIRECTIONS.items():
             found |= self._direction(axes, shaft, bearing)
-        return with_budgets(
-            {name: reading for name, (reading, _) in found.items()},
-            {name: budget for name, (_, budget) in found.items()},
-        )
+        return found
 
-    def phases(self) -> Found:
+    def phases(self) -> dict[str, Budgeted]:
         """Phases of the mean 1× vectors at the mark, deg, positive where a vector leads."""
-        found = {f"{name}_phase_deg": self._phase(place) for name, place in AMPLITUDES.items()}
-        return with_budgets(
-            {name: reading for name, (reading, _) in found.items()},
-            {name: budget for name, (_, budget) in found.items()},
-        )
+        return {f"{name}_phase_deg": self._phase(place) for name, place in AMPLITUDES.items()}
 
     def axes_quality(self, rotation_sense: int) -> Quality:
         """Whether shaft and bearing whirl with the rotation, where their line stands out."""
@@ -169,7 +159,7 @@ class OrderLine:
             return None
         return average(self.orders.frequency_hz, self.phasors_um_pk[:, :, np.newaxis], known)
 
-    def _amplitude(self, place: int) -> tuple[Reading, Budget | None]:
+    def _amplitude(self, place: int) -> Budgeted:
         quality = self.quality(place)
         if isinstance(quality, Reading):
             return quality, None
@@ -178,7 +168,7 @@ class OrderLine:
         lines = amplitude_lines(self.bearing, place, amplitude, self._runout_um_pk(place))
         return Reading(amplitude, quality), amplitude_budget(amplitude, counted, lines)
 
-    def _phase(self, place: int) -> tuple[Reading, Budget | None]:
+    def _phase(self, place: int) -> Budgeted:
         quality = self.quality(place)
         if isinstance(quality, Reading):
             return quality, None
@@ -192,7 +182,7 @@ class OrderLine:
         lines = phase_lines(self._runout_um_pk(place), abs(mean))
         return Reading(phase_deg, quality), phase_budget(phase_deg, vectors, lines)
 
-    def _roundness(self) -> tuple[Reading, Budget | None]:
+    def _roundness(self) -> Budgeted:
         quality, phased = self.quality(SHAFT_X, SHAFT_Y), self._phased(SHAFT_X, SHAFT_Y)
         if isinstance(quality, Reading) or phased is None:
             nothing = quality if isinstance(quality, Reading) else missing(Reason.NOT_MEASURED)
@@ -220,9 +210,7 @@ class OrderLine:
         power = phased.power[self.at]
         return bool(min(power[x, y], power[y, x]) > least_um_pk**2)
 
-    def _direction(
-        self, axes: str, shaft: int, bearing: int
-    ) -> dict[str, tuple[Reading, Budget | None]]:
+    def _direction(self, axes: str, shaft: int, bearing: int) -> dict[str, Budgeted]:
         """Coherence, equation (5) and transfer of one direction."""
         coherence, k_eff, k, c = (
             f"coherence_{axes}",
@@ -257,7 +245,7 @@ class OrderLine:
 
     def _coherence(
         self, shaft: int, bearing: int, quality: Quality, n_segments: float, few: bool
-    ) -> tuple[Reading, Budget | None]:
+    ) -> Budgeted:
         if self.bins is None:
             return NOT_MEASURED
         if few:
@@ -265,9 +253,7 @@ class OrderLine:
         coherence = self.orders.coherence_at(self.at, shaft, bearing)
         return Reading(coherence, quality), coherence_budget(coherence, n_segments)
 
-    def _ratio(
-        self, shaft: int, bearing: int, quality: Quality, n_segments: float
-    ) -> tuple[Reading, Budget | None]:
+    def _ratio(self, shaft: int, bearing: int, quality: Quality, n_segments: float) -> Budgeted:
         bracket, accuracy = self.bearing.bracket, self.bearing.accuracy
         runout_um_pk = self._runout_um_pk(shaft)
         if self.bins is not None:
@@ -294,7 +280,7 @@ class OrderLine:
 
     def _transfer(
         self, shaft: int, bearing: int, quality: Quality, n_segments: float, few: bool
-    ) -> tuple[tuple[Reading, Budget | None], tuple[Reading, Budget | None]]:
+    ) -> tuple[Budgeted, Budgeted]:
         phased, bracket = self._phased(shaft, bearing), self.bearing.bracket
         if phased is None:
             return NOT_MEASURED, NOT_MEASURED
@@ -357,7 +343,7 @@ class OrderLine:
         return bool(peak > self.settings.min_line_to_floor * floor)
 
 
-NOT_MEASURED: tuple[Reading, Budget | None] = (missing(Reason.NOT_MEASURED), None)
+NOT_MEASURED: Budgeted = (missing(Reason.NOT_MEASURED), None)
 
 
 def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
