@@ -81,8 +81,6 @@ def bearing_readings(
     bearing: Bearing,
     settings: AnalysisSettings,
     kept: KeptSegments,
-    frequency_hz: FloatArray | None,
-    min_segments: int,
     n_expected: int,
     last_growth: Growth | None = None,
 ) -> BearingReadings:
@@ -92,16 +90,12 @@ def bearing_readings(
     ----------
     kept
         The segments, at least one.
-    frequency_hz
-        (n_lines,) of the segments' bins; None of polls.
-    min_segments
-        Below this number of independent segments a result is uncertain.
     n_expected
         How many segments there could have been.
     last_growth
         Thermal growth of the gaps when it was last measured.
     """
-    found = _Bearing(unit, bearing, settings, kept, frequency_hz, min_segments, n_expected)
+    found = _Bearing(unit, bearing, settings, kept, n_expected)
     readings, budgets, dynamic = found.readings(last_growth)
     readings |= found.doubted(readings, budgets, dynamic)
     chosen = {
@@ -128,26 +122,23 @@ class _Bearing:
         bearing: Bearing,
         settings: AnalysisSettings,
         kept: KeptSegments,
-        frequency_hz: FloatArray | None,
-        min_segments: int,
         n_expected: int,
     ) -> None:
         self._unit, self._bearing, self._settings = unit, bearing, settings
         self._segments = segments = list(kept.segments)
-        self._min_segments = min_segments
+        self._min_segments = kept.min_segments
         ids = [channel.id for channel in unit.channels]
         rows = self._rows = [ids.index(id_) for id_ in bearing.channels]
         self._usable = np.array([s.order_usable[:, rows] for s in segments])  # (n, 2, 4)
         self._whole: npt.NDArray[np.bool_] = np.all(self._usable[:, ORDER1], axis=1)
         self._phasors: ComplexArray = np.array([s.order_phasors_um_pk[rows] for s in segments])
         self._order_hz = np.mean([segment.order_frequency_hz for segment in segments], axis=0)
-        self._frequency_hz = frequency_hz
         self._bins: ComplexArray = np.array(
             [s.bin_phasors_um_pk[rows] for s in segments if s.bin_phasors_um_pk is not None]
         )
         self.spectrum: CrossSpectrum | None = None
-        if frequency_hz is not None:
-            self.spectrum = average(frequency_hz, self._bins, self._usable[:, ORDER1])
+        if kept.frequency_hz is not None:
+            self.spectrum = average(kept.frequency_hz, self._bins, self._usable[:, ORDER1])
         self.n_segments = int(self._whole.sum())
         self.coverage = self.n_segments / n_expected
         self._lines = self._order_lines()

@@ -258,15 +258,13 @@ class UnitMonitor:
 
     def _assess(self, bearing: Bearing, newest: Segment, window: SampleBlock) -> Assessment:
         transform, first_index = self._transform, self._transform.segments[0].first_index
-        polled = transform if isinstance(transform, PollTransform) else None
+        polled = transform.frequency_hz is None
         n_possible = 1 + (newest.first_index - self._first_start) // transform.hop_samples
         found = bearing_readings(
             self.unit,
             bearing,
             self._settings,
             transform,
-            None if isinstance(transform, PollTransform) else transform.frequency_hz,
-            polled.averaging.min_polls if polled else self._settings.min_segments,
             min(transform.n_segments, n_possible),
             self._growth.get(bearing.id),
         )
@@ -303,7 +301,7 @@ class UnitMonitor:
             clipped_share=dict(shares),
             evidence=found.evidence,
             recent=(
-                polled_readings(list(transform.segments)[-polled.result_samples :], rows)
+                polled_readings(list(transform.segments)[-transform.result_samples :], rows)
                 if polled
                 else recent_readings(newest, rows, self.unit.rate_hz)
             ),

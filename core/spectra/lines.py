@@ -25,6 +25,8 @@ class SegmentSettings:
         Share of a segment that the next one repeats.
     n_segments
         Segments that are averaged; 24 at 600 Hz are about five minutes.
+    min_segments
+        Below this number of segments a result is marked uncertain.
     max_frequency_hz
         Spectra are kept up to here.
     vortex_order
@@ -45,6 +47,7 @@ class SegmentSettings:
     segment_samples: int = 8192
     overlap: float = 0.125
     n_segments: int = 24
+    min_segments: int = 4
     max_frequency_hz: float = 25.0
     vortex_order: float = 0.25
     vortex_band: tuple[float, float] = (0.2, 0.4)

@@ -116,9 +116,9 @@ class PollTransform(KeptSegments):
         settings: SegmentSettings,
         averaging: PollSettings | None = None,
     ) -> None:
-        self.averaging = averaging or PollSettings()
-        super().__init__(len(rows), self.averaging.n_polls)
-        self.result_samples = self.averaging.hop_polls
+        averaging = averaging or PollSettings()
+        n_polls, hop_polls = averaging.n_polls, averaging.hop_polls
+        super().__init__(len(rows), n_polls, averaging.min_polls, result_samples=hop_polls)
         self._unit, self._settings = unit, settings
         self._row = {(row.channel, row.part): n for n, row in enumerate(rows)}
         known = {channel.id for channel in unit.channels}

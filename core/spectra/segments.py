@@ -154,21 +154,35 @@ class KeptSegments:
     ----------
     n_segments
         How many make a full average.
+    min_segments
+        How many independent ones make a result that is not uncertain.
     segment_samples, hop_samples
         Samples of one, and from the start of one to that of the next.
     result_samples
         Results come with the first segment that ends at or after each multiple of this.
     n_rows
         Rows of a block.
+
+    Attributes
+    ----------
+    frequency_hz
+        (n_lines,) of the segments' bins; None of polls.
     """
 
-    result_samples = 1
+    frequency_hz: FloatArray | None = None
 
     def __init__(
-        self, n_rows: int, n_segments: int, segment_samples: int = 1, hop_samples: int = 1
+        self,
+        n_rows: int,
+        n_segments: int,
+        min_segments: int,
+        segment_samples: int = 1,
+        hop_samples: int = 1,
+        result_samples: int = 1,
     ) -> None:
-        self.n_rows, self.n_segments = n_rows, n_segments
+        self.n_rows, self.n_segments, self.min_segments = n_rows, n_segments, min_segments
         self.segment_samples, self.hop_samples = segment_samples, hop_samples
+        self.result_samples = result_samples
         self.segments: deque[Segment] = deque(maxlen=n_segments)
 
     def clear(self) -> None:
@@ -200,6 +214,7 @@ class SegmentTransform(KeptSegments):
         super().__init__(
             len(unit.channels),
             settings.n_segments,
+            settings.min_segments,
             settings.segment_samples,
             settings.hop_samples,
         )

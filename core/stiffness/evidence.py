@@ -29,8 +29,6 @@ class EvidenceSettings(SegmentSettings):
 
     Parameters
     ----------
-    min_segments
-        Below this number of segments a result is marked uncertain.
     min_coherence
         Squared coherence of shaft and bearing motion below which there is no stiffness. At 0.9, a
         bearing line that is noise to the rest makes equation (5) read 5 % high.
@@ -38,7 +36,6 @@ class EvidenceSettings(SegmentSettings):
         Share of the wanted segments below which a result is marked uncertain.
     """
 
-    min_segments: int = 4
     min_coherence: float = 0.9
     min_coverage: float = 0.5
 
