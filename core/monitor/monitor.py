@@ -130,7 +130,7 @@ class UnitMonitor:
         self._gaps.clear()
         self._first_start, self._n_voided = state.first_start, state.n_voided
 
-    def adopt(self, unit: Unit) -> None:
+    def replace_description(self, unit: Unit) -> None:
         """Take a new description of the same unit, from the next assessment on.
 
         Parameters

@@ -150,13 +150,13 @@ def test_gaps_give_the_shaft_centre_which_moves_with_a_new_reference_alone(rack)
     before = watch(monitor, stream[:12])[-1]
     [bearing] = monitor.unit.bearings
     moved = replace(bearing, gap_reference_um=(1970.0, 1960.0))
-    monitor.adopt(replace(monitor.unit, bearings=(moved,)))
+    monitor.replace_description(replace(monitor.unit, bearings=(moved,)))
     after = watch(monitor, stream[12:])[-1]
 
     assert before.readings["eccentricity_ratio"].value == pytest.approx(0.25)
     assert after.readings["eccentricity_ratio"].value == pytest.approx(0.0)
     with pytest.raises(ValueError, match="rated_speed_rpm is 100"):
-        monitor.adopt(replace(monitor.unit, rated_speed_rpm=100.0))
+        monitor.replace_description(replace(monitor.unit, rated_speed_rpm=100.0))
 
 
 def test_the_vortex_order_is_its_own_line_or_switched_off(rack) -> None:
