@@ -10,7 +10,7 @@ from core.quality import Reason
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.spectra.segments import ORDER1, VORTEX
 from core.stiffness.dynamic import dynamic_stiffness
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.evidence import LineLimits, line_excitation
 from core.stiffness.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
 from core.stiffness.transfer import line_transfer

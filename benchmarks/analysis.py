@@ -34,9 +34,9 @@ from core.spectra.cross_spectrum import (
     average,
 )
 from core.spectra.segments import ORDER1, VORTEX, SegmentTransform
-from core.spectra.vortex import whirl
+from core.spectra.vortex import roundness
 from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
 from core.stiffness.transfer import line_transfer
 
@@ -107,7 +107,7 @@ class Analysis:
         if isinstance(found, DynamicStiffness):
             dynamic_budgets(found, bracket, accuracy)
         for line in (ORDER1, VORTEX):
-            whirl(orders, line)
+            roundness(orders, line)
             for shaft, bearing in ((SHAFT_X, BEARING_X), (SHAFT_Y, BEARING_Y)):
                 ratio_budget(orders, line, shaft, bearing, bracket, accuracy)
                 transfer = line_transfer(orders, line, shaft, bearing, bracket)

@@ -89,7 +89,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--times", type=int, default=20)
     n_times = parser.parse_args().times
-    names = [q.name for q in CATALOGUE if not q.has_uncertainty][:N_QUANTITIES]
+    names = [q.name for q in CATALOGUE if not q.keeps_uncertainty][:N_QUANTITIES]
     series = {name: stored(number) for number, name in enumerate(names)}
     times_ns = [n * NS_PER_MINUTE for n in range(N_POINTS)]
     trend = Trend(NS_PER_MINUTE, times_ns, series)

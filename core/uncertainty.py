@@ -6,8 +6,9 @@ in a channel's own trend. A budget lists both and combines them.
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtri, stdtrit
@@ -26,14 +27,13 @@ class Distribution(StrEnum):
 
 
 class Kind(StrEnum):
-    """Whether a contribution is drawn anew in every averaging time."""
+    """Whether a contribution changes from one averaging time to the next."""
 
     RANDOM = "random"
     SYSTEMATIC = "systematic"
 
 
-@dataclass(frozen=True)
-class BudgetLine:
+class BudgetLine(NamedTuple):
     """One contribution to the uncertainty of a result.
 
     Parameters
@@ -68,10 +68,17 @@ class BudgetLine:
 
 @dataclass(frozen=True)
 class Budget:
-    """A result with everything that makes it uncertain."""
+    """A result with everything that makes it uncertain.
+
+    Parameters
+    ----------
+    bounded_interval
+        95 % interval of a result that is not normal because it lies between bounds; None of others.
+    """
 
     value: float
     lines: tuple[BudgetLine, ...]
+    bounded_interval: tuple[float, float] | None = None
 
     @property
     def random(self) -> float:
@@ -91,7 +98,16 @@ class Budget:
     @property
     def interval(self) -> tuple[float, float]:
         """Interval that holds the truth with 95 %."""
-        return _interval(self.value, self.lines)
+        return self.bounded_interval or _interval(self.value, self.lines)
+
+    def reading(self, quality: Quality) -> Reading:
+        """The result with its standard uncertainties and interval."""
+        parts = [(line.kind, line.contribution, line.freedoms) for line in self.lines]
+        random = math.sqrt(sum(part**2 for kind, part, _ in parts if kind is Kind.RANDOM))
+        systematic = math.sqrt(sum(part**2 for kind, part, _ in parts if kind is Kind.SYSTEMATIC))
+        half = _half_width([(part, freedoms) for _, part, freedoms in parts])
+        interval = self.bounded_interval or (self.value - half, self.value + half)
+        return Reading(self.value, quality, random, systematic, interval)
 
     @property
     def random_interval(self) -> tuple[float, float]:
@@ -115,14 +131,32 @@ def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE)
     Student's distribution with the effective degrees of freedom of Welch and Satterthwaite (GUM,
     G.4.1); 1.96 when all widths are known.
     """
-    fourth = sum(line.contribution**4 / line.freedoms for line in lines)
-    freedoms = _root_sum(lines) ** 4 / fourth if fourth > 0.0 else math.inf
+    parts = [(line.contribution, line.freedoms) for line in lines]
+    return _coverage_factor(parts, confidence, math.sqrt(sum(part**2 for part, _ in parts)))
+
+
+def _coverage_factor(parts: Sequence[tuple[float, float]], confidence: float, root: float) -> float:
+    """The same of contributions with their degrees of freedom, and the root of their squares."""
+    fourth = sum(part**4 / freedoms for part, freedoms in parts)
+    freedoms = root**4 / fourth if fourth > 0.0 else math.inf
     quantile = 0.5 + confidence / 2.0
     return float(ndtri(quantile) if math.isinf(freedoms) else stdtrit(freedoms, quantile))
 
 
+def _half_width(parts: Sequence[tuple[float, float]]) -> float:
+    root = math.sqrt(sum(part**2 for part, _ in parts))
+    return _coverage_factor(parts, CONFIDENCE, root) * root
+
+
+def proportional(value: float, budget: Budget) -> Budget:
+    """Budget of a value that is in an exactly known proportion to the result of another."""
+    factor = value / budget.value
+    lines = (line._replace(sensitivity=factor * line.sensitivity) for line in budget.lines)
+    return Budget(value, tuple(lines))
+
+
 def _interval(value: float, lines: Sequence[BudgetLine]) -> tuple[float, float]:
-    half = coverage_factor(lines) * _root_sum(lines)
+    half = _half_width([(line.contribution, line.freedoms) for line in lines])
     return value - half, value + half
 
 
@@ -137,7 +171,7 @@ MIN_EFFECTIVE = 2.0
 
 
 def effective_number(values: FloatArray) -> float:
-    """How many independent values would say as much as these (n,), at least 2 of 2 or more.
+    """Number of independent values with as much information as these (n,), at least 2 of 2 or more.
 
     Segments overlap, and what they show wanders: neighbours share much. For a first-order process
     ``n (1 - r) / (1 + r)`` are left, r the correlation of neighbours (Bayley and Hammersley 1946);
@@ -173,7 +207,7 @@ def mean_budget(
     Returns
     -------
     None where fewer than two values are known, or where they never differ: a transmitter that
-    repeats itself says nothing of how well it measures.
+    repeats itself does not show how well it measures.
     """
     known = np.asarray(values, dtype=np.float64)
     if known.size < MIN_EFFECTIVE or not np.ptp(known) > 0.0:
@@ -188,34 +222,30 @@ def numbers(readings: Sequence[Reading]) -> FloatArray:
     return np.array([r.value for r in readings if r.value is not None], np.float64)
 
 
-def with_budgets(
-    readings: Mapping[str, Reading], found: Mapping[str, Budget | None]
-) -> tuple[dict[str, Reading], dict[str, Budget]]:
-    """Readings that have a number with their uncertainty, and the budgets that say so."""
-    budgets = {
-        name: budget
-        for name, budget in found.items()
-        if budget is not None and readings[name].value is not None
-    }
-    told = {name: stated(reading, budgets.get(name)) for name, reading in readings.items()}
-    return told, budgets
+Budgeted = tuple[Reading, Budget | None]
+"""A reading with its budget; None if its uncertainty is not known."""
+
+Found = tuple[dict[str, Reading], dict[str, Budget]]
+"""Readings with their uncertainties, and the budgets of those that have one, by quantity."""
 
 
-def stated(reading: Reading, budget: Budget | None) -> Reading:
-    """The reading with the uncertainty of a budget, where there is one."""
-    if budget is None:
-        return reading
-    return replace(
-        reading,
-        u_random=budget.random,
-        u_systematic=budget.systematic,
-        interval_95=budget.interval,
-    )
+def with_budgets(found: Mapping[str, Budgeted], prefix: str = "") -> Found:
+    """State the uncertainty of readings that have a number and a budget.
 
-
-def reading_of(budget: Budget, quality: Quality) -> Reading:
-    """The result of a budget with its standard uncertainties."""
-    return Reading(budget.value, quality, budget.random, budget.systematic, budget.interval)
+    Parameters
+    ----------
+    prefix
+        Put before the name of each.
+    """
+    readings: dict[str, Reading] = {}
+    budgets: dict[str, Budget] = {}
+    for name, (reading, budget) in found.items():
+        if reading.value is None or budget is None:
+            readings[prefix + name] = reading
+        else:
+            budgets[prefix + name] = budget
+            readings[prefix + name] = budget.reading(reading.quality)
+    return readings, budgets
 
 
 SHAFT_GAIN = "gain of shaft probe"

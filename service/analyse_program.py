@@ -10,7 +10,7 @@ from prometheus_client.process_collector import ProcessCollector
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
-from core.monitor.monitor_port import Monitor
+from core.monitor.monitor import UnitMonitor
 from core.samples.outage import Reach
 from service.alarms.gone_alarms import SHARED
 from service.alarms.health import StreamLook, recording_error
@@ -56,7 +56,7 @@ async def run_analyse(
     plant: PlantFile,
     partition: Partition,
     settings: StreamSettings,
-    monitors: Mapping[str, Monitor],
+    monitors: Mapping[str, UnitMonitor],
     listener: socket.socket,
     clock: Clock,
     announce: Callable[[str], None],
@@ -108,7 +108,7 @@ class Analysing:
         plant: PlantFile,
         partition: Partition,
         settings: StreamSettings,
-        monitors: Mapping[str, Monitor],
+        monitors: Mapping[str, UnitMonitor],
         ground: Ground,
         around: Around,
     ) -> None:

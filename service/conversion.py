@@ -5,8 +5,7 @@ from core.checks.sensor_checks import SensorLimits
 from core.machine.channel import Channel
 from core.machine.unit import Bearing, BearingAccuracy, GapAccuracy, Unit
 from core.monitor.settings import AnalysisSettings
-from core.stiffness.dynamic_settings import DynamicSettings
-from core.stiffness.usable_lines import LineSelection
+from core.stiffness.dynamic_lines import DynamicSettings, LineSelection
 from service.settings.bearings import BearingSettings
 from service.settings.channels import ChannelSettings
 from service.settings.plant import AnalysisModel

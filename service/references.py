@@ -46,7 +46,7 @@ class Adopter(Protocol):
 
     unit: Unit
 
-    def adopt(self, unit: Unit) -> None:
+    def replace_description(self, unit: Unit) -> None:
         """Take a new description of the same unit."""
         ...
 
@@ -107,7 +107,7 @@ class ReferencesInForce:
         self._in_force |= news
         for unit in {unit for unit, _ in news}:
             monitor = self._monitors[unit]
-            monitor.adopt(self._described(monitor.unit))
+            monitor.replace_description(self._described(monitor.unit))
         for (unit, bearing), reference in news.items():
             log.info(
                 "reference taken over",

@@ -26,7 +26,7 @@ from acquisition.modbus.read_plan import ReadPlan, plan_signature
 from acquisition.modbus.register_map import RegisterMap
 from acquisition.modbus.transport import LinkSettings, require_above_zero
 from core.samples.blocks import SampleBlock
-from core.spectra.vector_rows import VectorPart, VectorRow
+from core.spectra.polls import VectorPart, VectorRow
 
 _MIN_STAMP_STEPS = 2.0
 """A device's clock must tell neighbouring polls apart, or its stamps would seem to stand still."""

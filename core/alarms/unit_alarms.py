@@ -38,8 +38,8 @@ from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
 from core.quality import NOT_MEASURED, Quality, Reading, Reason, worst
 from core.samples.blocks import SampleBlock
-from core.stiffness.line_results import AMPLITUDES, DIRECTIONS
-from core.stiffness.polarity import is_reversed
+from core.stiffness.estimators import is_reversed
+from core.stiffness.order_line import AMPLITUDES, DIRECTIONS
 from core.units import NS_PER_S
 
 POINT_HOLDS_NS = 300 * NS_PER_S

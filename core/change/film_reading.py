@@ -9,7 +9,7 @@ from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Level, Quality, Reading, Reason, worst
-from core.stiffness.estimators import STIFFNESS_OF
+from core.stiffness.estimators import ESTIMATORS
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def good_or_nan(reading: Reading) -> float:
 
 
 def _value(readings: Mapping[str, Reading], estimator: Estimator, direction: str) -> FilmValue:
-    stiffness = readings[STIFFNESS_OF[estimator].format(axes=direction * 2)]
+    stiffness = readings[ESTIMATORS[estimator].stiffness.format(axes=direction * 2)]
     outcome, reason = _outcome(
         stiffness,
         worst(readings[key].quality for key in ("eccentricity_ratio", "oil_temperature_c")),

@@ -1,4 +1,4 @@
-"""What a record itself says about the transducers and the operation it comes from.
+"""Checks of transducers and operation that need a whole segment or all averaged ones.
 
 Blocks are judged on counts and volts, before calibration; what is judged here shows only in a whole
 segment or in all that are averaged.
@@ -208,7 +208,7 @@ def checked_speed(
 
     Returns
     -------
-    The reading itself; doubted where the line says otherwise; missing where no machine turns like
+    The reading itself; uncertain where the line contradicts it; missing where no machine turns like
     that.
     """
     if measured.value is None:
@@ -240,8 +240,8 @@ def stationarity(
 
     Returns
     -------
-    Uncertain where something moved, and where the newest power is not known: a load that nobody
-    knows is not steady.
+    Uncertain where something moved, and where the newest power is not known: an unknown load is
+    not steady.
     """
     speed, power = _spread(speed_rpm), _spread(power_mw)
     if speed.change > limits.max_speed_change * speed.mean:

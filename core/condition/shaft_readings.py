@@ -11,12 +11,21 @@ from core.machine.channel import Measurand
 from core.machine.unit import Bearing, GapAccuracy, Unit
 from core.quality import NOT_MEASURED, Reading, Reason, current_mean, missing
 from core.spectra.segments import Segment
-from core.uncertainty import SHAFT_GAIN, Budget, mean_budget, numbers, systematic_line, with_budgets
+from core.uncertainty import (
+    SHAFT_GAIN,
+    Budget,
+    Budgeted,
+    Found,
+    mean_budget,
+    numbers,
+    systematic_line,
+    with_budgets,
+)
 
 
 def position_results(
     unit: Unit, bearing: Bearing, segments: Sequence[Segment], last_growth: Growth | None
-) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+) -> Found:
     """Gaps, shaft centre, eccentricity and attitude with their budgets, by quantity.
 
     Parameters
@@ -33,11 +42,10 @@ def position_results(
         "opposite_gap_y_um": _gap(unit, segments, bearing.opposite_y, bearing.opposite_gap_y),
     }
     gaps, gap_budgets = with_budgets(
-        {name: reading for name, (reading, _) in measured.items()},
         {
-            name: _gap_budget(reading, values, bearing.gap_accuracy)
+            name: (reading, _gap_budget(reading, values, bearing.gap_accuracy))
             for name, (reading, values) in measured.items()
-        },
+        }
     )
     near, far = tuple(gaps.values())[:2], tuple(gaps.values())[2:]
     x, y = (probe_axis(bearing, near, far, axis) for axis in (0, 1))
@@ -69,9 +77,7 @@ def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
     return {"power_mw": unit.power_channel, "oil_temperature_c": bearing.oil_temperature}
 
 
-def slow_results(
-    segments: Sequence[Segment], channels: Mapping[str, str | None]
-) -> tuple[dict[str, Reading], Mapping[str, Budget]]:
+def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]) -> Found:
     """Means of slow channels over the segments, by quantity, with their scatter.
 
     The calibration uncertainty of the plant's transmitters is unknown here.
@@ -81,13 +87,11 @@ def slow_results(
     channels
         Slow channel of each quantity, None where it is not measured.
     """
-    readings: dict[str, Reading] = {}
-    found: dict[str, Budget | None] = {}
+    found: dict[str, Budgeted] = {}
     for name, channel in channels.items():
         mean, values = _mean_slow(segments, channel)
-        readings[name] = mean
-        found[name] = None if mean.value is None else mean_budget(mean.value, values)
-    return with_budgets(readings, found)
+        found[name] = mean, None if mean.value is None else mean_budget(mean.value, values)
+    return with_budgets(found)
 
 
 def probe_axis(

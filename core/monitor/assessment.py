@@ -2,25 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 
 from core.arrays import SampleArray
 from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator
 from core.quality import Quality, Reading
 from core.spectra.cross_spectrum import CrossSpectrum
-from core.spectra.recent import RecentReadings
+from core.spectra.overall import RecentReadings
 from core.spectra.runout import RunoutVerdict
+from core.spectra.segments import Evidence
 from core.spectra.speed import SpeedSource
 from core.uncertainty import Budget
-
-
-class Evidence(StrEnum):
-    """What results stand on. The names appear in the API."""
-
-    WAVEFORMS = "waveforms"
-    AMPLITUDE_AND_PHASE = "amplitude_and_phase"
-    AMPLITUDE_ONLY = "amplitude_only"
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ STORED = (True, True)
 
 def _order_quantities(prefix: str, words: str) -> tuple[Quantity, ...]:
     return (
-        Quantity(f"{prefix}_frequency_hz", "Hz", f"Frequency of {words}"),
+        Quantity(f"{prefix}_frequency_hz", "Hz", f"Frequency of {words}", *LIVE),
         Quantity(
             f"{prefix}_shaft_x_um_pk", "µm 0-pk", f"Relative shaft vibration x, {words}", *LIVE
         ),
@@ -49,9 +49,15 @@ def _order_quantities(prefix: str, words: str) -> tuple[Quantity, ...]:
         Quantity(
             f"{prefix}_bearing_y_um_pk", "µm 0-pk", f"Absolute bearing vibration y, {words}", *LIVE
         ),
-        Quantity(f"{prefix}_roundness", "1", f"Roundness of the shaft's orbit, {words}, forward +"),
-        Quantity(f"{prefix}_coherence_xx", "1", f"Coherence of shaft and bearing x, {words}"),
-        Quantity(f"{prefix}_coherence_yy", "1", f"Coherence of shaft and bearing y, {words}"),
+        Quantity(
+            f"{prefix}_roundness", "1", f"Roundness of the shaft's orbit, {words}, forward +", *LIVE
+        ),
+        Quantity(
+            f"{prefix}_coherence_xx", "1", f"Coherence of shaft and bearing x, {words}", *LIVE
+        ),
+        Quantity(
+            f"{prefix}_coherence_yy", "1", f"Coherence of shaft and bearing y, {words}", *LIVE
+        ),
         *_in_both_directions(
             f"{prefix}_k_eff", "N/m", f"Effective stiffness, {words}, equation (5)"
         ),
@@ -71,7 +77,7 @@ def _coefficient(prefix: str, axes: str, unit: str, words: str) -> Quantity:
 
 CATALOGUE: tuple[Quantity, ...] = (
     *_in_both_directions("stiffness", "N/m", "Film stiffness by the preferred estimator"),
-    Quantity("speed_rpm", "r/min", "Running speed"),
+    Quantity("speed_rpm", "r/min", "Running speed", *LIVE),
     Quantity("power_mw", "MW", "Active power", *LIVE),
     Quantity("oil_temperature_c", "°C", "Oil temperature", *LIVE),
     Quantity("gap_x_um", "µm", "Mean probe gap x", *LIVE),
@@ -102,13 +108,17 @@ CATALOGUE: tuple[Quantity, ...] = (
     *_order_quantities("vortex", "vortex"),
     *(_coefficient("dynamic_k", axes, "N/m", "Film stiffness, dynamic") for axes in AXES),
     *(_coefficient("dynamic_c", axes, "N·s/m", "Film damping, dynamic") for axes in AXES),
-    Quantity("dynamic_coherence_x", "1", "Share of the bearing's motion x that the film explains"),
-    Quantity("dynamic_coherence_y", "1", "Share of the bearing's motion y that the film explains"),
+    Quantity(
+        "dynamic_coherence_x", "1", "Share of the bearing's motion x that the film explains", *LIVE
+    ),
+    Quantity(
+        "dynamic_coherence_y", "1", "Share of the bearing's motion y that the film explains", *LIVE
+    ),
     Quantity("dynamic_lack_of_fit_x", "1", "Lack of fit of the film x, about 1 if it fits"),
     Quantity("dynamic_lack_of_fit_y", "1", "Lack of fit of the film y, about 1 if it fits"),
     Quantity("dynamic_n_lines", "1", "Spectral lines used by dynamic"),
-    Quantity("dynamic_delay_s", "s", "Delay of the bearing channels that dynamic finds"),
-    Quantity("dynamic_bracket_mass_kg", "kg", "Bracket mass, fitted where none is given"),
+    Quantity("dynamic_delay_s", "s", "Delay of the bearing channels that dynamic finds", *LIVE),
+    Quantity("dynamic_bracket_mass_kg", "kg", "Bracket mass, fitted where none is given", *LIVE),
 )
 
 BY_NAME = {quantity.name: quantity for quantity in CATALOGUE}

@@ -1,24 +1,28 @@
 """`UnitMonitor`: sample blocks of one unit in, assessments of its bearings out."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
+from core.condition.probe_axes import Growth
 from core.condition.shaft_readings import measured_growth
-from core.machine.unit import Bearing, Unit
+from core.machine.unit import Bearing, Unit, bearings_with_new_references, require_same_machine
 from core.monitor.assessment import Assessment, AveragingWindow, OrbitTrace
-from core.monitor.bearing_results import BearingResults
-from core.monitor.monitor_state import MonitorState
-from core.monitor.monitored_unit import MonitoredUnit
-from core.monitor.overall_results import recent_results
+from core.monitor.bearing_readings import bearing_readings
+from core.monitor.overall_readings import polled_readings, recent_readings
 from core.monitor.settings import AnalysisSettings
 from core.quality import worst
+from core.samples.account import Gap, SampleAccount
 from core.samples.blocks import SampleBlock
+from core.samples.misfit import BlockMisfitError
+from core.samples.outage import Reach, outage, restart
 from core.samples.ring import Ring
+from core.spectra.polls import PollTransform
 from core.spectra.segments import Segment, SegmentTransform
-from core.stiffness.line_results import AMPLITUDES
-from core.units import hz_from_rpm
+from core.stiffness.order_line import AMPLITUDES
+from core.units import hz_from_rpm, ns_from_s
 
 ORBIT_TURNS = 3
 
@@ -33,23 +37,69 @@ JUDGED = (
 """The readings whose worst quality is the quality of the assessment."""
 
 
-class UnitMonitor(MonitoredUnit):
+@dataclass(frozen=True)
+class MonitorState:
+    """State of a monitor that cannot be rebuilt from its samples since `start`.
+
+    Parameters
+    ----------
+    epoch
+        In which its samples are counted; None before the first.
+    start
+        First sample that it has to see once more.
+    first_start
+        First sample of what it counts as possible in this epoch.
+    n_voided
+        Segments that gaps have voided.
+    growth
+        By bearing.
+    """
+
+    epoch: int | None
+    start: int
+    first_start: int
+    n_voided: int
+    growth: Mapping[str, Growth]
+    account: SampleAccount
+
+
+class UnitMonitor:
     """Watches one unit. All state of its analysis is here and nowhere else.
 
     What comes from the samples depends on them and their indices alone, not on how they were cut
     into blocks or when they arrived. Slow readings count for the samples of the block they came
     with.
+
+    Parameters
+    ----------
+    transform
+        Makes segments of windows of samples; by default of waveforms.
     """
 
-    def __init__(self, unit: Unit, settings: AnalysisSettings) -> None:
-        super().__init__(unit, Ring(len(unit.channels), 2 * settings.segment_samples))
+    def __init__(
+        self,
+        unit: Unit,
+        settings: AnalysisSettings,
+        transform: SegmentTransform | PollTransform | None = None,
+    ) -> None:
+        self.unit = unit
         self._settings = settings
-        self._transform = SegmentTransform(unit, settings)
+        self._transform = transform or SegmentTransform(unit, settings)
+        self._ring = Ring(self._transform.n_rows, 2 * self._transform.segment_samples)
+        self._gaps: list[Gap] = []
+        self._growth: dict[str, Growth] = {}
+        self._reach: Reach | None = None
         self._next_start: int | None = None
         self._first_start = 0
         self._n_voided = 0
+        self._n_results = 0
         self._starts: deque[int] = deque()
         self._rewound_to = 0
+
+    @property
+    def account(self) -> SampleAccount:
+        """Where every sample went that the unit's device offered."""
+        return self._ring.account
 
     @property
     def state(self) -> MonitorState:
@@ -73,115 +123,204 @@ class UnitMonitor(MonitoredUnit):
         self._rewound_to = state.start
 
     def settle(self, state: MonitorState) -> None:
-        """Be as the one was that `state` is of, after these samples."""
-        super().settle(state)
+        """Take over a state, after the samples since `state.start` were shown again."""
+        self._growth = dict(state.growth)
+        self._ring.account = state.account
+        self._gaps.clear()
         self._first_start, self._n_voided = state.first_start, state.n_voided
 
+    def replace_description(self, unit: Unit) -> None:
+        """Take a new description of the same unit, from the next assessment on.
+
+        Parameters
+        ----------
+        unit
+            The bearings' references, clearances and brackets may differ; what the results that
+            are being averaged were made with may not.
+
+        Raises
+        ------
+        ValueError
+            If it does; the message says where, and gives both.
+        """
+        require_same_machine(self.unit, unit)
+        for bearing in bearings_with_new_references(self.unit, unit):
+            self._growth.pop(bearing, None)  # it counts from a reference
+        self.unit = unit
+
+    def go_on(self, reach: Reach | None) -> None:
+        """Go on after a stop, before the first block: what is missing since then is a gap."""
+        self._reach = reach
+
+    def drain_gaps(self) -> list[Gap]:
+        """Hand over the gaps found since the last call, to be recorded."""
+        gaps, self._gaps = self._gaps, []
+        return gaps
+
+    def ingest(self, block: SampleBlock) -> list[Assessment]:
+        """Take a block in and return all assessments that it completes; as `steps`."""
+        return list(self.steps(block))
+
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
-        """Take a block in and hand over what is learnt by it, one bearing at a time."""
+        """Take a block in and hand over the assessments that it completes, one bearing at a time.
+
+        Parameters
+        ----------
+        block
+            Must follow its predecessors in index order; what is repeated is dropped.
+
+        Yields
+        ------
+        One assessment for each bearing and each hop that the block completes; mostly none. They
+        must all be taken before the next block.
+
+        Raises
+        ------
+        BlockMisfitError
+            If the block is not of this unit, or has another rate or number of channels; the
+            message gives both.
+        """
         self.require(block)
-        for piece in _pieces(block, self._settings.segment_samples):
+        for piece in _pieces(block, self._transform.segment_samples):
             self._write(piece)
             yield from self._complete_segments()
 
+    def require(self, block: SampleBlock) -> None:
+        """Refuse a block that does not fit the unit, before anything has changed.
+
+        Raises
+        ------
+        BlockMisfitError
+            If it is of another unit, rate or number of channels; the message gives both.
+        """
+        if block.unit != self.unit.id:
+            raise BlockMisfitError(
+                f"block of unit {block.unit!r} in the monitor of {self.unit.id!r}"
+            )
+        if block.rate_hz != self.unit.rate_hz:
+            raise BlockMisfitError(
+                f"samples at {block.rate_hz} Hz, configured {self.unit.rate_hz} Hz"
+            )
+        self._ring.require(block)
+
     def _write(self, block: SampleBlock) -> None:
-        epoch = self._ring.epoch
+        epoch, stop_index = self._ring.epoch, self._ring.stop_index
         self._write_to_ring(block)
         restarted = self._ring.epoch != epoch
         if restarted:
             self._transform.clear()
             self._starts.clear()
             self._first_start = self._ring.contiguous_from
+            self._n_results = self._first_start // self._transform.result_samples
         if self._next_start is None:
             self._next_start = max(self._ring.contiguous_from, self._rewound_to)
         elif restarted or self._next_start < self._ring.contiguous_from:
-            self._n_voided += 1
+            self._n_voided += self._next_start < stop_index
             self._next_start = self._ring.contiguous_from
 
+    def _write_to_ring(self, block: SampleBlock) -> None:
+        """Take a block in; all that is missing before it is a gap, lost or refused."""
+        epoch, n_missing = self._ring.epoch, self._ring.n_missing_before(block)
+        self._ring.write(block)
+        if epoch is None:
+            self._gaps += outage(self._reach, block) if self._reach else []
+        elif epoch != block.epoch:
+            lost = restart(self._reach, block) if self._reach else None
+            self._gaps += [lost] if lost else []
+        if n_missing:
+            first_index = block.first_index - n_missing
+            estimated = any(rejection.is_estimated for rejection in block.rejected)
+            self._gaps.append(
+                Gap(block.epoch, first_index, n_missing, block.start_ns, is_estimated=estimated)
+            )
+        if block.stop_index == self._ring.stop_index:
+            self._reach = Reach(block.epoch, block.stop_index, block.stop_ns)
+
     def _complete_segments(self) -> Iterator[Assessment]:
-        start = self._next_start or 0
-        while self._ring.holds(start, start + self._settings.segment_samples):
-            window = self._ring.read(start, start + self._settings.segment_samples)
+        start, n_samples = self._next_start or 0, self._transform.segment_samples
+        while self._ring.holds(start, start + n_samples):
+            window = self._ring.read(start, start + n_samples)
             segment = self._transform.add(window)
             self._note_start(start)
-            self._next_start = start = start + self._settings.hop_samples
-            for bearing in self.unit.bearings:
-                yield self._assess(bearing, segment)
+            self._next_start = start = start + self._transform.hop_samples
+            n_results = segment.stop_index // self._transform.result_samples
+            if n_results != self._n_results:
+                self._n_results = n_results
+                for bearing in self.unit.bearings:
+                    yield self._assess(bearing, segment, window)
 
     def _note_start(self, start: int) -> None:
         self._starts.append(start)
-        n_samples = 2 * self._settings.n_segments * self._settings.hop_samples
+        n_samples = 2 * self._transform.n_segments * self._transform.hop_samples
         while self._starts[0] <= start - n_samples:
             self._starts.popleft()
 
-    def _assess(self, bearing: Bearing, newest: Segment) -> Assessment:
-        settings = self._settings
-        n_possible = 1 + (newest.first_index - self._first_start) // settings.hop_samples
-        segments = list(self._transform.segments)
-        results = BearingResults(
+    def _assess(self, bearing: Bearing, newest: Segment, window: SampleBlock) -> Assessment:
+        transform, first_index = self._transform, self._transform.segments[0].first_index
+        polled = transform.frequency_hz is None
+        n_possible = 1 + (newest.first_index - self._first_start) // transform.hop_samples
+        found = bearing_readings(
             self.unit,
             bearing,
-            settings,
-            segments,
-            self._transform.frequency_hz,
-            min(settings.n_segments, n_possible),
+            self._settings,
+            transform,
+            min(transform.n_segments, n_possible),
             self._growth.get(bearing.id),
         )
-        readings = results.readings
-        growth = measured_growth(readings)
+        growth = measured_growth(found.readings)
         if growth is not None:
             self._growth[bearing.id] = growth
-        n_samples = newest.stop_index - segments[0].first_index
+        rows = self._rows(bearing)
+        shares = {} if polled else zip(AMPLITUDES, newest.clipped_share[rows].tolist(), strict=True)
         return Assessment(
             unit=self.unit.id,
             bearing=bearing.id,
             time_ns=newest.stop_ns,
             window=AveragingWindow(
                 epoch=newest.epoch,
-                first_index=segments[0].first_index,
+                first_index=first_index,
                 stop_index=newest.stop_index,
-                n_segments=results.n_segments,
-                n_segments_wanted=settings.n_segments,
+                n_segments=found.n_segments,
+                n_segments_wanted=transform.n_segments,
                 n_voided=self._n_voided,
-                coverage=results.coverage,
-                duration_s=n_samples / self.unit.rate_hz,
+                coverage=found.coverage,
+                duration_s=(newest.stop_index - first_index) / self.unit.rate_hz,
             ),
             speed_source=newest.speed.source,
-            quality=worst(r.quality for name, r in readings.items() if name in JUDGED),
-            readings=readings,
-            budgets=results.budgets,
-            estimators=results.estimators,
-            spectrum=results.spectrum,
-            orbit=self._orbit(bearing, newest),
+            quality=worst(r.quality for name, r in found.readings.items() if name in JUDGED),
+            readings=found.readings,
+            budgets=found.budgets,
+            estimators=found.estimators,
+            spectrum=found.spectrum,
+            orbit=None if polled else self._orbit(bearing, newest, window),
             runout={
                 "shaft_x": newest.runout[bearing.shaft_x],
                 "shaft_y": newest.runout[bearing.shaft_y],
             },
-            clipped_share=self._clipped_share(bearing, newest),
-            recent=recent_results(newest, self._rows(bearing), self.unit.rate_hz),
+            clipped_share=dict(shares),
+            evidence=found.evidence,
+            recent=(
+                polled_readings(list(transform.segments)[-transform.result_samples :], rows)
+                if polled
+                else recent_readings(newest, rows, self.unit.rate_hz)
+            ),
         )
 
     def _rows(self, bearing: Bearing) -> list[int]:
         by_id = {c.id: n for n, c in enumerate(self.unit.channels)}
         return [by_id[id_] for id_ in bearing.channels]
 
-    def _clipped_share(self, bearing: Bearing, newest: Segment) -> dict[str, float]:
-        rows = self._rows(bearing)
-        shares = newest.clipped_share[rows].tolist()
-        return dict(zip(AMPLITUDES, shares, strict=True))
-
-    def _orbit(self, bearing: Bearing, newest: Segment) -> OrbitTrace | None:
-        ids = [channel.id for channel in self.unit.channels]
-        rows = [ids.index(bearing.shaft_x), ids.index(bearing.shaft_y)]
+    def _orbit(self, bearing: Bearing, newest: Segment, window: SampleBlock) -> OrbitTrace | None:
+        rows = self._rows(bearing)[:2]
         if newest.speed.rpm.value is None or not newest.usable[rows].all():
             return None
         n_samples = round(ORBIT_TURNS / hz_from_rpm(newest.speed.rpm.value) * self.unit.rate_hz)
-        stop = newest.stop_index
-        window = self._ring.read(max(stop - n_samples, newest.first_index), stop)
+        start = max(window.n_samples - n_samples, 0)
         signs = np.array([[self.unit.channels[row].direction] for row in rows], dtype=np.float32)
-        traces = signs * window.samples[rows]
+        traces = signs * window.samples[rows, start:]
         traces -= traces.mean(axis=1, keepdims=True)
-        return OrbitTrace(window.start_ns, window.rate_hz, traces[0], traces[1])
+        start_ns = window.start_ns + ns_from_s(start / window.rate_hz)
+        return OrbitTrace(start_ns, window.rate_hz, traces[0], traces[1])
 
 
 def _pieces(block: SampleBlock, n_most: int) -> Iterator[SampleBlock]:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.evidence import EvidenceSettings
 
 

@@ -1,11 +1,14 @@
-"""`CrossSpectrum`: how four signals of a bearing vary together, line by line."""
+"""`CrossSpectrum`: how four signals of a bearing vary together, line by line, and how surely."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
+from core.spectra.lines import hann
 
 SHAFT_X, SHAFT_Y, BEARING_X, BEARING_Y = range(4)
 """Where the channels of a bearing stand in every matrix."""
@@ -60,6 +63,12 @@ class CrossSpectrum:
         )
         return np.minimum(coherence, 1.0)
 
+    def coherence_at(self, line: int, first: int, second: int) -> float:
+        """Squared coherence of two channels at one line."""
+        product = float(self.power[line, first, second]) * float(self.power[line, second, first])
+        squared = abs(complex(self.matrix[line, first, second])) ** 2
+        return min(squared / product, 1.0) if product > 0.0 else 0.0
+
 
 NO_SPECTRUM = CrossSpectrum(
     np.zeros(0), np.zeros((0, 4, 4), complex), np.zeros((0, 4, 4)), np.zeros((4, 4), np.int64)
@@ -80,15 +89,114 @@ def average(
     usable : (n_segments, n_channels)
         Whether the channel may be believed throughout the segment.
     """
-    counted = phasors_um_pk * usable[:, :, np.newaxis]
+    all_usable = bool(usable.all())
+    counted = phasors_um_pk if all_usable else phasors_um_pk * usable[:, :, np.newaxis]
     by_line = np.ascontiguousarray(counted.transpose(2, 1, 0))  # (n_lines, n_channels, n_segments)
     weight = usable.astype(np.float64)
     n_segments = weight.T @ weight
     divisor = np.maximum(n_segments, 1.0)
     matrix = by_line @ by_line.conj().transpose(0, 2, 1) / divisor
-    own = by_line.real**2 + by_line.imag**2
-    if usable.all():
-        power = np.repeat(own.mean(axis=2)[:, :, np.newaxis], usable.shape[1], axis=2)
+    if all_usable:
+        own = np.diagonal(matrix, axis1=1, axis2=2).real
+        power = np.repeat(own[:, :, np.newaxis], usable.shape[1], axis=2)
     else:
-        power = own @ weight / divisor
+        power = (by_line.real**2 + by_line.imag**2) @ weight / divisor
     return CrossSpectrum(frequency_hz, matrix, power, n_segments.astype(np.int64))
+
+
+NOISE_BANDWIDTH_BINS = 1.5
+"""Equivalent noise bandwidth of Hann's taper (Harris 1978, table I)."""
+
+BIN_CORRELATION = (1.0, 2.0 / 3.0, 1.0 / 6.0)
+"""Of the phasors of white noise in bins 0, 1 and 2 apart: Hann's taper convolved with itself."""
+
+CORRELATED_LINES = 1.0 + 2.0 * sum(rho**2 for rho in BIN_CORRELATION[1:])
+"""Neighbouring lines that count as one in a mean of squares, 1.94."""
+
+
+def phasor_power_per_density(bin_hz: float) -> float:
+    """Mean squared 0-to-peak phasor of noise with a one-sided density of 1 per Hz.
+
+    The mean square in a bin is density times noise bandwidth; a 0-to-peak square is twice that.
+    """
+    return 2.0 * NOISE_BANDWIDTH_BINS * bin_hz
+
+
+@lru_cache(maxsize=32)
+def independent_segments(n_segments: int, overlap: float) -> float:
+    """Independent segments that overlapping ones are worth (Welch 1967, equation 12).
+
+    Parameters
+    ----------
+    overlap
+        Share of a segment that the next one repeats, from 0 to below 1.
+    """
+    taper = hann(1024)
+    excess, lag = 0.0, 1
+    while lag < n_segments and lag * (1.0 - overlap) < 1.0:
+        shift = round(lag * (1.0 - overlap) * taper.size)
+        common = float(taper[shift:] @ taper[: taper.size - shift])
+        correlation = common / float(taper @ taper)
+        excess += 2.0 * (1.0 - lag / n_segments) * correlation**2
+        lag += 1
+    return n_segments / (1.0 + excess)
+
+
+WHITE_PRODUCTS = (1.0, *(rho**2 for rho in BIN_CORRELATION[1:]))
+"""Correlation, 0, 1 and 2 bins apart, of products of two independent white noises."""
+
+SMEARED_IN_PHASE = (1.0, -1.0 / 3.0, -1.0 / 6.0)
+SMEARED_IN_QUADRATURE = (1.0, 1.0 / 3.0, 0.0)
+SMEARED_APART = (1.0, 0.0, -1.0 / 12.0)
+"""The same of white noise times what it leaves in a line when each of its parts is integrated with
+the line's frequency instead of its own, d times its share in the bins d = -1, 0, 1 of the taper;
+for the factor's part in phase with the noise, in quadrature, and independent of it. In phase, what
+one line has too much its neighbours have too little: only the ends of a stretch of lines are
+left."""
+
+SMEAR_BINS_SQUARED = 1.0 / 3.0
+"""Variance of the frequency, in bins, that a line of broadband noise holds."""
+
+
+def correlated_sum(
+    terms: FloatArray, lines: npt.NDArray[np.int64], products: FloatArray | Sequence[float]
+) -> FloatArray:
+    """Covariance of a sum over lines, each of several terms, whose neighbours are correlated.
+
+    Parameters
+    ----------
+    terms : (..., n_lines, n, m)
+        Standard deviations of the n summands' m independent real parts.
+    lines : (n_lines,)
+        Which bins they are, rising.
+    products : (3, m) or (3,)
+        Correlation of each part, or of all, 0, 1 and 2 bins apart.
+
+    Returns
+    -------
+    (..., n, n); with no negative variance, as products are of a real process.
+    """
+    *outer, _, n, m = terms.shape
+    spread = np.zeros((*outer, n, int(lines[-1] - lines[0]) + 1, m))
+    spread[..., lines - lines[0], :] = np.swapaxes(terms, -3, -2)
+    here, *apart = np.asarray(products).reshape(3, -1)
+    smoothed = here * spread
+    for distance, correlation in enumerate(apart, 1):
+        smoothed[..., :-distance, :] += 2.0 * correlation * spread[..., distance:, :]
+    flat = (*outer, n, -1)
+    covariance: FloatArray = smoothed.reshape(flat) @ np.swapaxes(spread.reshape(flat), -1, -2)
+    return 0.5 * (covariance + np.swapaxes(covariance, -1, -2))
+
+
+@lru_cache(maxsize=8)
+def leakage_kernel(n_lines: int) -> FloatArray:
+    """Share of a line's power that Hann's side lobes may put on others, (n_lines, n_lines).
+
+    Zero within the main lobe. The envelope of the lobes at distance d is ``1 / (π d (d² - 1))``.
+    """
+    distance = np.abs(np.subtract.outer(np.arange(n_lines), np.arange(n_lines))).astype(np.float64)
+    far = distance > 2.0
+    kernel = np.zeros_like(distance)
+    kernel[far] = (np.pi * distance[far] * (distance[far] ** 2 - 1.0)) ** -2
+    kernel.setflags(write=False)
+    return kernel

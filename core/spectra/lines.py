@@ -25,6 +25,8 @@ class SegmentSettings:
         Share of a segment that the next one repeats.
     n_segments
         Segments that are averaged; 24 at 600 Hz are about five minutes.
+    min_segments
+        Below this number of segments a result is marked uncertain.
     max_frequency_hz
         Spectra are kept up to here.
     vortex_order
@@ -45,6 +47,7 @@ class SegmentSettings:
     segment_samples: int = 8192
     overlap: float = 0.125
     n_segments: int = 24
+    min_segments: int = 4
     max_frequency_hz: float = 25.0
     vortex_order: float = 0.25
     vortex_band: tuple[float, float] = (0.2, 0.4)
@@ -121,18 +124,37 @@ def exact_phasors(
     ValueError
         If a frequency is out of range.
     """
+    n_samples = tapered_samples.shape[1]
     if np.any(frequency_hz <= 0.0) or np.any(frequency_hz >= rate_hz / 2.0):
         raise ValueError(f"frequencies {frequency_hz} must lie between 0 and {rate_hz / 2.0} Hz")
-    n_channels, n_samples = tapered_samples.shape
-    n_coarse = -(-n_samples // FINE_STEPS)
-    padded = np.zeros((n_channels, n_coarse * FINE_STEPS))
-    padded[:, :n_samples] = tapered_samples
-    # the exponential of a sum of steps: a fine table within each run and a coarse one over runs
+    return line_phasors(tapered_samples, turning_factors(n_samples, rate_hz, frequency_hz))
+
+
+def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) -> ComplexArray:
+    """(n_samples, n_lines) factors ``exp(-iωt)`` that turn the phasors of frequencies back.
+
+    The exponential of a sum of steps: a fine table within each run and a coarse one over runs.
+    """
     turn_rad = -2j * np.pi * frequency_hz / rate_hz
+    n_coarse = -(-n_samples // FINE_STEPS)
     fine = np.exp(np.outer(np.arange(FINE_STEPS), turn_rad))
     coarse = np.exp(np.outer(FINE_STEPS * np.arange(n_coarse), turn_rad))
-    runs = padded.reshape(n_channels, n_coarse, FINE_STEPS) @ fine
-    phasors: ComplexArray = (runs * coarse).sum(axis=1)
+    factors: ComplexArray = (coarse[:, np.newaxis] * fine).reshape(-1, turn_rad.size)[:n_samples]
+    return factors
+
+
+def line_phasors(tapered_samples: FloatArray, factors: ComplexArray) -> ComplexArray:
+    """As `exact_phasors`, by factors of `turning_factors`."""
+    parts: FloatArray = tapered_samples @ factors.view(np.float64)
+    return parts.view(np.complex128)
+
+
+def part_phasors(samples: FloatArray, factors: ComplexArray) -> ComplexArray:
+    """The same of samples that are not tapered, (n_channels, n_lines), without a copy of them."""
+    taper = hann(samples.shape[1])
+    weighted = factors * (2.0 * taper / taper.sum())[:, np.newaxis]
+    of_mean = samples.mean(axis=1, keepdims=True) * weighted.sum(axis=0)
+    phasors: ComplexArray = line_phasors(samples, weighted) - of_mean
     return phasors
 
 

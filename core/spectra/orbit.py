@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.arrays import ComplexArray, FloatArray
-from core.spectra.key_phase import ODD_TURN, rising_edges
+from core.spectra.speed import ODD_TURN, rising_edges
 
 FILTER_TURNS = 8.0
 """Width of the taper in which 1× is read: its first zeros are a quarter of the running speed away
@@ -80,7 +80,7 @@ def order_phasors(trace_um: FloatArray, rate_hz: float, frequency_hz: float) -> 
 
 
 def trace_of(phasors: ComplexArray, rate_hz: float, frequency_hz: float) -> FloatArray:
-    """Motion that `order_phasors` tell of, (n_samples,) µm."""
+    """Motion of the phasors of `order_phasors`, (n_samples,) µm."""
     angle = 2.0 * math.pi * frequency_hz / rate_hz * np.arange(phasors.size)
     trace: FloatArray = (phasors * np.exp(1.0j * angle)).real
     return trace

@@ -1,11 +1,13 @@
-"""Broad-band vibration: displacement of shafts peak-to-peak, velocity of bearings rms.
+"""Broad-band vibration of a segment, and vibration of its newest parts.
 
-What standards of the ISO 20816 family judge; nothing else in padwatch is made of it.
+Broad-band displacement of shafts and velocity of bearings are what standards of the ISO 20816
+family judge. Limits of fast changes are judged by the newest parts: averages over minutes show a
+step minutes later, parts of a segment show it within seconds, and for how long it has lasted.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -13,11 +15,17 @@ import numpy.typing as npt
 from core.arrays import ComplexArray, FloatArray
 from core.machine.channel import Measurand, displacement_factor
 from core.machine.unit import Unit
+from core.quality import Reading
+from core.spectra.cross_spectrum import NOISE_BANDWIDTH_BINS
 from core.spectra.lines import SegmentSettings
 from core.units import hz_from_rpm
 
-HANN_NOISE_BINS = 1.5
-"""Equivalent noise bandwidth of Hann's taper (Harris 1978, table I): what its lines share."""
+MAX_PARTS = 4
+"""Of what a segment adds to the one before; 3 s each at the defaults."""
+
+PART_TURNS = 4.0
+"""Turns in a part, at least: the main lobe of Hann's taper then reaches half an order from 1×
+(Harris 1978), short of the vortex at 0.2 to 0.4 orders."""
 
 MM_FROM_UM = 1e-3
 
@@ -43,11 +51,6 @@ class Overall:
     orbit_um_pk: FloatArray
     velocity_mm_s_rms: FloatArray
 
-    @classmethod
-    def of_nothing(cls, n_channels: int, n_bearings: int) -> Self:
-        """What is known without waveforms."""
-        return cls(*(np.full(n, np.nan) for n in (n_channels, n_bearings, n_channels)))
-
 
 class OverallTransform:
     """Reads broad-band vibration off segments of one unit.
@@ -69,14 +72,13 @@ class OverallTransform:
         )
         low_hz = settings.velocity_low_order * hz_from_rpm(unit.rated_speed_rpm)
         in_band = (frequency_hz >= low_hz) & (frequency_hz <= settings.velocity_high_hz)
-        self._band: npt.NDArray[np.intp] = np.flatnonzero(in_band)
+        band: npt.NDArray[np.intp] = np.flatnonzero(in_band)
+        self._band = slice(int(band[0]), int(band[-1]) + 1) if band.size else slice(0)
         band_hz: FloatArray = frequency_hz[self._band]
-        self._mm_s = np.array(
-            [
-                2.0 * np.pi * band_hz * MM_FROM_UM * np.abs(displacement_factor(channel, band_hz))
-                for channel in unit.channels
-            ]
-        )
+        mm_s = 2.0 * np.pi * band_hz * MM_FROM_UM
+        factor = [(mm_s * np.abs(displacement_factor(c, band_hz))) ** 2 for c in unit.channels]
+        # of real and imaginary parts in turn
+        self._power_factor = np.repeat(factor, 2, axis=1)
 
     def of(self, samples: FloatArray, phasors: ComplexArray) -> Overall:
         """Broad-band vibration of a segment.
@@ -89,8 +91,9 @@ class OverallTransform:
             At all bins above zero, in the channels' own units.
         """
         span = np.where(self._is_displacement, np.ptp(samples, axis=1), np.nan)
-        speed = self._mm_s * np.abs(phasors[:, self._band])
-        power = (speed**2).sum(axis=1) / (2.0 * HANN_NOISE_BINS)
+        parts = phasors[:, self._band].view(np.float64)
+        power = np.einsum("ij,ij->i", parts * parts, self._power_factor)
+        power /= 2.0 * NOISE_BANDWIDTH_BINS
         return Overall(span, self._orbits(samples), np.sqrt(power))
 
     def _orbits(self, samples: FloatArray) -> FloatArray:
@@ -99,5 +102,53 @@ class OverallTransform:
     def _orbit(self, samples: FloatArray, rows: Sequence[int]) -> float:
         if not self._is_displacement[rows].all():
             return float("nan")
-        moved = samples[rows] - samples[rows].mean(axis=1, keepdims=True)
-        return float(np.hypot(moved[0], moved[1]).max())
+        x, y = (samples[row] - samples[row].mean() for row in rows)
+        return math.sqrt(float((x * x + y * y).max()))
+
+
+@dataclass(frozen=True)
+class RecentVibration:
+    """The newest parts of one segment, oldest first.
+
+    Parameters
+    ----------
+    stop : (n_parts,)
+        Sample behind each part, counted from the segment's first.
+    order1_um_pk : (n_parts, n_channels)
+        Displacement amplitudes at 1×, without runout where that can be taken off.
+    peak_to_peak_um : (n_parts, n_channels)
+        Of the samples as they are; only of channels that measure displacement.
+    """
+
+    stop: npt.NDArray[np.int64]
+    order1_um_pk: FloatArray
+    peak_to_peak_um: FloatArray
+
+
+@dataclass(frozen=True)
+class RecentReadings:
+    """Some quantities of one bearing, of the samples just before a moment alone."""
+
+    time_ns: int
+    readings: Mapping[str, Reading]
+
+
+def parts_of(
+    n_samples: int, hop_samples: int, turn_samples: float
+) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """First sample of each part of a segment, and the one behind it.
+
+    They cover what the segment adds to the one before; a part is as long as its turns need, so
+    that it may begin earlier.
+
+    Parameters
+    ----------
+    hop_samples
+        Samples from one segment's start to the next one's.
+    turn_samples
+        Samples in a turn of the shaft.
+    """
+    n_parts = int(np.clip(hop_samples / (PART_TURNS * turn_samples), 1, MAX_PARTS))
+    stop = n_samples - hop_samples + hop_samples * np.arange(1, n_parts + 1) // n_parts
+    length = max(hop_samples // n_parts, round(PART_TURNS * turn_samples))
+    return np.maximum(stop - length, 0), stop

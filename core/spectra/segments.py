@@ -1,8 +1,12 @@
 """Segments: each stretch of samples is transformed once, here, and averaged elsewhere."""
 
+import cmath
+import math
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -17,16 +21,20 @@ from core.checks.sensor_checks import (
 )
 from core.machine.channel import Channel, displacement_factor
 from core.machine.unit import Unit
-from core.quality import GOOD, Level, Quality, Reading, Reason, bad, uncertain, worst
+from core.quality import GOOD, Level, Quality, Reading, Reason, bad, missing, uncertain, worst
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import average
-from core.spectra.key_phase import KeyPhase, read_key_phase
-from core.spectra.lines import SegmentSettings, bin_phasors, exact_phasors, tapered
-from core.spectra.overall import Overall, OverallTransform
-from core.spectra.recent import RecentVibration, parts_of
-from core.spectra.runout import RunoutVerdict
-from core.spectra.segment_runout import shaft_angle_rad, without_runout
-from core.spectra.speed import Speed, running_speed
+from core.spectra.lines import (
+    SegmentSettings,
+    bin_phasors,
+    line_phasors,
+    part_phasors,
+    tapered,
+    turning_factors,
+)
+from core.spectra.overall import Overall, OverallTransform, RecentVibration, parts_of
+from core.spectra.runout import RunoutVerdict, shaft_angle_rad, without_runout
+from core.spectra.speed import KeyPhase, Speed, read_key_phase, running_speed
 from core.spectra.vortex import vortex_frequency_hz
 from core.units import hz_from_rpm
 
@@ -39,36 +47,49 @@ ORDER1, VORTEX = range(2)
 """Where the two order lines stand in `Segment.order_phasors_um_pk`."""
 
 
+class Evidence(StrEnum):
+    """What results are made of. The names appear in the API."""
+
+    WAVEFORMS = "waveforms"
+    AMPLITUDE_AND_PHASE = "amplitude_and_phase"
+    AMPLITUDE_ONLY = "amplitude_only"
+
+
 @dataclass(frozen=True)
 class Segment:
-    """One transformed segment of a unit.
+    """One transformed segment of a unit, or one poll of its rack.
 
     Parameters
     ----------
     channel_quality
-        One for each channel, throughout the segment.
+        One for each channel, throughout the segment; of a poll, that of the gaps.
+    usable : (n_channels,)
+        Whether the samples of each channel may be believed.
     mean
         (n_channels,) mean of the samples, engineering units of each channel.
     bin_phasors_um_pk
-        (n_channels, n_lines) displacement phasors at the bins above zero.
+        (n_channels, n_lines) displacement phasors at the bins above zero; None of a poll.
     order_frequency_hz
         (2,) exact frequencies of 1× and of the vortex; of its nominal order where there is no peak.
     has_vortex_peak
         Whether a line that bearings share has its peak in the vortex band, up to this segment.
     order_phasors_um_pk
         (n_channels, 2) displacement phasors at exactly these, 1× without runout where that can be
-        taken off.
+        taken off; finite also where not usable. Without a phase they are amplitudes.
+    order_quality
+        (2, n_channels) qualities of these.
+    order_usable, has_phase : (2, n_channels)
+        Whether each may be believed, and whether its phase is known.
+    at_mark_um_pk : (n_channels,)
+        1× phasors when the shaft's mark passes the pick-up; None without a key-phase.
     runout
-        Whether it was, by shaft channel.
+        Whether runout was taken off 1×, by shaft channel.
     overall
-        Broad-band vibration.
+        Broad-band vibration; None of a poll.
     clipped_share
         (n_channels,) share of the samples at an end of the converter's range.
-    shaft_angle_rad
-        Angle that the shaft has turned at the first sample since its mark passed the pick-up; None
-        where no key-phase says so.
     recent
-        Vibration of the newest parts; None without waveforms.
+        Vibration of the newest parts; None of a poll.
     """
 
     epoch: int
@@ -76,31 +97,111 @@ class Segment:
     stop_index: int
     stop_ns: int
     channel_quality: tuple[Quality, ...]
+    usable: npt.NDArray[np.bool_]
     slow: Mapping[str, Reading]
     mean: FloatArray
     speed: Speed
-    bin_phasors_um_pk: ComplexArray
+    bin_phasors_um_pk: ComplexArray | None
     order_frequency_hz: FloatArray
     has_vortex_peak: bool
     order_phasors_um_pk: ComplexArray
+    order_quality: tuple[tuple[Quality, ...], tuple[Quality, ...]]
+    order_usable: npt.NDArray[np.bool_]
+    has_phase: npt.NDArray[np.bool_]
+    at_mark_um_pk: ComplexArray | None
     runout: Mapping[str, RunoutVerdict]
-    overall: Overall
+    overall: Overall | None
     clipped_share: FloatArray
-    shaft_angle_rad: float | None = None
-    recent: RecentVibration | None = None
-
-    @property
-    def usable(self) -> npt.NDArray[np.bool_]:
-        """(n_channels,) whether each channel may be believed."""
-        return _usable(self.channel_quality)
+    recent: RecentVibration | None
 
     def is_grazed(self, row: int) -> bool:
         """Whether a channel is left out for a few clipped samples alone."""
         few = 0.0 < self.clipped_share[row] <= MAX_CLIPPED_SHARE
         return bool(few) and self.channel_quality[row] == CLIPPED
 
+    def line_quality(self, row: int, line: int) -> Quality:
+        """Quality of a channel at a line; a few clipped samples leave the segments before."""
+        return uncertain(Reason.CLIPPED) if self.is_grazed(row) else self.order_quality[line][row]
 
-class SegmentTransform:
+    @cached_property
+    def spans_um_pp(self) -> tuple[Reading, ...]:
+        """Broad-band displacement of each channel."""
+        return self._of_channels(None if self.overall is None else self.overall.peak_to_peak_um)
+
+    @cached_property
+    def velocities_mm_s_rms(self) -> tuple[Reading, ...]:
+        """Broad-band velocity of each channel."""
+        return self._of_channels(None if self.overall is None else self.overall.velocity_mm_s_rms)
+
+    def _of_channels(self, values: FloatArray | None) -> tuple[Reading, ...]:
+        each = [math.nan] * self.usable.size if values is None else values.tolist()
+        return tuple(self.reading((row,), value) for row, value in enumerate(each))
+
+    def reading(self, rows: Sequence[int], value: float) -> Reading:
+        """A value from some channels, as far as all of them may be believed."""
+        qualities = [self.channel_quality[row] for row in rows]
+        if any(quality.level is Level.BAD for quality in qualities):
+            return missing(worst(qualities).reason)
+        if math.isnan(value):
+            return missing(Reason.NOT_MEASURED)
+        return Reading(value, worst(qualities))
+
+
+class KeptSegments:
+    """The segments or polls that are averaged.
+
+    Parameters
+    ----------
+    n_segments
+        How many make a full average.
+    min_segments
+        How many independent ones make a result that is not uncertain.
+    segment_samples, hop_samples
+        Samples of one, and from the start of one to that of the next.
+    result_samples
+        Results come with the first segment that ends at or after each multiple of this.
+    n_rows
+        Rows of a block.
+
+    Attributes
+    ----------
+    frequency_hz
+        (n_lines,) of the segments' bins; None of polls.
+    """
+
+    frequency_hz: FloatArray | None = None
+
+    def __init__(
+        self,
+        n_rows: int,
+        n_segments: int,
+        min_segments: int,
+        segment_samples: int = 1,
+        hop_samples: int = 1,
+        result_samples: int = 1,
+    ) -> None:
+        self.n_rows, self.n_segments, self.min_segments = n_rows, n_segments, min_segments
+        self.segment_samples, self.hop_samples = segment_samples, hop_samples
+        self.result_samples = result_samples
+        self.segments: deque[Segment] = deque(maxlen=n_segments)
+
+    def clear(self) -> None:
+        """Drop all segments, after a restart of the sample count."""
+        self.segments.clear()
+
+    def keep(self, segment: Segment) -> Segment:
+        """Keep a segment, and drop what has left the averaging time."""
+        self.segments.append(segment)
+        self.drop_before(segment.first_index - self.n_segments * self.hop_samples + 1)
+        return segment
+
+    def drop_before(self, first_index: int) -> None:
+        """Drop segments that begin before a sample."""
+        while self.segments and self.segments[0].first_index < first_index:
+            self.segments.popleft()
+
+
+class SegmentTransform(KeptSegments):
     """Transforms windows of one unit and keeps the ones that are averaged.
 
     Parameters
@@ -110,6 +211,13 @@ class SegmentTransform:
     """
 
     def __init__(self, unit: Unit, settings: SegmentSettings) -> None:
+        super().__init__(
+            len(unit.channels),
+            settings.n_segments,
+            settings.min_segments,
+            settings.segment_samples,
+            settings.hop_samples,
+        )
         self._unit = unit
         self._settings = settings
         bin_hz = unit.rate_hz / settings.segment_samples
@@ -122,11 +230,6 @@ class SegmentTransform:
         ids = [channel.id for channel in unit.channels]
         self._key_phase_row = ids.index(unit.key_phase) if unit.key_phase else None
         self._bearing_rows = [[ids.index(i) for i in b.channels] for b in unit.bearings]
-        self.segments: deque[Segment] = deque(maxlen=settings.n_segments)
-
-    def clear(self) -> None:
-        """Forget all segments: the device counts anew."""
-        self.segments.clear()
 
     def add(self, window: SampleBlock) -> Segment:
         """Transform a window, keep it, and drop what has left the averaging time.
@@ -134,13 +237,14 @@ class SegmentTransform:
         Nothing older than the averaging time counts, also not for where its vortex is looked for:
         behind a gap it may be of any time.
         """
-        self._drop_before(window.first_index - self._span)
+        self.drop_before(window.first_index - self.n_segments * self.hop_samples)
         finite: npt.NDArray[np.bool_] = np.all(np.isfinite(window.samples), axis=1)
         quality = tuple(
             q if good or q.level is Level.BAD else bad(Reason.NOT_FINITE)
             for q, good in zip(window.channel_quality, finite, strict=True)
         )
-        samples = np.where(finite[:, np.newaxis], window.samples, 0.0).astype(np.float64)
+        samples = window.samples.astype(np.float64)
+        samples[~finite] = 0.0
         prepared = tapered(samples)
         lines = bin_phasors(prepared, prepared.shape[1] // 2 - 1)
         bins = lines[:, : self.frequency_hz.size] * self._bin_factor
@@ -152,13 +256,22 @@ class SegmentTransform:
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
         vortex_hz = self._vortex_hz(turn_hz, bins, _usable(quality))
         order_hz = np.array([turn_hz, vortex_hz or self._settings.vortex_order * turn_hz])
-        orders, runout = self._orders(prepared, window.rate_hz, order_hz, speed, key_phase)
+        factors = _factors(self._unit.channels, order_hz)
+        turn_samples = window.rate_hz / turn_hz
+        turning = turning_factors(samples.shape[1], window.rate_hz, order_hz)
+        orders = factors * line_phasors(prepared, turning)
+        shafts = np.flatnonzero(self._is_shaft).tolist()
+        orders[:, ORDER1], runout = without_runout(
+            orders[:, ORDER1], self._unit, shafts, speed, key_phase
+        )
+        angle_rad, usable = shaft_angle_rad(speed, key_phase), _usable(quality)
         segment = Segment(
             epoch=window.epoch,
             first_index=window.first_index,
             stop_index=window.stop_index,
             stop_ns=window.stop_ns,
             channel_quality=quality,
+            usable=usable,
             slow=window.slow,
             mean=mean,
             speed=speed,
@@ -166,23 +279,16 @@ class SegmentTransform:
             order_frequency_hz=order_hz,
             has_vortex_peak=vortex_hz is not None,
             order_phasors_um_pk=orders,
+            order_quality=(quality, quality),
+            order_usable=np.array([usable, usable]),
+            has_phase=np.ones((2, usable.size), dtype=np.bool_),
+            at_mark_um_pk=None if angle_rad is None else _turned(orders[:, ORDER1], -angle_rad),
             runout=runout,
             overall=self._overall.of(samples, lines),
             clipped_share=clipped,
-            recent=self._recent(samples, window.rate_hz, turn_hz, speed, key_phase),
-            shaft_angle_rad=shaft_angle_rad(speed, key_phase),
+            recent=self._recent(samples, turn_samples, turning, factors, speed, key_phase),
         )
-        self.segments.append(segment)
-        self._drop_before(window.first_index - self._span + 1)
-        return segment
-
-    @property
-    def _span(self) -> int:
-        return self._settings.n_segments * self._settings.hop_samples
-
-    def _drop_before(self, first_index: int) -> None:
-        while self.segments and self.segments[0].first_index < first_index:
-            self.segments.popleft()
+        return self.keep(segment)
 
     def _judged(
         self,
@@ -236,39 +342,23 @@ class SegmentTransform:
             self._unit, window.slow, self.frequency_hz, power, self._settings, key_phase
         )
 
-    def _orders(
-        self,
-        prepared: FloatArray,
-        rate_hz: float,
-        order_hz: FloatArray,
-        speed: Speed,
-        key_phase: KeyPhase | None,
-    ) -> tuple[ComplexArray, Mapping[str, RunoutVerdict]]:
-        phasors = exact_phasors(prepared, rate_hz, order_hz)
-        phasors *= _factors(self._unit.channels, order_hz)
-        rows = np.flatnonzero(self._is_shaft).tolist()
-        phasors[:, ORDER1], runout = without_runout(
-            phasors[:, ORDER1], self._unit, rows, speed, key_phase
-        )
-        return phasors, runout
-
     def _recent(
         self,
         samples: FloatArray,
-        rate_hz: float,
-        turn_hz: float,
+        turn_samples: float,
+        turning: ComplexArray,
+        factors: ComplexArray,
         speed: Speed,
         key_phase: KeyPhase | None,
     ) -> RecentVibration:
-        starts, stops = parts_of(samples.shape[1], self._settings.hop_samples, rate_hz / turn_hz)
-        order_hz, rows = np.array([turn_hz]), np.flatnonzero(self._is_shaft).tolist()
-        factor = _factors(self._unit.channels, order_hz)[:, 0]
+        starts, stops = parts_of(samples.shape[1], self._settings.hop_samples, turn_samples)
+        shafts = np.flatnonzero(self._is_shaft).tolist()
         amplitudes, spans = [], []
         for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
             part = samples[:, start:stop]
-            phasors = factor * exact_phasors(tapered(part), rate_hz, order_hz)[:, 0]
-            phasors *= np.exp(-2j * np.pi * turn_hz * start / rate_hz)  # of the segment's first
-            clean, _ = without_runout(phasors, self._unit, rows, speed, key_phase)
+            at_turn = np.ascontiguousarray(turning[start:stop, ORDER1 : ORDER1 + 1])
+            phasors = factors[:, ORDER1] * part_phasors(part, at_turn)[:, 0]
+            clean, _ = without_runout(phasors, self._unit, shafts, speed, key_phase)
             amplitudes.append(np.abs(clean))
             spans.append(np.ptp(part, axis=1))
         return RecentVibration(stops, np.array(amplitudes), np.array(spans))
@@ -279,13 +369,12 @@ class SegmentTransform:
         """Where the bearings share a line: over all segments, for one resolves a rope poorly."""
         low, high = self._settings.vortex_band
         band_hz = (low * turn_hz, high * turn_hz)
-        # a bin more on each side, to tell a peak from the flank of one outside
+        # a bin more on each side, to distinguish a peak from the flank of one outside
         margin_hz = 1.5 * self.frequency_hz[0]
-        near = np.flatnonzero(
-            (self.frequency_hz > band_hz[0] - margin_hz)
-            & (self.frequency_hz < band_hz[1] + margin_hz)
-        )
-        phasors = np.array([*(s.bin_phasors_um_pk[:, near] for s in self.segments), bins[:, near]])
+        first = int(np.searchsorted(self.frequency_hz, band_hz[0] - margin_hz, "right"))
+        near = slice(first, int(np.searchsorted(self.frequency_hz, band_hz[1] + margin_hz)))
+        before = [s.bin_phasors_um_pk for s in self.segments if s.bin_phasors_um_pk is not None]
+        phasors = np.array([part[:, near] for part in (*before, bins)])
         counted = np.array([*(s.usable for s in self.segments), usable])
         spectra = [
             average(self.frequency_hz[near], phasors[:, rows], counted[:, rows])
@@ -298,11 +387,19 @@ def _usable(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
     return np.array([quality.level is not Level.BAD for quality in qualities])
 
 
+def _turned(phasors: ComplexArray, angle_rad: float) -> ComplexArray:
+    factor = cmath.exp(1j * angle_rad)
+    return np.array([phasor * factor for phasor in phasors.tolist()])
+
+
 def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
     power: FloatArray = (np.abs(phasors[counted]) ** 2).sum(axis=0)
     return power
 
 
 def _factors(channels: Sequence[Channel], frequency_hz: FloatArray) -> ComplexArray:
-    """(n_channels, n_lines) displacement per engineering unit."""
-    return np.array([displacement_factor(channel, frequency_hz) for channel in channels])
+    """(n_channels, n_lines) displacement per engineering unit, once for channels that are alike."""
+    kinds = [(c.measurand, c.direction, c.response, c.delay_s) for c in channels]
+    alike = dict(zip(kinds, channels, strict=True))
+    factors = {kind: displacement_factor(channel, frequency_hz) for kind, channel in alike.items()}
+    return np.array([factors[kind] for kind in kinds])

@@ -1,4 +1,8 @@
-"""The running speed, and how it is known."""
+"""The running speed and the shaft's angle: by key-phase, speed channel, 1× line or rated value.
+
+The whole segment must bear out that the pulses of a key-phase are one a turn: a pulse lost, one too
+many or one out of place makes every phase that follows from it a guess, and so there is none.
+"""
 
 import math
 from collections.abc import Mapping
@@ -6,14 +10,31 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.checks.sensor_checks import checked_speed
+from core.checks.sensor_checks import SURE, checked_speed
 from core.machine.unit import Unit
-from core.quality import Reading, Reason, missing, uncertain
-from core.spectra.key_phase import KeyPhase
+from core.quality import GOOD, Reading, Reason, missing, uncertain
 from core.spectra.lines import SegmentSettings, peak_frequency_hz
+from core.uncertainty import Budget, random_line, systematic_line
 from core.units import hz_from_rpm, rpm_from_hz
+
+HYSTERESIS = 0.2
+"""A pulse begins this share of its height above the middle, and ends as much below it."""
+
+MIN_PULSES = 4
+"""Three turns; fewer would not show an odd one out."""
+
+MAX_DEPARTURE_TURNS = 0.02
+"""Farthest that a pulse may lie from its place in an even turning, 7°."""
+
+ODD_TURN = (0.75, 1.5)
+"""A turn shorter or longer than these shares of the middle one holds a pulse too many or too
+few."""
+
+OUTER_TURN = 1.1
+"""The first and the last pulse lie no more turns than this from the ends of the segment."""
 
 LINE_SEARCH = (0.85, 1.15)
 """Where the 1× line is looked for, in multiples of the speed that is expected."""
@@ -25,6 +46,37 @@ KEY_PHASE_TOLERANCE = 0.02
 LINE_SPREAD = 0.35
 """Standard uncertainty of an interpolated line in bins, for a floor as strong as the line; it falls
 with the root of their powers' ratio. Found on simulated machines: 0.28 to 0.38."""
+
+
+class KeyPhaseFault(StrEnum):
+    """Why there is no shaft angle."""
+
+    TOO_FEW_PULSES = "too_few_pulses"
+    MISSING_PULSE = "missing_pulse"
+    EXTRA_PULSE = "extra_pulse"
+    IRREGULAR = "irregular"
+
+
+@dataclass(frozen=True)
+class KeyPhase:
+    """How the shaft turned during a segment.
+
+    Parameters
+    ----------
+    shaft_angle_rad
+        Angle that it has turned at the first sample since the mark passed the pick-up, 0 to 2π.
+    speed_rpm
+        Mean over the segment.
+    u_relative
+        Standard uncertainty of the speed, relative, by how far the pulses lie from an even turning.
+    n_pulses
+        Pulses in the segment.
+    """
+
+    shaft_angle_rad: float
+    speed_rpm: float
+    u_relative: float = 0.0
+    n_pulses: int = 0
 
 
 @dataclass(frozen=True)
@@ -46,10 +98,17 @@ class SpeedSource(StrEnum):
 
 @dataclass(frozen=True)
 class Speed:
-    """Running speed in r/min; without a value when the machine stands."""
+    """Running speed in r/min; without a value when the machine stands.
+
+    Parameters
+    ----------
+    budget
+        Its uncertainty; None for the rated speed and for a speed that another contradicts.
+    """
 
     rpm: Reading
     source: SpeedSource
+    budget: Budget | None = None
 
 
 def running_speed(
@@ -72,7 +131,7 @@ def running_speed(
     frequency_hz, shaft_power : (n_lines,)
         Power of the shaft channels together, in which the 1× line is looked for.
     key_phase
-        What the pulses say, if they are one a turn.
+        What the pulses show, if they are one a turn.
     """
     slow_rpm = slow.get(unit.speed_channel) if unit.speed_channel else None
     for source, measured in (
@@ -92,16 +151,18 @@ def running_speed(
             line.u_relative if line else 0.0,
         )
         if checked.value is not None:
-            return Speed(checked, source)
+            pulses = key_phase if source is SpeedSource.KEY_PHASE else None
+            return Speed(checked, source, _budget(checked, pulses, line, settings))
     doubtful = uncertain(Reason.SPEED_UNKNOWN)
     line = _line(unit.rated_speed_rpm, frequency_hz, shaft_power, settings)
     if line is not None:
-        return Speed(Reading(line.rpm, doubtful), SpeedSource.LINE)
+        budget = Budget(line.rpm, (random_line("1× line", line.rpm * line.u_relative),))
+        return Speed(Reading(line.rpm, doubtful), SpeedSource.LINE, budget)
     return Speed(Reading(unit.rated_speed_rpm, doubtful), SpeedSource.RATED)
 
 
 def _pulsed(key_phase: KeyPhase | None, slow_rpm: Reading | None) -> Reading | None:
-    """Speed by the key-phase, doubted where a speed channel says otherwise."""
+    """Speed by the key-phase, uncertain where a speed channel contradicts it."""
     if key_phase is None:
         return None
     other_rpm = slow_rpm.value if slow_rpm is not None else None
@@ -110,6 +171,26 @@ def _pulsed(key_phase: KeyPhase | None, slow_rpm: Reading | None) -> Reading | N
     ):
         return Reading(key_phase.speed_rpm)
     return Reading(key_phase.speed_rpm, uncertain(Reason.SPEED_IMPLAUSIBLE))
+
+
+def _budget(
+    speed: Reading, pulses: KeyPhase | None, line: _Line | None, settings: SegmentSettings
+) -> Budget | None:
+    """Uncertainty of a measured speed: of its pulses, or of a speed channel's reading.
+
+    A speed channel is as good as its agreement with the 1× line, where there is one.
+    """
+    if speed.value is None or speed.quality != GOOD:
+        return None
+    if pulses is not None:
+        if not pulses.u_relative > 0.0:
+            return None
+        std_rpm = speed.value * pulses.u_relative
+        return Budget(speed.value, (random_line("key-phase", std_rpm, pulses.n_pulses - 2.0),))
+    tolerance = KEY_PHASE_TOLERANCE
+    if line is not None:
+        tolerance = math.hypot(settings.sensors.speed_tolerance, SURE * line.u_relative)
+    return Budget(speed.value, (systematic_line("speed channel", tolerance, speed.value),))
 
 
 def _line(
@@ -132,3 +213,77 @@ def _line(
     bin_hz = float(frequency_hz[1] - frequency_hz[0])
     spread_hz = LINE_SPREAD * bin_hz * math.sqrt(floor / float(top))
     return _Line(rpm_from_hz(line_hz), spread_hz / line_hz)
+
+
+def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | KeyPhaseFault:
+    """Fit an even turning to the pulses of a segment.
+
+    Parameters
+    ----------
+    signal
+        (n_samples,) with pulses that rise; the mark passes where they begin.
+
+    Returns
+    -------
+    The first thing that is wrong, if anything is.
+    """
+    edges = rising_edges(signal)
+    if edges.size < MIN_PULSES:
+        return KeyPhaseFault.TOO_FEW_PULSES
+    fault = _odd_turn(edges, signal.size)
+    if fault is not None:
+        return fault
+    # The error lies in where a pulse is found, so that positions are fitted over turns.
+    turns = np.arange(edges.size) - (edges.size - 1) / 2.0
+    samples_per_turn = float(turns @ edges / (turns @ turns))
+    middle = float(edges.mean())
+    departure = (edges - middle - samples_per_turn * turns) / samples_per_turn
+    if np.abs(departure).max() > MAX_DEPARTURE_TURNS:
+        return KeyPhaseFault.IRREGULAR
+    # slope of a line (Bevington and Robinson 2003, equation 6.23); an edge is known to a sample
+    resolution = samples_per_turn**-2 / 12.0
+    variance = float(departure @ departure) / (edges.size - 2) + resolution
+    turns_at_start = -middle / samples_per_turn - float(turns[0])  # since the first pulse
+    return KeyPhase(
+        shaft_angle_rad=2.0 * math.pi * (turns_at_start % 1.0),
+        speed_rpm=rpm_from_hz(rate_hz / samples_per_turn),
+        u_relative=math.sqrt(variance / (turns @ turns)),
+        n_pulses=edges.size,
+    )
+
+
+def rising_edges(signal: FloatArray) -> FloatArray:
+    """Where a signal rises through the middle between its extremes, in samples, between them too.
+
+    Parameters
+    ----------
+    signal : (n_samples,)
+
+    Returns
+    -------
+    (n_edges,) rising; noise smaller than the hysteresis makes no edge.
+    """
+    low, high = float(signal.min()), float(signal.max())
+    middle, margin = (low + high) / 2.0, HYSTERESIS * (high - low)
+    if margin == 0.0:
+        return np.empty(0)
+    clear = np.flatnonzero(np.abs(signal - middle) > margin)
+    is_high = signal[clear] > middle
+    begins = clear[1:][is_high[1:] & ~is_high[:-1]]
+    under: npt.NDArray[np.intp] = np.flatnonzero(signal <= middle)
+    last = under[np.searchsorted(under, begins) - 1]
+    edges: FloatArray = last + (middle - signal[last]) / (signal[last + 1] - signal[last])
+    return edges
+
+
+def _odd_turn(edges: FloatArray, n_samples: int) -> KeyPhaseFault | None:
+    intervals = np.diff(edges)
+    usual = float(np.median(intervals))
+    shortest, longest = ODD_TURN[0] * usual, ODD_TURN[1] * usual
+    if intervals.min() < shortest:
+        return KeyPhaseFault.EXTRA_PULSE
+    # a train that begins late or breaks off lacks pulses as well
+    outer = max(edges[0], n_samples - 1 - edges[-1])
+    if intervals.max() > longest or outer > OUTER_TURN * usual:
+        return KeyPhaseFault.MISSING_PULSE
+    return None

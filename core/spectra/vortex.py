@@ -1,25 +1,11 @@
 """Which way the shaft turns in its bearing at one line, and where the vortex is."""
 
-import math
 from collections.abc import Sequence
-from enum import StrEnum
 
 import numpy as np
 
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.spectra.lines import peak_frequency_hz
-
-
-class Whirl(StrEnum):
-    """Sense of an orbit, from the positive x axis towards the positive y axis."""
-
-    FORWARD = "forward"
-    BACKWARD = "backward"
-    UNDECIDED = "undecided"
-
-
-LEAST_ROUNDNESS = 0.1
-"""Below this an orbit is a line whose sense means nothing."""
 
 
 def roundness(spectrum: CrossSpectrum, line: int) -> float:
@@ -31,19 +17,6 @@ def roundness(spectrum: CrossSpectrum, line: int) -> float:
     matrix = spectrum.matrix[line]
     whole = float(matrix[SHAFT_X, SHAFT_X].real + matrix[SHAFT_Y, SHAFT_Y].real)
     return 2.0 * float(matrix[SHAFT_X, SHAFT_Y].imag) / whole if whole > 0.0 else 0.0
-
-
-def whirl(spectrum: CrossSpectrum, line: int) -> Whirl:
-    """Tell the sense of the orbit, where it is round enough and not chance.
-
-    Two unrelated signals of n segments seem round by 1 / √(2n); twice that must be passed.
-    """
-    value = roundness(spectrum, line)
-    n_segments = int(spectrum.n_segments[SHAFT_X, SHAFT_Y])
-    chance = math.sqrt(2.0 / n_segments) if n_segments else 1.0
-    if abs(value) < max(LEAST_ROUNDNESS, chance):
-        return Whirl.UNDECIDED
-    return Whirl.FORWARD if value > 0.0 else Whirl.BACKWARD
 
 
 def vortex_frequency_hz(

@@ -6,14 +6,16 @@ not, and is stated, may.
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from core.arrays import FloatArray
+from core.machine.unit import Estimator
 from core.spectra.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.stiffness.dynamic import DynamicStiffness
+from core.stiffness.estimators import ESTIMATORS, TRANSFERS
 from core.stiffness.stiffness_budget import BEARING_GAIN, BRACKET, CROSS_COUPLING, STATISTICS
 from core.stiffness.transfer import motion_across
 from core.uncertainty import SHAFT_GAIN, Budget, Kind, coverage_factor, random_line
@@ -60,11 +62,11 @@ def contradicting(
     doubted: set[str] = set()
     for row, (axes, along) in enumerate((("xx", SHAFT_X), ("yy", SHAFT_Y))):
         at_lines = {
-            prefix: (budgets[f"{prefix}_transfer_k_{axes}_n_per_m"], budgets[c_name])
+            prefix: (budgets[names[0]], budgets[names[1]])
             for prefix in lines
-            if (c_name := f"{prefix}_transfer_c_{axes}_n_s_per_m") in budgets
+            if (names := ESTIMATORS[TRANSFERS[prefix]].names(axes))[1] in budgets
         }
-        names = {
+        of_line = {
             prefix: {name for name in budgets if name.startswith(prefix) and f"_{axes}_" in name}
             for prefix in lines
         }
@@ -72,9 +74,13 @@ def contradicting(
             if len(at_lines) > 1 and any(
                 itertools.starmap(disagree, zip(*at_lines.values(), strict=True))
             ):
-                doubted = doubted.union(*names.values())
+                doubted = doubted.union(*of_line.values())
             continue
-        of_row = list(_coefficients(row))
+        dynamic = ESTIMATORS[Estimator.DYNAMIC]
+        stiffness_x, damping_x, stiffness_y, damping_y = (
+            name for column in "xy" for name in dynamic.names("xy"[row] + column)
+        )
+        of_row = [stiffness_x, stiffness_y, damping_x, damping_y]
         if not all(name in budgets for name in of_row):
             continue
         for prefix, measured in at_lines.items():
@@ -83,14 +89,8 @@ def contradicting(
             film = [budgets[name] for name in of_row]
             expected = expected_transfer(found, film, row, frequency_hz, across)
             if any(map(disagree, expected, map(_without_cross_coupling, measured))):
-                doubted |= names[prefix] | set(of_row)
+                doubted |= of_line[prefix] | set(of_row)
     return doubted
-
-
-def _coefficients(row: int) -> Iterator[str]:
-    for letter, unit in (("k", "n_per_m"), ("c", "n_s_per_m")):
-        for column in "xy":
-            yield f"dynamic_{letter}_{'xy'[row]}{column}_{unit}"
 
 
 def _without_cross_coupling(budget: Budget) -> Budget:
@@ -136,7 +136,7 @@ def _combined(budgets: Sequence[Budget], factors: FloatArray, covariance: FloatA
         (
             random_line(STATISTICS, random),
             *(
-                replace(lines[0], sensitivity=float(factors @ [line.sensitivity for line in lines]))
+                lines[0]._replace(sensitivity=float(factors @ [line.sensitivity for line in lines]))
                 for lines in systematic
             ),
         ),

@@ -1,4 +1,4 @@
-"""Uncertainty of what is read off single channels: amplitudes, phases, gaps, slow values.
+"""Uncertainty of what is read off single channels and pairs of them, but for stiffnesses.
 
 The random part comes from how far segments or polls differ among themselves.
 """
@@ -7,15 +7,20 @@ import math
 
 import numpy as np
 
-from core.arrays import ComplexArray
+from core.arrays import ComplexArray, FloatArray
 from core.machine.unit import Bearing
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y
-from core.stiffness.stiffness_budget import BEARING_GAIN, RUNOUT
+from core.spectra.speed import Speed
+from core.stiffness.stiffness_budget import BEARING_GAIN, RUNOUT, STATISTICS
 from core.uncertainty import (
     SHAFT_GAIN,
     Budget,
     BudgetLine,
+    Kind,
+    coverage_factor,
     mean_budget,
+    proportional,
+    random_line,
     systematic_line,
 )
 
@@ -63,3 +68,85 @@ def phase_lines(runout_um_pk: float, amplitude_um_pk: float) -> tuple[BudgetLine
     """What stays the same in a phase, deg: runout turns a vector by so much at most."""
     turned = math.asin(min(1.0, runout_um_pk / amplitude_um_pk))
     return (systematic_line(RUNOUT, math.degrees(turned), 1.0),)
+
+
+def coherence_budget(coherence: float, n_segments: float) -> Budget | None:
+    """Uncertainty of a squared coherence (Bendat and Piersol, Random Data, 4th ed., table 9.6).
+
+    Its estimate is skewed, the more so near 0 and 1 and with few segments. That of ``artanh γ`` is
+    close to normal, with variance and bias ``1 / (2 (n - 1))`` (Enochson and Goodman 1965), and the
+    interval is that of γ² from it.
+
+    Parameters
+    ----------
+    n_segments
+        Independent segments.
+
+    Returns
+    -------
+    None for a coherence of exactly 0 or 1, and with fewer than two segments.
+    """
+    if not (0.0 < coherence < 1.0 and n_segments >= 2.0):
+        return None
+    root, variance = math.sqrt(coherence), 0.5 / (n_segments - 1.0)
+    std = 2.0 * root * (1.0 - coherence) * math.sqrt(variance)
+    centre, reach = math.atanh(root) - variance, coverage_factor(()) * math.sqrt(variance)
+    interval = (math.tanh(max(centre - reach, 0.0)) ** 2, math.tanh(centre + reach) ** 2)
+    return Budget(coherence, (random_line(STATISTICS, std),), interval)
+
+
+def roundness_budget(
+    bearing: Bearing, roundness: float, phasors_um_pk: ComplexArray, runout_um_pk: tuple[float, ...]
+) -> Budget | None:
+    """Uncertainty of the roundness of an orbit.
+
+    The random part is the jackknife's, to first order: how far each segment alone would move it.
+
+    Parameters
+    ----------
+    phasors_um_pk : (n, 2)
+        Of u_x and u_y in the segments or polls in which both are usable.
+    runout_um_pk
+        Of u_x and u_y, not taken off.
+    """
+    x, y = phasors_um_pk.T
+    of_each = np.abs(x) ** 2 + np.abs(y) ** 2
+    power = float(of_each.mean()) if of_each.size else 0.0
+    if not power > 0.0:
+        return None
+    moves = (2.0 * (x * y.conj()).imag - roundness * of_each) / power
+    x_share = float(np.mean(np.abs(x) ** 2)) / power
+    gain, left = bearing.accuracy.shaft_gain, max(1.0 - roundness**2, 0.0)
+    across = np.sqrt(np.array([1.0 - x_share, x_share]) * left / power)
+    lines = (
+        systematic_line(SHAFT_GAIN, gain, roundness * (1.0 - 2.0 * x_share)),
+        systematic_line(SHAFT_GAIN, gain, roundness * (2.0 * x_share - 1.0)),
+        *(
+            systematic_line(RUNOUT, r, 2.0 * float(a))
+            for r, a in zip(runout_um_pk, across, strict=True)
+        ),
+    )
+    found = mean_budget(roundness, moves, lines)
+    if found is None:
+        return None
+    low, high = found.interval
+    return Budget(roundness, found.lines, (max(low, -1.0), min(high, 1.0)))
+
+
+def frequency_budget(
+    frequency_hz: float, each_hz: FloatArray, speed: Speed | None
+) -> Budget | None:
+    """Uncertainty of the mean frequency of a line, by its scatter and that of the speed.
+
+    Parameters
+    ----------
+    each_hz : (n,)
+        In each segment or poll.
+    speed
+        The newest, where the frequency follows from it; None where the line itself was found.
+    """
+    own = None
+    if speed is not None and speed.budget is not None:
+        own = proportional(frequency_hz, speed.budget)
+    stays = () if own is None else tuple(li for li in own.lines if li.kind is Kind.SYSTEMATIC)
+    return mean_budget(frequency_hz, each_hz, stays) or own

@@ -14,31 +14,36 @@ import numpy.typing as npt
 from core.arrays import FloatArray
 from core.machine.unit import BracketDynamics
 from core.quality import Reason
-from core.spectra.cross_spectrum import BEARING_X, CrossSpectrum
-from core.spectra.spectral_statistics import (
+from core.spectra.cross_spectrum import (
+    BEARING_X,
     SMEAR_BINS_SQUARED,
+    CrossSpectrum,
     independent_segments,
     phasor_power_per_density,
 )
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.dynamic_lines import (
+    DynamicSettings,
+    between_harmonics,
+    little_leakage,
+    probe_noise_power,
+)
 from core.stiffness.film_covariance import BracketChanges, FilmFit
 from core.stiffness.film_fit import (
+    coherence_segments,
     explained_share,
     lack_of_fit,
     line_weights,
+    normal_equations,
     signal_share,
     smoother,
 )
-from core.stiffness.normal_equations import normal_equations
-from core.stiffness.probe_noise import probe_noise_power
-from core.stiffness.usable_lines import between_harmonics, little_leakage
 
 MAX_INERTIA_SHARE = 0.8
 """Largest mass that is sought takes so much of the bracket's stiffness away at the highest line."""
 
 MAX_MASS_STD = 0.5
 """A mass that is not given must be found to that share of what a bracket may be thought to have;
-else the lines say nothing of it, and a film with it would be a guess."""
+else the lines do not determine it, and a film with it would be a guess."""
 
 
 @dataclass(frozen=True)
@@ -78,8 +83,10 @@ class DynamicStiffness:
     coherence : (2,)
         Multiple coherence of each bearing channel with the shaft's motion through the fitted film,
         over the used lines as they are weighted; 0 to 1.
+    coherence_segments : (2,)
+        Independent segments that would make that of a single line as certain.
     lack_of_fit : (2,)
-        About 1 if the film is as constant over frequency as the model says, else more.
+        About 1 if the film is as constant over frequency as the model assumes, else more.
     frequency_hz : (n_used,)
         The lines that were used.
     probe_noise_um2_per_hz : (2,)
@@ -101,6 +108,7 @@ class DynamicStiffness:
     per_delay: FilmChange
     delay_per_damping: float
     coherence: FloatArray
+    coherence_segments: FloatArray
     lack_of_fit: FloatArray
     frequency_hz: FloatArray
     probe_noise_um2_per_hz: FloatArray
@@ -127,7 +135,7 @@ def dynamic_stiffness(
     settings: DynamicSettings,
     n_integrations: tuple[int, int] = (2, 2),
 ) -> DynamicStiffness | Reason:
-    """Estimate a film's coefficients, or say why that is not possible.
+    """Estimate a film's coefficients, or return the reason why that is not possible.
 
     A bracket whose mass is not known has it fitted with the film, one mass for both directions.
 
@@ -221,9 +229,12 @@ def _used_lines(
     used: npt.NDArray[np.bool_] = (
         _inside(spectrum.frequency_hz, settings.band_hz)
         & between_harmonics(spectrum.frequency_hz, turn_hz, selection.guard_bins)
-        & little_leakage(power[:, :BEARING_X], selection.max_leakage)
         & np.all(power > 0.0, axis=1)
     )
+    inside = np.flatnonzero(used)
+    if inside.size:
+        band = slice(int(inside[0]), int(inside[-1]) + 1)
+        used[band] &= little_leakage(power[:, :BEARING_X], selection.max_leakage, band)
     return used
 
 
@@ -286,6 +297,9 @@ def _result(
         per_delay=per(DELAY),
         delay_per_damping=0.0 if delay is None else float(changes.follow(DAMPING, with_delay)[0]),
         coherence=explained_share(weight, fit.residual, equations.force_power),
+        coherence_segments=coherence_segments(
+            weight, fit.residual, equations.force_power, fit.smoothing, fit.n_segments
+        ),
         lack_of_fit=lack_of_fit(equations, unknowns, weight, fit.n_segments),
         frequency_hz=spectrum.frequency_hz[fit.lines],
         probe_noise_um2_per_hz=equations.noise_power / phasor_power_per_density(bin_hz),

@@ -1,20 +1,71 @@
-"""The estimators of film stiffness by name, and the choice between them."""
+"""The estimators of film stiffness: one table, the check of their signs, and the choice of one."""
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from core.machine.unit import Estimator
 from core.quality import Reading, Reason, missing, worst
 
-STIFFNESS_OF = {
-    Estimator.DYNAMIC: "dynamic_k_{axes}_n_per_m",
-    Estimator.TRANSFER_ORDER1: "order1_transfer_k_{axes}_n_per_m",
-    Estimator.TRANSFER_VORTEX: "vortex_transfer_k_{axes}_n_per_m",
-    Estimator.RATIO_ORDER1: "order1_k_eff_{axes}_n_per_m",
-    Estimator.RATIO_VORTEX: "vortex_k_eff_{axes}_n_per_m",
+
+@dataclass(frozen=True)
+class EstimatorEntry:
+    """What an estimator reports of a direction, as names of quantities with "xx" or "yy" for axes.
+
+    Parameters
+    ----------
+    label
+        Words for people.
+    stiffness, damping, coherence
+        Names with a place for ``{axes}``; `axis` in that of the coherence is "x" or "y". Equation
+        (5) cannot tell stiffness from damping.
+    """
+
+    label: str
+    stiffness: str
+    damping: str | None
+    coherence: str
+
+    def names(self, axes: str) -> tuple[str, ...]:
+        """Stiffness and, where there is one, damping of a direction."""
+        return tuple(
+            name.format(axes=axes) for name in (self.stiffness, self.damping) if name is not None
+        )
+
+
+def _transfer(line: str, words: str) -> EstimatorEntry:
+    return EstimatorEntry(
+        f"transfer, {words}",
+        f"{line}_transfer_k_{{axes}}_n_per_m",
+        f"{line}_transfer_c_{{axes}}_n_s_per_m",
+        f"{line}_coherence_{{axis}}{{axis}}",
+    )
+
+
+def _ratio(line: str, words: str) -> EstimatorEntry:
+    return EstimatorEntry(
+        f"equation (5), {words}",
+        f"{line}_k_eff_{{axes}}_n_per_m",
+        None,
+        f"{line}_coherence_{{axis}}{{axis}}",
+    )
+
+
+ESTIMATORS: Mapping[Estimator, EstimatorEntry] = {
+    Estimator.DYNAMIC: EstimatorEntry(
+        "dynamic",
+        "dynamic_k_{axes}_n_per_m",
+        "dynamic_c_{axes}_n_s_per_m",
+        "dynamic_coherence_{axis}",
+    ),
+    Estimator.TRANSFER_ORDER1: _transfer("order1", "1×"),
+    Estimator.TRANSFER_VORTEX: _transfer("vortex", "vortex"),
+    Estimator.RATIO_ORDER1: _ratio("order1", "1×"),
+    Estimator.RATIO_VORTEX: _ratio("vortex", "vortex"),
 }
 
+TRANSFERS = {"order1": Estimator.TRANSFER_ORDER1, "vortex": Estimator.TRANSFER_VORTEX}
+"""`transfer` by the line that it is read from."""
 
 MODEL_DOUBTS = frozenset({Reason.POOR_FIT, Reason.CHANNEL_DELAY, Reason.ESTIMATORS_DISAGREE})
 """Why a number with little scatter may be wrong."""
@@ -36,9 +87,11 @@ def preferred_stiffness(
 
     Returns
     -------
-    Without any number: why the first choice has none, and no estimator.
+    Without any number: why the first choice that was measured has none, and no estimator.
     """
-    found = [(readings[STIFFNESS_OF[e].format(axes=axes)], e) for e in preference]
+    found = [(readings[ESTIMATORS[e].stiffness.format(axes=axes)], e) for e in preference]
+    measured = [(r, e) for r, e in found if r.quality.reason is not Reason.NOT_MEASURED]
+    found = measured or found
     numbers = [
         (reading, estimator)
         for reading, estimator in found
@@ -50,3 +103,70 @@ def preferred_stiffness(
         doubts = (r.quality for r, _ in before if r.quality.reason in MODEL_DOUBTS)
         return replace(reading, quality=worst((reading.quality, *doubts))), estimator
     return missing(found[0][0].quality.reason), None
+
+
+def signs_checked(readings: Mapping[str, Reading]) -> dict[str, Reading]:
+    """Replace numbers of a reversed sign by the reason `polarity`.
+
+    Direct stiffness and damping of a film are positive. With one transducer of a direction
+    reversed, the ratio of bearing to shaft motion changes its sign, and both come out negative.
+    Amplitudes, and with them equation (5), are not affected.
+
+    A negative direct coefficient of `dynamic` takes out all coefficients of its direction, as it is
+    not known whether the shaft or the bearing transducer is reversed. A negative stiffness of
+    `transfer` takes out its damping, but not the other way round: cross-coupling alone can make the
+    damping that a single line shows negative.
+
+    Parameters
+    ----------
+    readings
+        By quantity.
+    """
+    found, dynamic = dict(readings), ESTIMATORS[Estimator.DYNAMIC]
+    for axes, crossed in (("xx", ("xx", "xy", "yx")), ("yy", ("yy", "yx", "xy"))):
+        if any(_is_negative(readings[name]) for name in dynamic.names(axes)):
+            for other in crossed:
+                _take_out(found, dynamic.names(other))
+        for estimator in TRANSFERS.values():
+            stiffness, damping = ESTIMATORS[estimator].names(axes)
+            if _is_negative(readings[stiffness]):
+                _take_out(found, (stiffness, damping))
+            elif _is_negative(readings[damping]):
+                _take_out(found, (damping,))
+    return found
+
+
+def is_reversed(readings: Mapping[str, Reading], axes: str) -> bool | None:
+    """Whether a transducer of a direction is reversed, by the best estimator that has a result.
+
+    Parameters
+    ----------
+    readings
+        From :func:`signs_checked`.
+    axes
+        "xx" or "yy".
+
+    Returns
+    -------
+    None if no estimator has a result.
+    """
+    for estimator in (Estimator.DYNAMIC, Estimator.TRANSFER_VORTEX, Estimator.TRANSFER_ORDER1):
+        reading = readings.get(ESTIMATORS[estimator].stiffness.format(axes=axes))
+        if reading is not None and reading.quality.reason is Reason.POLARITY:
+            return True
+        if reading is not None and reading.value is not None:
+            return False
+    return None
+
+
+def _is_negative(reading: Reading) -> bool:
+    """Whether a value is below zero by more than its uncertainty."""
+    if reading.value is None:
+        return False
+    return (reading.value if reading.interval_95 is None else reading.interval_95[1]) < 0.0
+
+
+def _take_out(readings: dict[str, Reading], names: tuple[str, ...]) -> None:
+    for name in names:
+        if readings[name].value is not None:
+            readings[name] = missing(Reason.POLARITY)

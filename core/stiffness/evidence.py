@@ -29,8 +29,6 @@ class EvidenceSettings(SegmentSettings):
 
     Parameters
     ----------
-    min_segments
-        Below this number of segments a result is marked uncertain.
     min_coherence
         Squared coherence of shaft and bearing motion below which there is no stiffness. At 0.9, a
         bearing line that is noise to the rest makes equation (5) read 5 % high.
@@ -38,7 +36,6 @@ class EvidenceSettings(SegmentSettings):
         Share of the wanted segments below which a result is marked uncertain.
     """
 
-    min_segments: int = 4
     min_coherence: float = 0.9
     min_coverage: float = 0.5
 
@@ -77,7 +74,7 @@ class LineLimits:
 def line_excitation(
     spectrum: CrossSpectrum, line: int, shaft: int, bearing: int, limits: LineLimits
 ) -> Reason:
-    """Say whether `ratio` and `transfer` may speak at a line, and if not, why.
+    """Whether a line carries enough motion for `ratio` and `transfer`, else the reason.
 
     Returns
     -------
@@ -87,5 +84,5 @@ def line_excitation(
         return Reason.FEW_SEGMENTS  # one segment is coherent with anything
     shaft_um_pk = float(spectrum.amplitude_um_pk(shaft)[line])
     hidden = limits.runout_um_pk > limits.max_runout_share * shaft_um_pk
-    incoherent = float(spectrum.coherence(shaft, bearing)[line]) < limits.min_coherence
+    incoherent = spectrum.coherence_at(line, shaft, bearing) < limits.min_coherence
     return Reason.INSUFFICIENT_EXCITATION if hidden or incoherent else Reason.OK

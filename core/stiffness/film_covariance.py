@@ -1,10 +1,10 @@
-"""Random errors of a fitted film, and what its residual says of the bracket and of delays.
+"""Random errors of a fitted film, and what its residual shows of the bracket and of delays.
 
 Every estimate here is linear in ``Σ_lines w Σ_segments conj(f u) e``: e is the force that the fit
 leaves over, f u a linear form of the shaft's motion, its influence on the estimate.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,14 +12,28 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
-from core.spectra.spectral_statistics import (
+from core.spectra.cross_spectrum import (
     SMEARED_APART,
     SMEARED_IN_PHASE,
     SMEARED_IN_QUADRATURE,
     WHITE_PRODUCTS,
     correlated_sum,
 )
-from core.stiffness.normal_equations import NormalEquations
+from core.stiffness.film_fit import NormalEquations
+
+_NONE = (0.0, 0.0, 0.0)
+
+PART_PRODUCTS: FloatArray = np.array(
+    [
+        *[WHITE_PRODUCTS] * 4,  # residual with the shaft's motion
+        SMEARED_IN_PHASE,
+        SMEARED_IN_QUADRATURE,
+        *[SMEARED_APART] * 4,
+        WHITE_PRODUCTS,  # the probes' noise in both
+        _NONE,
+    ]
+).T
+"""Correlation of real and imaginary parts of `FilmFit._parts` 0, 1 and 2 bins apart, (3, 12)."""
 
 
 @dataclass(frozen=True)
@@ -74,69 +88,70 @@ class FilmFit:
         return squared
 
     @cached_property
-    def own_influences(self) -> Mapping[int, ComplexArray]:
-        """Influence of the shaft's motion on the unknowns of each row, (n_lines, 4, 2)."""
+    def own_influences(self) -> ComplexArray:
+        """Influence of the shaft's motion on the unknowns of each row, (2, n_lines, 4, 2)."""
         inverse = self.equations.inverse(self.weight)
-        return {row: part @ self.equations.regressors for row, part in enumerate(inverse)}
+        own: ComplexArray = inverse[:, np.newaxis] @ self.equations.regressors
+        return own
 
     def covariance(self) -> FloatArray:
         """Covariance of the unknowns of each row, (2, 4, 4)."""
-        return np.array([self.spread({row: own}) for row, own in self.own_influences.items()])
+        return self._spread(self.own_influences[:, np.newaxis], np.array([[0], [1]]))
 
-    def spread(self, influences: Mapping[int, ComplexArray]) -> FloatArray:
-        """Covariance of estimates by their influences, (n, n).
+    def spread(self, influences: ComplexArray) -> FloatArray:
+        """Covariance of groups of n estimates by their influences, (n_groups, n, n).
 
         Parameters
         ----------
-        influences
-            (n_lines, n, 2) of the shaft's motion on the estimates through a row's residual, by row.
+        influences : (n_groups, 2, n_lines, n, 2)
+            Of the shaft's motion on the estimates, through the residual of each row.
         """
-        rows = influences.items()
-        slope = np.sum([self._floor_slope(influence, row) for row, influence in rows], axis=0)
+        return self._spread(influences, np.array([[0, 1]]))
+
+    def _spread(self, influences: ComplexArray, rows: npt.NDArray[np.int64]) -> FloatArray:
+        """The same through the residuals of some rows, (n_groups or 1, n_rows)."""
+        parts = (influences @ self._parts[rows]).view(np.float64)
+        of_rows = correlated_sum(parts, self.lines, PART_PRODUCTS).sum(axis=1)
+        weighted = (self.weight[..., np.newaxis] * self.film).transpose(1, 0, 2)[rows]
+        # per unit of noise power
+        slope = (influences.conj() * weighted[..., np.newaxis, :]).real.sum(axis=(1, 2))
         slope = slope * self.equations.noise_power * self.floor_std
-        of_rows = np.sum([self._spread_of_row(influence, row) for row, influence in rows], axis=0)
-        covariance: FloatArray = of_rows + slope @ slope.T
+        # real part of conj(x) e with circular e: half of its power (Bendat and Piersol, 9.2)
+        covariance: FloatArray = of_rows / (2.0 * self.n_segments)
+        covariance += slope @ slope.transpose(0, 2, 1)
         return covariance
 
-    def _spread_of_row(self, influence: ComplexArray, row: int) -> FloatArray:
-        weight = self.weight[:, row]
-        smear = self._smoothed(self.equations.force_power[:, row]) * self.smear_share[:, row]
+    @cached_property
+    def _parts(self) -> ComplexArray:
+        """Independent parts of the errors per influence, (2, n_lines, 2, 6).
+
+        What integration leaves of neighbouring lines cancels in the part of an influence that is in
+        phase with a row's force, whatever chance makes of the size of each: powers are smooth.
+        """
+        weight, film = self.weight.T[..., None, None], self.film.transpose(1, 0, 2)[..., None, :]
+        smear = (self._smoothed(self.equations.force_power) * self.smear_share).T[..., None, None]
         smeared = np.minimum(weight * smear, 1.0)  # of the smooth residual, one over the weight
-        rest = weight**2 * self.residual[:, row] * (1.0 - smeared)
-        motion = influence @ self._root
-        spread = correlated_sum(_sized(motion, rest), self.lines, WHITE_PRODUCTS)
-        for terms, products in self._smeared_terms(influence, row):
-            spread += correlated_sum(_sized(terms, weight * smeared), self.lines, products)
+        rest = weight**2 * self.residual.T[..., None, None] * (1.0 - smeared)
+        shaft, across = self.equations.shaft, film.conj().swapaxes(-1, -2)
+        force = (film @ shaft @ across).real
+        shared = shaft @ across / force
+        size = np.sqrt(self._smoothed(force[:, :, 0, 0].T).T)[..., None, None]
         # The residual holds the probes' noise as the shaft's motion does, and so with one phase:
         # E[x*e x*e] is not 0 as for independent signals (Isserlis 1918). What that takes off some
         # coefficients is left in.
-        noise = self.equations.noise_power * self.film[:, row]
-        common = weight[:, np.newaxis, np.newaxis] * (influence.conj() @ noise[:, :, np.newaxis])
-        spread += correlated_sum(common.real, self.lines, WHITE_PRODUCTS)
-        # real part of conj(x) e with circular e: half of its power (Bendat and Piersol, 9.2)
-        return spread / (2.0 * self.n_segments)
+        noise = self.equations.noise_power[:, np.newaxis]
+        parts = (
+            np.sqrt(rest) * self._root,
+            np.sqrt(weight * smeared) * size * shared,
+            np.sqrt(weight * smeared) * ((np.eye(2) - shared @ film) @ self._smooth_root),
+            weight * noise * across,
+        )
+        return np.concatenate(parts, axis=-1)
 
     def _smoothed(self, power: FloatArray) -> FloatArray:
         """Straight lines through the logarithm, along the first axis."""
         smooth: FloatArray = np.exp(self.smoothing @ np.log(power))
         return smooth
-
-    def _smeared_terms(
-        self, influence: ComplexArray, row: int
-    ) -> Iterator[tuple[FloatArray | ComplexArray, tuple[float, ...]]]:
-        """Parts of an influence in phase, in quadrature and not coherent with a row's force.
-
-        What integration leaves of neighbouring lines cancels in the first, whatever chance makes
-        of the size of each: powers are smooth.
-        """
-        shaft, film = self.equations.shaft, self.film[:, row]
-        force = (film[:, np.newaxis] @ shaft @ film.conj()[:, :, np.newaxis])[:, 0, 0].real
-        shared = (influence @ shaft @ film.conj()[:, :, np.newaxis]) / force[:, None, None]
-        size = np.sqrt(self._smoothed(force))[:, np.newaxis, np.newaxis]
-        yield shared.real * size, SMEARED_IN_PHASE
-        yield shared.imag * size, SMEARED_IN_QUADRATURE
-        apart = influence - shared * film[:, np.newaxis]
-        yield apart @ self._smooth_root, SMEARED_APART
 
     @cached_property
     def _smooth_root(self) -> ComplexArray:
@@ -144,17 +159,6 @@ class FilmFit:
         power = np.diagonal(self.equations.shaft, axis1=1, axis2=2).real
         scale: ComplexArray = np.sqrt(self._smoothed(power) / power)[:, :, np.newaxis] * self._root
         return scale
-
-    def _floor_slope(self, influence: ComplexArray, row: int) -> FloatArray:
-        """Change of the estimates per unit of each probe's noise power, (n, 2)."""
-        slope: FloatArray = np.einsum(
-            "l,laj,lj->aj", self.weight[:, row], influence.conj(), self.film[:, row]
-        ).real
-        return slope
-
-
-def _sized(terms: FloatArray | ComplexArray, power: FloatArray) -> FloatArray | ComplexArray:
-    return np.sqrt(power)[:, np.newaxis, np.newaxis] * terms
 
 
 @dataclass(frozen=True)
@@ -176,8 +180,9 @@ class BracketChanges:
     @cached_property
     def per(self) -> FloatArray:
         """Change of the film's unknowns with each, (n, 2, 4)."""
-        solve, moment = self.fit.equations.solve, self.fit.equations.moment
-        return np.array([solve(self.fit.weight, moment(change)) for change in self.stiffnesses])
+        equations = self.fit.equations
+        moments = np.array([equations.moment(change) for change in self.stiffnesses])
+        return equations.solve(self.fit.weight, moments)
 
     @cached_property
     def _left(self) -> ComplexArray:
@@ -207,7 +212,7 @@ class BracketChanges:
         return np.asarray(-step, dtype=np.float64)
 
     def estimate(self, fitted: Sequence[int]) -> "BracketEstimate | None":
-        """Estimate some of them together, the others as they are; None if they cannot be told."""
+        """Estimate some together, the others as they are; None if they cannot be separated."""
         information = self._information[np.ix_(fitted, fitted)]
         if not np.all(np.linalg.eigvalsh(information) > 0.0):
             return None
@@ -218,11 +223,9 @@ class BracketChanges:
         left = self._left[:, fitted]
         score = np.einsum("lr,lprj,lrj->p", self.fit.weight, left.conj(), common).real
         inverse = np.linalg.inv(information)
-        through = -np.einsum("pq,lqrj->rlpj", inverse, left)
-        influences = dict(enumerate(through))
-        return BracketEstimate(
-            -inverse @ score, self.fit.spread(influences), self.per[fitted], influences
-        )
+        influences: ComplexArray = -(inverse @ left.transpose(2, 0, 1, 3))
+        [covariance] = self.fit.spread(influences[np.newaxis])
+        return BracketEstimate(-inverse @ score, covariance, self.per[fitted], influences)
 
 
 @dataclass(frozen=True)
@@ -234,14 +237,14 @@ class BracketEstimate:
     value, covariance : (n,), (n, n)
     per : (n, 2, 4)
         Change of the film's unknowns with each.
-    influences
-        Of the shaft's motion on the values, by row of the film: (n_lines, n, 2).
+    influences : (2, n_lines, n, 2)
+        Of the shaft's motion on the values, through the residual of each row.
     """
 
     value: FloatArray
     covariance: FloatArray
     per: FloatArray
-    influences: Mapping[int, ComplexArray]
+    influences: ComplexArray
 
     @property
     def std(self) -> FloatArray:
@@ -251,13 +254,7 @@ class BracketEstimate:
 
     def with_film(self, fit: FilmFit) -> FloatArray:
         """Covariance of the film's unknowns if these are fitted with them, (2, 4, 4)."""
-        own = fit.own_influences
-        covariances = []
-        for row in own:
-            through = {
-                other: np.einsum("pa,lpj->laj", self.per[:, row], influence)
-                for other, influence in self.influences.items()
-            }
-            through[row] += own[row]
-            covariances.append(fit.spread(through))
-        return np.array(covariances)
+        through = self.per.transpose(1, 2, 0)[:, np.newaxis, np.newaxis] @ self.influences
+        for row in (0, 1):
+            through[row, row] += fit.own_influences[row]
+        return fit.spread(through)

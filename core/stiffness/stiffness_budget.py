@@ -4,12 +4,21 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
+from core.arrays import FloatArray
 from core.machine.unit import BearingAccuracy, BracketDynamics
 from core.spectra.cross_spectrum import CrossSpectrum
 from core.stiffness.dynamic import DynamicStiffness
 from core.stiffness.transfer import LineTransfer, motion_across
-from core.uncertainty import SHAFT_GAIN, Budget, BudgetLine, random_line, systematic_line
+from core.uncertainty import (
+    SHAFT_GAIN,
+    Budget,
+    BudgetLine,
+    effective_number,
+    random_line,
+    systematic_line,
+)
 
 STATISTICS = "spectral statistics"
 BEARING_GAIN = "gain of bearing transducer"
@@ -19,6 +28,8 @@ DAMPING = "bracket damping"
 CROSS_COUPLING = "cross-coupling not known"
 DELAY = "delay between channels"
 RUNOUT = "runout"
+SPREAD = "spread of polls"
+COHERENCE = "coherence not known"
 
 RESOLUTION = 0.001
 """Half-width, relative to a row's direct coefficient, of what tapering does to `dynamic`: a line
@@ -63,31 +74,109 @@ def ratio_budget(
     None without shaft motion, coherence or a second segment.
     """
     counted = float(spectrum.n_segments[shaft, bearing]) if n_segments is None else n_segments
-    coherence = float(spectrum.coherence(shaft, bearing)[line])
+    coherence = spectrum.coherence_at(line, shaft, bearing)
     if coherence <= 0.0 or counted < 2.0:
         return None
     value = float(spectrum.amplitude_ratio(bearing, shaft)[line]) * bracket.stiffness_n_per_m
-    shaft_um_pk = float(spectrum.amplitude_um_pk(shaft)[line])
-    omega = 2.0 * math.pi * float(spectrum.frequency_hz[line])
     # two powers of n segments, correlated by γ²: Bendat and Piersol, 9.1
     random = value * math.sqrt((1.0 - coherence) / (2.0 * (counted - 1.0)))
-    inertia = bracket.max_mass_kg * omega**2 / bracket.stiffness_n_per_m
-    return Budget(
+    lines = _ratio_lines(
         value,
-        (
-            random_line(STATISTICS, random, 2.0 * (counted - 1.0)),
-            *_gains(value, accuracy),
-            systematic_line(BRACKET, accuracy.bracket_stiffness, value),
-            systematic_line(
-                CROSS_COUPLING,
-                accuracy.cross_coupling,
-                value * abs(motion_across(spectrum, line, shaft)),
-            ),
-            systematic_line("incoherent motion", 1.0 / math.sqrt(coherence) - 1.0, value),
-            systematic_line("bracket inertia left out", inertia, value),
-            systematic_line(RUNOUT, runout_um_pk, value / shaft_um_pk),
-        ),
+        float(spectrum.frequency_hz[line]),
+        bracket,
+        accuracy,
+        (runout_um_pk, float(spectrum.amplitude_um_pk(shaft)[line])),
+        abs(motion_across(spectrum, line, shaft)),
+        ("incoherent motion", coherence),
     )
+    return Budget(value, (random_line(STATISTICS, random, 2.0 * (counted - 1.0)), *lines))
+
+
+def polls_ratio_budget(
+    shaft_um_pk: FloatArray,
+    bearing_um_pk: FloatArray,
+    frequency_hz: float,
+    bracket: BracketDynamics,
+    accuracy: BearingAccuracy,
+    coherence: float,
+    runout_um_pk: float = 0.0,
+    across: float = 1.0,
+) -> Budget | None:
+    """Uncertainty of equation (5) over the polls of a rack.
+
+    A rack may be asked more often than it measures, or average for longer than a poll period: the
+    spread of the polls is divided by their effective number.
+
+    Parameters
+    ----------
+    shaft_um_pk, bearing_um_pk : (n_polls,)
+        Amplitudes of the same polls; shaft amplitudes above zero.
+    coherence
+        Squared, of the two; without phases the least that would be accepted of waveforms.
+    runout_um_pk
+        Largest runout at this line, not taken off.
+    across
+        Shaft amplitude across this direction over that along it.
+
+    Returns
+    -------
+    None with fewer than two independent polls.
+    """
+    independent = n_effective(shaft_um_pk, bearing_um_pk)
+    if independent < 2.0:
+        return None
+    shaft = float(np.sqrt(np.mean(shaft_um_pk**2)))
+    value = float(np.sqrt(np.mean(bearing_um_pk**2))) / shaft * bracket.stiffness_n_per_m
+    each = bearing_um_pk / shaft_um_pk * bracket.stiffness_n_per_m
+    random = float(np.std(each, ddof=1)) / math.sqrt(independent)
+    known = (COHERENCE, coherence)
+    lines = _ratio_lines(
+        value, frequency_hz, bracket, accuracy, (runout_um_pk, shaft), across, known
+    )
+    return Budget(value, (random_line(SPREAD, random, independent - 1.0), *lines))
+
+
+def _ratio_lines(
+    value: float,
+    frequency_hz: float,
+    bracket: BracketDynamics,
+    accuracy: BearingAccuracy,
+    runout_of_um_pk: tuple[float, float],
+    across: float,
+    coherence: tuple[str, float],
+) -> tuple[BudgetLine, ...]:
+    """Systematic contributions to equation (5); runout and shaft motion, name and coherence."""
+    runout_um_pk, shaft_um_pk = runout_of_um_pk
+    inertia = bracket.max_mass_kg * (2.0 * math.pi * frequency_hz) ** 2 / bracket.stiffness_n_per_m
+    return (
+        *_gains(value, accuracy),
+        systematic_line(BRACKET, accuracy.bracket_stiffness, value),
+        systematic_line(CROSS_COUPLING, accuracy.cross_coupling, value * across),
+        systematic_line(coherence[0], 1.0 / math.sqrt(coherence[1]) - 1.0, value),
+        systematic_line("bracket inertia left out", inertia, value),
+        systematic_line(RUNOUT, runout_um_pk, value / shaft_um_pk),
+    )
+
+
+def n_changed(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> int:
+    """Polls in which at least one of two amplitudes differs from the poll before."""
+    return int(np.count_nonzero(_changed(shaft_um_pk, bearing_um_pk)))
+
+
+def n_effective(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> float:
+    """Number of independent polls with as much information, at least 2 of 2 or more.
+
+    A rack averages, perhaps for longer than a poll period: neighbouring polls then share much of
+    what they show.
+    """
+    changed = _changed(shaft_um_pk, bearing_um_pk)
+    return effective_number(bearing_um_pk[changed] / shaft_um_pk[changed])
+
+
+def _changed(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> npt.NDArray[np.bool_]:
+    changed = np.ones(shaft_um_pk.size, dtype=np.bool_)
+    changed[1:] = (np.diff(shaft_um_pk) != 0.0) | (np.diff(bearing_um_pk) != 0.0)
+    return changed
 
 
 def mass_half_width_kg(bracket: BracketDynamics, accuracy: BearingAccuracy) -> float:

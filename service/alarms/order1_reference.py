@@ -4,7 +4,7 @@ from core.alarms.judgements import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import Level, Reading, Reason
-from core.stiffness.line_results import AMPLITUDES
+from core.stiffness.order_line import AMPLITUDES
 
 NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMENTS)
 """Doubts with which an amplitude is no reference."""

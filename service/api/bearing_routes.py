@@ -9,7 +9,7 @@ from pydantic import BeforeValidator
 
 from core.monitor.catalogue import BY_NAME
 from core.samples.account import Gap
-from core.stiffness.estimators import STIFFNESS_OF
+from core.stiffness.estimators import ESTIMATORS
 from core.units import ns_from_s
 from service.api.access.declared import needs
 from service.api.bearing_models import BearingModel
@@ -196,7 +196,7 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
     if quantity.startswith("stiffness_"):
         axes = quantity.split("_")[1]
         estimator = assessment.estimators[axes]
-        source = STIFFNESS_OF[estimator].format(axes=axes) if estimator else quantity
+        source = ESTIMATORS[estimator].stiffness.format(axes=axes) if estimator else quantity
     budget = assessment.budgets.get(source)
     return None if budget is None else budget_model(quantity, assessment.time_ns, budget)
 

@@ -4,7 +4,7 @@ from core.monitor.assessment import Assessment, AveragingWindow, OrbitTrace
 from core.monitor.catalogue import BY_NAME
 from core.quality import Level, Quality, Reading
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
-from core.stiffness.line_results import marked_hz
+from core.stiffness.order_line import marked_hz
 from core.uncertainty import Budget
 from service.api.budget_models import BudgetLineModel, BudgetModel
 from service.api.models import (

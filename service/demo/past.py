@@ -14,7 +14,7 @@ from core.change.decision import WatchedReadings
 from core.change.settings import FilmRules
 from core.change.shaft_response import learn_response
 from core.machine.unit import Estimator
-from core.stiffness.estimators import STIFFNESS_OF
+from core.stiffness.estimators import ESTIMATORS
 from service.films.rules import film_rules_of
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.plant import PlantFile
@@ -154,7 +154,7 @@ def _trends(history: StiffnessHistory, estimator: Estimator) -> dict[str, FloatA
     }
     for row, direction in enumerate(DIRECTIONS):
         k_n_per_m = np.exp(history.ln_k[row])
-        for name in ("stiffness_{axes}_n_per_m", STIFFNESS_OF[estimator]):
+        for name in ("stiffness_{axes}_n_per_m", ESTIMATORS[estimator].stiffness):
             columns[name.format(axes=direction * 2)] = k_n_per_m
         columns[f"order1_shaft_{direction}_um_pk"] = history.shaft_um_pk[row]
         columns[f"order1_bearing_{direction}_um_pk"] = history.bearing_um_pk[row]

@@ -11,7 +11,7 @@ from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment, AveragingWindow
 from core.monitor.catalogue import BY_NAME
 from core.quality import Level, Reading
-from core.stiffness.estimators import STIFFNESS_OF
+from core.stiffness.estimators import ESTIMATORS
 from core.uncertainty import Budget
 from service.api.alarm_views import LEVEL_NAMES
 from service.api.times import rfc3339
@@ -30,15 +30,6 @@ from service.evidence.bearing_part import (
     WindowPart,
 )
 from service.evidence.part import finite
-
-COHERENCE_OF = {
-    Estimator.DYNAMIC: "dynamic_coherence_{direction}",
-    Estimator.TRANSFER_ORDER1: "order1_coherence_{direction}{direction}",
-    Estimator.RATIO_ORDER1: "order1_coherence_{direction}{direction}",
-    Estimator.TRANSFER_VORTEX: "vortex_coherence_{direction}{direction}",
-    Estimator.RATIO_VORTEX: "vortex_coherence_{direction}{direction}",
-}
-"""What each estimator stands on."""
 
 LEVEL_WORDS: dict[Level, QualityWord] = {
     Level.GOOD: "good",
@@ -87,10 +78,10 @@ def cell_bounds(cell: Cell | None, grid: CellGrid | None) -> list[tuple[float, f
 
 
 def _estimators(found: Assessment, watched: Estimator | None) -> Iterator[EstimatorPart]:
-    for estimator, pattern in STIFFNESS_OF.items():
+    for estimator, entry in ESTIMATORS.items():
         for direction in AXES:
-            name = pattern.format(axes=direction * 2)
-            coherence = found.readings[COHERENCE_OF[estimator].format(direction=direction)]
+            name = entry.stiffness.format(axes=direction * 2)
+            coherence = found.readings[entry.coherence.format(axis=direction)]
             yield EstimatorPart(
                 estimator=estimator.value,
                 direction=direction,

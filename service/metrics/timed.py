@@ -3,75 +3,38 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
-from core.monitor.monitor_port import Monitor
-from core.monitor.monitor_state import MonitorState
-from core.samples.account import Gap, SampleAccount
+from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from core.samples.outage import Reach
 from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
 from service.roles.watched_unit import WatchedUnit
 
 
-class TimedMonitor:
-    """A monitor that notes what its results take."""
+class TimedMonitor(UnitMonitor):
+    """A monitor whose results are timed.
 
-    def __init__(self, monitor: Monitor, timings: Timings) -> None:
-        self._monitor, self._timings = monitor, timings
-        self.unit: Unit = monitor.unit
+    Parameters
+    ----------
+    monitor
+        Taken over with all its state; it must not be used apart from this one.
+    """
 
-    @property
-    def account(self) -> SampleAccount:
-        """Where every sample went that the unit's device offered."""
-        return self._monitor.account
-
-    def adopt(self, unit: Unit) -> None:
-        """Take a new description of the same unit; raises as the monitor does."""
-        self._monitor.adopt(unit)
-        self.unit = unit
-
-    def go_on(self, reach: Reach | None) -> None:
-        """Go on after a stop, before the first block."""
-        self._monitor.go_on(reach)
-
-    @property
-    def state(self) -> MonitorState:
-        """What must be known beside its newest samples."""
-        return self._monitor.state
-
-    def rewind(self, state: MonitorState) -> None:
-        """Expect samples once more."""
-        self._monitor.rewind(state)
-
-    def settle(self, state: MonitorState) -> None:
-        """Be as another one was."""
-        self._monitor.settle(state)
-
-    def drain_gaps(self) -> list[Gap]:
-        """Hand over the gaps found since the last call, to be recorded."""
-        return self._monitor.drain_gaps()
-
-    def require(self, block: SampleBlock) -> None:
-        """Refuse a block that does not fit; raises as the monitor does."""
-        self._monitor.require(block)
+    def __init__(self, monitor: UnitMonitor, timings: Timings) -> None:
+        vars(self).update(vars(monitor))
+        self._timings = timings
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
         """Take a block in, one bearing at a time; raises as the monitor does."""
-        steps = self._monitor.steps(block)
+        steps = super().steps(block)
         began_s = self._timings.begin()
         for assessment in steps:
             self._timings.assessed(block.unit, began_s)
             yield assessment
             began_s = self._timings.begin()
 
-    def ingest(self, block: SampleBlock) -> list[Assessment]:
-        """Take a block in and return what has been learnt by it; raises as the monitor does."""
-        return list(self.steps(block))
 
-
-def timed_monitors(monitors: Mapping[str, Monitor], timings: Timings) -> dict[str, Monitor]:
+def timed_monitors(monitors: Mapping[str, UnitMonitor], timings: Timings) -> dict[str, UnitMonitor]:
     """The same monitors, timed."""
     return {unit: TimedMonitor(monitor, timings) for unit, monitor in monitors.items()}
 

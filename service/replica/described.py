@@ -9,6 +9,6 @@ class Described:
     def __init__(self, unit: Unit) -> None:
         self.unit = unit
 
-    def adopt(self, unit: Unit) -> None:
+    def replace_description(self, unit: Unit) -> None:
         """Take a new description of the same unit."""
         self.unit = unit

@@ -11,9 +11,10 @@ from core.change.film_judge import FilmFinding
 from core.change.film_reading import FilmReading
 from core.condition.cells import BearingCondition
 from core.machine.unit import Estimator
-from core.monitor.assessment import AveragingWindow, Evidence
+from core.monitor.assessment import AveragingWindow
 from core.quality import Quality, Reading
 from core.spectra.runout import RunoutVerdict
+from core.spectra.segments import Evidence
 from core.spectra.speed import SpeedSource
 from core.uncertainty import Budget
 from service.live import UnitStatus

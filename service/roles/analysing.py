@@ -3,8 +3,7 @@
 import asyncio
 from collections.abc import Mapping
 
-from core.monitor.monitor_port import Monitor
-from core.monitor.monitor_state import MonitorState
+from core.monitor.monitor import MonitorState, UnitMonitor
 from core.samples.account import SampleAccount
 from core.samples.blocks import SampleBlock
 from core.samples.counts import Counts
@@ -30,7 +29,7 @@ class Analyser:
 
     def __init__(
         self,
-        monitors: Mapping[str, Monitor],
+        monitors: Mapping[str, UnitMonitor],
         live: LiveView,
         recorder: Recorder,
         alarms: AlarmEngine,

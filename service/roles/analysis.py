@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from core.monitor.monitor_port import Monitor
+from core.monitor.monitor import UnitMonitor
 from service.alarms.engine import AlarmEngine
 from service.alarms.health import StreamLook, health_of
 from service.alarms.start import alarm_engine
@@ -114,7 +114,7 @@ class Analysis:
 
 async def analysis_on(
     ground: Ground,
-    monitors: Mapping[str, Monitor],
+    monitors: Mapping[str, UnitMonitor],
     bus: Bus,
     around: Around,
     part: PlantPart = WHOLE,

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from core.alarms.board import AlarmMemory
 from core.change.film_judge import FilmMemory
-from core.monitor.monitor_state import MonitorState
+from core.monitor.monitor import MonitorState
 from core.samples.counts import Count
 
 VERSION = 1

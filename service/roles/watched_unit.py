@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from acquisition.source import SampleSource
-from core.monitor.monitor_port import Monitor
+from core.monitor.monitor import UnitMonitor
 
 
 @dataclass(frozen=True)
@@ -18,5 +18,5 @@ class WatchedUnit:
     """
 
     source: SampleSource
-    monitor: Monitor
+    monitor: UnitMonitor
     retry_s: float = 0.5

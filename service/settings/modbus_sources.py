@@ -9,8 +9,7 @@ from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 from acquisition.modbus.cells import MapError
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.modbus.register_map import RegisterMap
-from core.spectra.vector_rows import VectorPart, VectorRow
-from core.spectra.vector_settings import VectorSettings
+from core.spectra.polls import PollSettings, VectorPart, VectorRow
 from service.settings.base import MisfitError
 from service.settings.map_file import load_map_file
 from service.settings.modbus_link import ModbusLinkSettings
@@ -162,9 +161,9 @@ class ModbusVectorSettings(MappedDeviceSettings):
         return self
 
     @property
-    def averaging(self) -> VectorSettings:
+    def averaging(self) -> PollSettings:
         """Which polls make a result."""
-        return VectorSettings(self.n_polls, self.hop_polls, self.min_polls)
+        return PollSettings(self.n_polls, self.hop_polls, self.min_polls)
 
     def require_fit(self, channels: Sequence[str], slow: Sequence[str]) -> None:
         """Refuse a map without the 1× amplitude of every channel.

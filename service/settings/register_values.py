@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from acquisition.modbus.cells import ByteOrder, NumberType
 from acquisition.modbus.register_map import Meaning
-from core.spectra.vector_rows import AMPLITUDE_PARTS, VectorPart, VectorRow
+from core.spectra.polls import AMPLITUDE_PARTS, VectorPart, VectorRow
 from service.settings.base import Identifier, MisfitError, Settings
 
 Function = Literal[1, 2, 3, 4]

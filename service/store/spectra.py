@@ -9,7 +9,7 @@ from core.arrays import FloatArray
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import Level, Quality, Reason, worst
-from core.stiffness.line_results import marked_hz
+from core.stiffness.order_line import marked_hz
 from service.store.database import Connect, Connection
 from service.store.series import series_of
 from service.store.spectra_codec import checksum, decode, encode

@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass
 
-from core.monitor.monitor_state import MonitorState
+from core.monitor.monitor import MonitorState
 from core.samples.blocks import SampleBlock
 
 

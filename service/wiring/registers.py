@@ -10,8 +10,9 @@ from acquisition.modbus.polled_source import PolledSettings, PolledSource, vecto
 from acquisition.modbus.slow_values import PolledSlowValues
 from acquisition.source import SampleSource
 from core.machine.unit import Unit
+from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
-from core.monitor.vector_monitor import VectorMonitor
+from core.spectra.polls import PollTransform
 from service.settings.modbus_sources import (
     MappedDeviceSettings,
     ModbusFifoSettings,
@@ -61,9 +62,11 @@ def vector_source(
 
 def vector_monitor(
     source: ModbusVectorSettings, unit: Unit, settings: AnalysisSettings
-) -> VectorMonitor:
+) -> UnitMonitor:
     """The monitor of a unit with a vector rack."""
-    return VectorMonitor(at_poll_rate(source, unit), source.rows, settings, source.averaging)
+    unit = at_poll_rate(source, unit)
+    transform = PollTransform(unit, source.rows, settings, source.averaging)
+    return UnitMonitor(unit, settings, transform)
 
 
 def fifo_source(

@@ -10,7 +10,6 @@ from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.simulated.plant.source import SimulatedSource
 from acquisition.source import SampleSource
 from core.monitor.monitor import UnitMonitor
-from core.monitor.monitor_port import Monitor
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.metrics.polls import TimedSource
 from service.roles.watched_unit import WatchedUnit
@@ -48,7 +47,7 @@ def watched_units(
     }
 
 
-def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> Monitor:
+def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
     """What the samples of a unit are analysed by: its rack may give vectors instead of them."""
     machine, settings, source = machine_of(unit), analysis_of(analysis), unit.source
     match source:

@@ -13,14 +13,14 @@ from core.condition.operating_state import OperatingLimits
 from core.limits import Limits
 from core.machine.response import ResponseTable
 from core.machine.unit import BearingAccuracy, BracketDynamics
-from core.spectra.vector_settings import VectorSettings
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.spectra.polls import PollSettings
+from core.stiffness.dynamic_lines import DynamicSettings
 from core.stiffness.evidence import LineLimits
 
 Operating = partial(OperatingLimits, rated_speed_rpm=92.3)
 PAIR, ZEROS = (1.0, 2.0), (0.0, 0.0)
 Sheet = partial(ResponseTable, frequency_hz=PAIR, magnitude=PAIR, phase_deg=ZEROS)
-Vector = partial(VectorSettings, n_polls=60)
+Vector = partial(PollSettings, n_polls=60)
 SHARES = tuple(vars(BearingAccuracy()))
 
 

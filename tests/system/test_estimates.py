@@ -18,8 +18,7 @@ from core.monitor.assessment import Assessment
 from core.monitor.catalogue import BY_NAME
 from core.monitor.monitor import UnitMonitor
 from core.quality import Level, Reason, bad, missing
-from core.stiffness.estimators import STIFFNESS_OF
-from core.stiffness.polarity import is_reversed
+from core.stiffness.estimators import ESTIMATORS, is_reversed
 from service.conversion import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
@@ -111,8 +110,8 @@ def test_the_estimators_agree_within_their_uncertainty_and_the_preferred_one_is_
         assert assessment.estimators == {"xx": Estimator.DYNAMIC, "yy": Estimator.DYNAMIC}
         for axes in ("xx", "yy"):
             found = {
-                estimator: assessment.readings[name.format(axes=axes)]
-                for estimator, name in STIFFNESS_OF.items()
+                estimator: assessment.readings[entry.stiffness.format(axes=axes)]
+                for estimator, entry in ESTIMATORS.items()
             }
             low = max(r.interval_95[0] for r in found.values() if r.interval_95)
             high = min(r.interval_95[1] for r in found.values() if r.interval_95)
@@ -160,7 +159,7 @@ def test_a_budget_adds_up_to_the_uncertainty_that_is_stated(part_load: list[Asse
         and assessment.readings[name].value is not None
         and not name.startswith(("stiffness_", "gap_growth_"))
     }
-    assert len(assessment.budgets) == 41
+    assert len(assessment.budgets) == 53
     for name, budget in assessment.budgets.items():
         reading = assessment.readings[name]
         assert reading.value == budget.value
@@ -210,7 +209,7 @@ def test_a_corner_that_the_plant_file_does_not_know_leaves_no_stiffness_good(
     channels = {machine.channels[row].id: corner for row in bearing_rows(machine)}
     scenario = replace(base, channels={**base.channels, **channels})
     for assessment in watch(plant, plant.unit[0], 4, scenario=scenario):
-        for name in (*STIFFNESS_OF.values(), "stiffness_{axes}_n_per_m"):
+        for name in (*(e.stiffness for e in ESTIMATORS.values()), "stiffness_{axes}_n_per_m"):
             for axes in ("xx", "yy"):
                 quality = assessment.readings[name.format(axes=axes)].quality
                 assert quality.level is not Level.GOOD, (assessment.bearing, name)

@@ -16,7 +16,7 @@ from acquisition.simulated.devices.register_image import RegisterImage, no_value
 from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import FloatArray
 from core.spectra.lines import exact_phasors, tapered
-from core.spectra.vector_rows import VectorPart, VectorRow
+from core.spectra.polls import VectorPart, VectorRow
 from core.units import hz_from_rpm
 
 _BEAT_MODULUS = 65536

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 
 from core.alarms.alarm import AlarmEvent
+from core.stiffness.estimators import ESTIMATORS
 from service.evidence.bearing_part import AXES, BearingPart, EstimatorPart, FindingPart, ReadingPart
 from service.evidence.clock_words import day_and_time
 from service.evidence.document import Evidence
@@ -14,14 +15,6 @@ GN_PER_M = 1e9
 
 MAX_EVENTS, MAX_ACTOR, MAX_NOTE = 6, 32, 84
 """That a page has room for: lines, and characters in one."""
-
-ESTIMATORS = {
-    "dynamic": "dynamic",
-    "transfer_order1": "transfer, 1×",
-    "transfer_vortex": "transfer, vortex",
-    "ratio_order1": "equation (5), 1×",
-    "ratio_vortex": "equation (5), vortex",
-}
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -42,7 +35,7 @@ def estimators_table(bearing: BearingPart) -> str:
     rows = []
     for name in ESTIMATORS:
         own = [each for each in bearing.estimators if each.estimator == name]
-        row = [ESTIMATORS[name] + (", watched" if any(e.is_watched for e in own) else "")]
+        row = [ESTIMATORS[name].label + (", watched" if any(e.is_watched for e in own) else "")]
         for axis in AXES:
             row += [cell for each in own if each.direction == axis for cell in _estimate(each)]
         rows.append(row)

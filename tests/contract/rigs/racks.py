@@ -6,16 +6,15 @@ import numpy as np
 
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
+from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
-from core.monitor.vector_monitor import VectorMonitor
 from core.quality import GOOD, Quality, Reading
 from core.samples.blocks import SampleBlock
-from core.spectra.vector_rows import VectorPart, VectorRow
-from core.spectra.vector_settings import VectorSettings
+from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow
 
 RATE_HZ = 0.2
 K_B = 1.18e9
-AVERAGING = VectorSettings(n_polls=60, hop_polls=12, min_polls=4)
+AVERAGING = PollSettings(n_polls=60, hop_polls=12, min_polls=4)
 AMPLITUDES = tuple(VectorRow(id_, VectorPart.ORDER1_AMPLITUDE) for id_ in ("sx", "sy", "bx", "by"))
 PHASES = tuple(VectorRow(id_, VectorPart.ORDER1_PHASE) for id_ in ("sx", "sy", "bx", "by"))
 GAPS = tuple(VectorRow(id_, VectorPart.GAP) for id_ in ("sx", "sy"))
@@ -23,13 +22,14 @@ VORTEX = tuple(VectorRow(id_, VectorPart.VORTEX_AMPLITUDE) for id_ in ("sx", "sy
 SLOW = {"speed": Reading(92.3), "power": Reading(650.0), "oil": Reading(45.0)}
 
 
-def monitor_of(unit: Unit, rows: tuple[VectorRow, ...] = AMPLITUDES, **changes) -> VectorMonitor:
+def monitor_of(unit: Unit, rows: tuple[VectorRow, ...] = AMPLITUDES, **changes) -> UnitMonitor:
     """A monitor of a unit whose shaft channels count motion towards the probe."""
     channels = tuple(replace(channel, direction=1) for channel in unit.channels)
     averaging = changes.pop("averaging", AVERAGING)
     bearing = replace(unit.bearings[0], **changes.pop("bearing", {}))
     there = replace(unit, rate_hz=RATE_HZ, bearings=(bearing,), channels=channels, **changes)
-    return VectorMonitor(there, rows, AnalysisSettings(), averaging)
+    settings = AnalysisSettings()
+    return UnitMonitor(there, settings, PollTransform(there, rows, settings, averaging))
 
 
 def polls(
@@ -64,5 +64,5 @@ def blocks_of(
     ]
 
 
-def watch(monitor: VectorMonitor, stream: list[SampleBlock]) -> list[Assessment]:
+def watch(monitor: UnitMonitor, stream: list[SampleBlock]) -> list[Assessment]:
     return [assessment for block in stream for assessment in monitor.ingest(block)]

@@ -19,7 +19,7 @@ from acquisition.simulated.devices.fifo_device import FifoDevice
 from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.source import SampleSource
-from core.spectra.vector_rows import VectorPart, VectorRow
+from core.spectra.polls import VectorPart, VectorRow
 from rigs.modbus import OnRtu, OnTcp, Rig
 
 SLOW = ("slow0", "slow1")

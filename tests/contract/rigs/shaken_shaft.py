@@ -6,7 +6,7 @@ from core.arrays import ComplexArray
 from core.machine.unit import BracketDynamics
 from core.spectra.cross_spectrum import CrossSpectrum, average
 from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.dynamic_lines import DynamicSettings
 
 FREQUENCY_HZ = 600.0 / 8192 * np.arange(1, 342)
 TURN_HZ = (92.3 / 60.0, 92.3 / 60.0)

@@ -33,7 +33,7 @@ def test_a_new_reference_moves_the_shaft_centre_and_nothing_else_from_the_next_r
     monitor = UnitMonitor(unit, AnalysisSettings())
     before = [a for block in stream[:3] for a in monitor.ingest(block)]
 
-    monitor.adopt(with_reference(unit, (1970.0, 2000.0)))
+    monitor.replace_description(with_reference(unit, (1970.0, 2000.0)))
     after = [a for block in stream[3:] for a in monitor.ingest(block)]
 
     assert before[-1].readings["eccentricity_ratio"].value == pytest.approx(0.25, abs=0.01)
@@ -46,7 +46,7 @@ def test_a_new_reference_moves_the_shaft_centre_and_nothing_else_from_the_next_r
     results = []
     for reference in ((2000.0, 2000.0), (1970.0, 2000.0)):
         monitor = UnitMonitor(unit, AnalysisSettings())
-        monitor.adopt(with_reference(unit, reference))
+        monitor.replace_description(with_reference(unit, reference))
         results.append([a for block in stream for a in monitor.ingest(block)][-1].readings)
 
     differing = {name for name in results[0] if results[0][name] != results[1][name]}
@@ -72,7 +72,7 @@ def test_growth_since_an_older_reference_is_forgotten(unit: Unit, blocks, signal
         found = [a for block in stream[:4] for a in monitor.ingest(block)]
         assert found[-1].readings["gap_growth_um"].value == pytest.approx(35.0, abs=1.0)
         anew = replace(three, gap_reference_um=reference)
-        monitor.adopt(replace(unit, bearings=(anew,)))
+        monitor.replace_description(replace(unit, bearings=(anew,)))
         found = [a for block in stream[4:] for a in monitor.ingest(block)]
         assert found[-1].readings["shaft_centre_y_um"].value == pytest.approx(40.0, abs=1.0)
 
@@ -98,6 +98,6 @@ def test_another_machine_is_refused_naming_what_differs(
     monitor = UnitMonitor(unit, AnalysisSettings())
 
     with pytest.raises(ValueError, match=said):
-        monitor.adopt(replace(unit, **changes))  # type: ignore[arg-type]
+        monitor.replace_description(replace(unit, **changes))  # type: ignore[arg-type]
 
     assert monitor.unit is unit

@@ -14,7 +14,7 @@ from core.machine.unit import Unit
 from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
 from core.samples.blocks import SampleBlock
-from core.spectra.recent import MAX_PARTS, PART_TURNS, parts_of
+from core.spectra.overall import MAX_PARTS, PART_TURNS, parts_of
 
 HOP, SEGMENT = 7168, 8192
 DELAYS_S = (0.0, 1.0, 10.0, 15.0)

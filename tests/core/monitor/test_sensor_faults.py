@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import core.monitor.bearing_results
-import core.stiffness.film_results
+import core.monitor.bearing_readings
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
@@ -15,6 +14,7 @@ from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Level, Reading, Reason, bad, uncertain
 from core.spectra.speed import SpeedSource
+from core.stiffness.dynamic_readings import dynamic_readings
 from service.settings.bearings import BearingSettings
 
 OMEGA = 2.0 * np.pi * 92.3 / 60.0
@@ -186,9 +186,9 @@ def test_how_often_a_bearing_channel_is_integrated_follows_from_its_transducer(
 ) -> None:
     asked: list[tuple[int, int]] = []
     monkeypatch.setattr(
-        core.monitor.bearing_results,
-        "film_results",
-        lambda *given: asked.append(given[-1]) or core.stiffness.film_results.film_results(*given),
+        core.monitor.bearing_readings,
+        "dynamic_readings",
+        lambda *given: asked.append(given[-1]) or dynamic_readings(*given),
     )
     velocity = Channel("bx", Measurand.VELOCITY_MM_S)
     acceleration = Channel("by", Measurand.ACCELERATION_M_S2)

@@ -10,8 +10,15 @@ from core.arrays import FloatArray
 from core.machine.unit import Unit
 from core.monitor.settings import AnalysisSettings
 from core.quality import Level, Reading, Reason, bad, missing
-from core.spectra.key_phase import KeyPhase, KeyPhaseFault, read_key_phase, rising_edges
-from core.spectra.speed import Speed, SpeedSource, running_speed
+from core.spectra.speed import (
+    KeyPhase,
+    KeyPhaseFault,
+    Speed,
+    SpeedSource,
+    read_key_phase,
+    rising_edges,
+    running_speed,
+)
 
 RATE_HZ = 600.0
 N_SAMPLES = 8192
@@ -158,6 +165,7 @@ def test_without_good_pulses_the_speed_channel_counts(unit: Unit, pulses_rpm: fl
     found = speed(unit, Reading(92.2), pulses_rpm)
     assert found.source is SpeedSource.SLOW_CHANNEL
     assert found.rpm == Reading(92.2)
+    assert found.budget.systematic == pytest.approx(0.02 * 92.2 / np.sqrt(3.0))
 
 
 @pytest.mark.parametrize("pulses_rpm", [184.6, 80.0])
@@ -168,9 +176,36 @@ def test_pulses_that_the_speed_channel_contradicts_are_doubted(
     assert found.source is SpeedSource.KEY_PHASE
     assert found.rpm.quality.level is Level.UNCERTAIN
     assert found.rpm.quality.reason is Reason.SPEED_IMPLAUSIBLE
+    assert found.budget is None
 
 
 def test_pulses_far_below_the_rated_speed_are_standstill(unit: Unit) -> None:
     found = speed(unit, missing(Reason.OUT_OF_RANGE), 15.0)
     assert found.source is SpeedSource.KEY_PHASE
     assert found.rpm.quality == bad(Reason.STANDSTILL)
+
+
+def test_the_interval_of_a_speed_by_pulses_holds_the_truth(unit: Unit) -> None:
+    held = []
+    for seed in range(200):
+        noisy = pulses(92.3, 0.9) + np.random.default_rng(seed).normal(0.0, 0.3, N_SAMPLES)
+        key_phase = read_key_phase(noisy, RATE_HZ)
+        slow, settings = {"speed": missing(Reason.OUT_OF_RANGE)}, AnalysisSettings()
+        found = running_speed(unit, slow, FREQUENCY_HZ, NO_LINE, settings, key_phase)
+        low, high = found.budget.interval
+        assert high - low < 0.02
+        held.append(low <= 92.3 <= high)
+    assert np.mean(held) > 0.93
+
+
+@pytest.mark.parametrize("slow", [Reading(92.3), missing(Reason.OUT_OF_RANGE)])
+def test_the_speed_of_a_line_is_as_uncertain_as_the_line_is_weak(unit: Unit, slow: Reading) -> None:
+    bins = (FREQUENCY_HZ - 92.3 / 60.0) * 8192 / 600.0
+    power = NO_LINE + 1e4 * (np.sinc(bins) / (1.0 - bins**2)) ** 2  # Hann's main lobe
+    found = running_speed(unit, {"speed": slow}, FREQUENCY_HZ, power, AnalysisSettings())
+    budget = found.budget
+    if slow.value is None:
+        assert found.source is SpeedSource.LINE
+        assert (budget.random, budget.systematic) == (pytest.approx(0.016, rel=0.1), 0.0)
+    else:  # as well as it agrees with the line
+        assert budget.systematic == pytest.approx(92.3 * 0.002 / np.sqrt(3.0), rel=0.1)

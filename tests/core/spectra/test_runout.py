@@ -9,10 +9,8 @@ import pytest
 from core.machine.channel import SlowRollVector
 from core.machine.unit import Unit
 from core.quality import Reading, Reason, uncertain
-from core.spectra.key_phase import KeyPhase
-from core.spectra.runout import RunoutVerdict, take_off_runout
-from core.spectra.segment_runout import without_runout
-from core.spectra.speed import Speed, SpeedSource
+from core.spectra.runout import RunoutVerdict, take_off_runout, without_runout
+from core.spectra.speed import KeyPhase, Speed, SpeedSource
 
 VECTOR = SlowRollVector("ujb_shaft_x", "SN 4711", 10.0 * cmath.exp(0.4j), 12.0, 1_790_000_000)
 VIBRATION = 25.0 * cmath.exp(-1.1j)

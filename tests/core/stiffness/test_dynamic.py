@@ -20,9 +20,9 @@ from rigs.shaken_shaft import (
 
 from core.arrays import ComplexArray, FloatArray
 from core.quality import Reason
-from core.spectra.spectral_statistics import phasor_power_per_density
+from core.spectra.cross_spectrum import phasor_power_per_density
 from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.dynamic_lines import DynamicSettings
 
 Recording = Callable[..., ComplexArray]
 

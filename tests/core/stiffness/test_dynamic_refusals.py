@@ -11,7 +11,7 @@ from core.arrays import ComplexArray
 from core.quality import Reason
 from core.spectra.cross_spectrum import average
 from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
-from core.stiffness.dynamic_settings import DynamicSettings
+from core.stiffness.dynamic_lines import DynamicSettings
 
 Recording = Callable[..., ComplexArray]
 

@@ -1,6 +1,6 @@
 import pytest
 
-from core.stiffness.ratio import effective_stiffness_n_per_m
+from core.stiffness.transfer import effective_stiffness_n_per_m
 
 
 def test_equal_amplitudes_of_any_unit_mean_a_film_as_stiff_as_its_bracket() -> None:

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from core.spectra.lines import bin_phasors, tapered
-from core.spectra.spectral_statistics import (
+from core.spectra.cross_spectrum import (
     BIN_CORRELATION,
     CORRELATED_LINES,
     SMEAR_BINS_SQUARED,
@@ -17,7 +16,8 @@ from core.spectra.spectral_statistics import (
     leakage_kernel,
     phasor_power_per_density,
 )
-from core.stiffness.usable_lines import LineSelection, between_harmonics, little_leakage
+from core.spectra.lines import bin_phasors, tapered
+from core.stiffness.dynamic_lines import LineSelection, between_harmonics, little_leakage
 
 FREQUENCY_HZ = 600.0 / 8192 * np.arange(1, 342)
 BIN_HZ = float(FREQUENCY_HZ[0])
@@ -95,7 +95,7 @@ def test_noise_of_known_density_has_the_power_and_the_correlation_stated() -> No
 
 def test_correlated_lines_and_overlapping_segments_count_for_less() -> None:
     def variance(lines: list[int], products: tuple[float, ...] = WHITE_PRODUCTS) -> float:
-        terms = np.ones((len(lines), 1, 1), dtype=complex)
+        terms = np.ones((len(lines), 1, 1))
         return float(correlated_sum(terms, np.array(lines), products)[0, 0])
 
     assert variance(list(range(2000))) / 2000 == pytest.approx(CORRELATED_LINES, rel=0.001)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.modbus.decoding import MapDecoder
-from core.spectra.vector_rows import VectorPart, VectorRow
+from core.spectra.polls import VectorPart, VectorRow
 from service.settings.map_file import load_map_file
 from service.settings.toml_file import TomlFileError
 

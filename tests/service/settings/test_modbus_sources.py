@@ -8,7 +8,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters
-from core.spectra.vector_rows import VectorPart, VectorRow
+from core.spectra.polls import VectorPart, VectorRow
 from service.settings.base import MisfitError
 from service.settings.modbus_identity import IdentitySettings
 from service.settings.modbus_sources import (

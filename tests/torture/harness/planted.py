@@ -16,7 +16,7 @@ from typing import Any
 from acquisition.clock import SystemClock
 from core.alarms.alarm import AlarmNews
 from core.monitor.assessment import Assessment
-from core.monitor.monitored_unit import MonitoredUnit
+from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from core.samples.ring import Ring
 from core.units import NS_PER_S
@@ -39,12 +39,12 @@ def alarms_forgotten_at_start() -> None:
 
 def outage_not_recorded() -> None:
     """Go on after a stop as if nothing was missing."""
-    MonitoredUnit.go_on = lambda self, reach: None  # type: ignore[method-assign]  # noqa: ARG005
+    UnitMonitor.go_on = lambda self, reach: None  # type: ignore[method-assign]  # noqa: ARG005
 
 
 def gap_not_recorded() -> None:
     """Drop the gaps that are found while running."""
-    MonitoredUnit.drain_gaps = lambda self: []  # type: ignore[method-assign]  # noqa: ARG005
+    UnitMonitor.drain_gaps = lambda self: []  # type: ignore[method-assign]  # noqa: ARG005
 
 
 def gap_closed_up() -> None:

@@ -14,10 +14,9 @@ from acquisition.simulated.devices.map_device import VectorDevice
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
+from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
-from core.monitor.vector_monitor import VectorMonitor
-from core.spectra.vector_rows import VectorPart, VectorRow
-from core.spectra.vector_settings import VectorSettings
+from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow
 from service.settings.map_file import load_map_file
 
 RACK = Path(__file__).parents[4] / "deploy" / "maps" / "vector-rack-skf-like.toml"
@@ -100,7 +99,9 @@ async def test_equation_5_comes_out_of_a_rack_over_the_wire(
     )
     bearing = Bearing("UJB", K_B, *IDS, 200.0, (2000.0, 2000.0))
     unit = Unit("U1", SPEED_RPM, rate_hz, channels, (bearing,), "speed")
-    monitor = VectorMonitor(unit, rows, AnalysisSettings(), VectorSettings(24, 12, 4))
+    settings = AnalysisSettings()
+    transform = PollTransform(unit, rows, settings, PollSettings(24, 12, 4))
+    monitor = UnitMonitor(unit, settings, transform)
     async with ModbusTcpServer(rack) as server:
         transport = TcpTransport(host="127.0.0.1", port=server.port)
         source = PolledSource(

@@ -15,8 +15,8 @@ from acquisition.simulated.plant.scenario import KeyPhasePulse, Scenario, Transd
 from core.arrays import FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
-from core.spectra.key_phase import KeyPhase, read_key_phase
 from core.spectra.lines import exact_phasors, tapered
+from core.spectra.speed import KeyPhase, read_key_phase
 
 MachineWith = Callable[[Measurand], Unit]
 

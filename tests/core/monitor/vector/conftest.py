@@ -7,10 +7,10 @@ import pytest
 from rigs.racks import monitor_of
 
 from core.machine.unit import Unit
-from core.monitor.vector_monitor import VectorMonitor
+from core.monitor.monitor import UnitMonitor
 
 
 @pytest.fixture
-def rack(unit: Unit) -> Callable[..., VectorMonitor]:
+def rack(unit: Unit) -> Callable[..., UnitMonitor]:
     """Builds monitors of the unit, whose shaft channels count motion towards the probe."""
     return partial(monitor_of, unit)

@@ -6,15 +6,19 @@ import numpy as np
 import pytest
 from rigs.racks import AMPLITUDES, GAPS, K_B, RATE_HZ, SLOW, VORTEX, blocks_of, polls, watch
 
+from core.alarms.kinds import AlarmKind
+from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.unit_alarms import UnitAlarms
+from core.limits import Limits
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Unit
-from core.monitor.assessment import Evidence
 from core.monitor.catalogue import CATALOGUE
+from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
-from core.monitor.vector_monitor import VectorMonitor
 from core.quality import GOOD, Level, Reading, Reason, bad, missing
+from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow
+from core.spectra.segments import Evidence
 from core.spectra.speed import SpeedSource
-from core.spectra.vector_rows import VectorPart, VectorRow
 
 
 def test_equation_5_is_computed_from_the_amplitudes_of_a_rack(rack) -> None:
@@ -30,6 +34,9 @@ def test_equation_5_is_computed_from_the_amplitudes_of_a_rack(rack) -> None:
     assert newest.evidence is Evidence.AMPLITUDE_ONLY
     assert newest.quality == GOOD
     assert newest.speed_source is SpeedSource.SLOW_CHANNEL
+    assert newest.readings["order1_frequency_hz"].u_systematic == pytest.approx(
+        0.02 * 92.3 / 60 / 3**0.5
+    )
     assert (value["speed_rpm"], value["power_mw"], value["oil_temperature_c"]) == (92.3, 650, 45)
 
 
@@ -68,9 +75,8 @@ def test_velocity_and_acceleration_become_displacement_at_the_speed_of_the_poll(
         Channel("bx", Measurand.VELOCITY_MM_S),
         Channel("by", Measurand.ACCELERATION_M_S2),
     )
-    monitor = VectorMonitor(
-        replace(unit, rate_hz=RATE_HZ, channels=channels), AMPLITUDES, AnalysisSettings()
-    )
+    unit, settings = replace(unit, rate_hz=RATE_HZ, channels=channels), AnalysisSettings()
+    monitor = UnitMonitor(unit, settings, PollTransform(unit, AMPLITUDES, settings))
     newest = watch(monitor, polls(60, 60, 20e-3 * omega, 20e-6 * omega**2, noise=0.0, n=12))[-1]
 
     assert newest.readings["order1_bearing_x_um_pk"].value == pytest.approx(20.0, rel=1e-5)
@@ -145,13 +151,13 @@ def test_gaps_give_the_shaft_centre_which_moves_with_a_new_reference_alone(rack)
     before = watch(monitor, stream[:12])[-1]
     [bearing] = monitor.unit.bearings
     moved = replace(bearing, gap_reference_um=(1970.0, 1960.0))
-    monitor.adopt(replace(monitor.unit, bearings=(moved,)))
+    monitor.replace_description(replace(monitor.unit, bearings=(moved,)))
     after = watch(monitor, stream[12:])[-1]
 
     assert before.readings["eccentricity_ratio"].value == pytest.approx(0.25)
     assert after.readings["eccentricity_ratio"].value == pytest.approx(0.0)
     with pytest.raises(ValueError, match="rated_speed_rpm is 100"):
-        monitor.adopt(replace(monitor.unit, rated_speed_rpm=100.0))
+        monitor.replace_description(replace(monitor.unit, rated_speed_rpm=100.0))
 
 
 def test_the_vortex_order_is_its_own_line_or_switched_off(rack) -> None:
@@ -208,3 +214,25 @@ def test_a_block_of_something_else_is_refused(rack) -> None:
         rack((VectorRow("nowhere", VectorPart.GAP),))
     with pytest.raises(ValueError, match="are the same"):
         rack((AMPLITUDES[0], AMPLITUDES[0]))
+
+
+@pytest.mark.parametrize("first", range(4), ids="{} polls after a result".format)
+@pytest.mark.parametrize("delay_s", [0.0, 10.0])
+def test_a_step_of_vibration_is_an_alarm_within_half_a_minute_and_its_delay(
+    unit: Unit, rack, first: int, delay_s: float
+) -> None:
+    limits = LimitRule(Limits(100.0), rule_of(delay_s, 30.0))
+    board = UnitAlarms(unit, UnitRules(bearings={"UJB": BearingRules(shaft_order1=limits)}))
+    monitor, n_before = rack(averaging=PollSettings()), 40 + first
+    values = np.repeat([[60.0], [50.0], [20.0], [10.0]], n_before + 12, axis=1)
+    values[0, n_before:] = 120.0
+    raised = {
+        event.identity.kind: block.stop_ns / 1e9 - n_before / RATE_HZ
+        for block in blocks_of(values)
+        for told in board.take(block, monitor.ingest(block), block.stop_ns)
+        for event in told.events
+        if event.change == "raised"
+    }
+
+    assert set(raised) == {AlarmKind.SHAFT_X}
+    assert delay_s <= raised[AlarmKind.SHAFT_X] <= 30.0 + delay_s

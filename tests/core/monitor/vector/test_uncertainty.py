@@ -7,11 +7,10 @@ import pytest
 from rigs.racks import AMPLITUDES, K_B, PHASES, blocks_of, polls, watch
 
 from core.machine.unit import BearingAccuracy
-from core.monitor.assessment import Evidence
 from core.quality import GOOD, Reason, bad, missing
 from core.samples.blocks import SampleBlock
-from core.stiffness.stiffness_budget import BEARING_GAIN, BRACKET
-from core.stiffness.vector_budget import COHERENCE, SPREAD
+from core.spectra.segments import Evidence
+from core.stiffness.stiffness_budget import BEARING_GAIN, BRACKET, COHERENCE, SPREAD
 from core.uncertainty import SHAFT_GAIN
 
 

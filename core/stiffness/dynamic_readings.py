@@ -1,6 +1,6 @@
-"""What the broadband motion of a bearing says: all eight film coefficients as readings."""
+"""All eight film coefficients from the broadband motion of a bearing, as readings."""
 
-from collections.abc import Mapping
+import math
 
 import numpy as np
 
@@ -8,10 +8,23 @@ from core.machine.unit import Bearing
 from core.quality import AXES, GOOD, Quality, Reading, Reason, missing, uncertain, worst
 from core.spectra.cross_spectrum import CrossSpectrum
 from core.stiffness.agreement import FALSE_ALARM
+from core.stiffness.channel_budget import coherence_budget
 from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
-from core.stiffness.dynamic_settings import DynamicSettings
-from core.stiffness.stiffness_budget import damping_half_width_n_s_per_m, dynamic_budgets
-from core.uncertainty import Budget, coverage_factor, reading_of
+from core.stiffness.dynamic_lines import DynamicSettings
+from core.stiffness.stiffness_budget import (
+    BRACKET,
+    DAMPING,
+    STATISTICS,
+    damping_half_width_n_s_per_m,
+    dynamic_budgets,
+)
+from core.uncertainty import (
+    Budget,
+    coverage_factor,
+    random_line,
+    systematic_line,
+    with_budgets,
+)
 
 MAX_LACK_OF_FIT = 3.0
 """Beyond it the film is not constant over the band, or something shakes the bracket directly."""
@@ -26,14 +39,14 @@ NAMES = (
 )
 
 
-def film_results(
+def dynamic_readings(
     bearing: Bearing,
     spectrum: CrossSpectrum | None,
     turn_hz: tuple[float, float],
     quality: Quality,
     settings: DynamicSettings,
     n_integrations: tuple[int, int] = (2, 2),
-) -> tuple[dict[str, Reading], Mapping[str, Budget], DynamicStiffness | None]:
+) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
     """Readings of `dynamic`, the budgets of its coefficients, and what it found.
 
     Parameters
@@ -57,16 +70,22 @@ def film_results(
         f"dynamic_{name}_{'n_per_m' if name[0] == 'k' else 'n_s_per_m'}": budget
         for name, budget in dynamic_budgets(found, bearing.bracket, bearing.accuracy).items()
     }
-    readings = {name: reading_of(budget, quality) for name, budget in budgets.items()}
-    return readings | _evidence(found, bearing, quality), budgets, found
+    readings = {name: budget.reading(quality) for name, budget in budgets.items()}
+    of_evidence = _evidence_budgets(found, bearing)
+    evidence, others = with_budgets(
+        {
+            name: (reading, of_evidence.get(name))
+            for name, reading in _evidence(found, bearing, quality).items()
+        }
+    )
+    return readings | evidence, budgets | others, found
 
 
 def _fit_quality(found: DynamicStiffness, bearing: Bearing) -> Quality:
     """Whether one constant film on this bracket explains the motion, with channels in step."""
-    bracket, accuracy = bearing.bracket, bearing.accuracy
     sure = coverage_factor((), 1.0 - FALSE_ALARM)
-    damping = damping_half_width_n_s_per_m(bracket, max(found.bracket_mass_kg, 0.0), accuracy)
-    limits_s = accuracy.delay_s + abs(found.delay_per_damping) * damping
+    damping = _damping_half_width_n_s_per_m(found, bearing)
+    limits_s = bearing.accuracy.delay_s + abs(found.delay_per_damping) * damping
     if abs(found.delay_s) > limits_s + sure * found.delay_std_s:
         return uncertain(Reason.CHANNEL_DELAY)
     massless = found.bracket_mass_kg < -sure * found.bracket_mass_std_kg
@@ -86,8 +105,36 @@ def _evidence(found: DynamicStiffness, bearing: Bearing, quality: Quality) -> di
     }
     readings = {name: Reading(float(value), quality) for name, value in evidence.items()}
     readings["dynamic_bracket_mass_kg"] = (
-        Reading(found.bracket_mass_kg, quality, found.bracket_mass_std_kg)
+        Reading(found.bracket_mass_kg, quality)
         if bearing.bracket.mass_kg is None
         else missing(Reason.SWITCHED_OFF)
     )
     return readings
+
+
+def _damping_half_width_n_s_per_m(found: DynamicStiffness, bearing: Bearing) -> float:
+    mass_kg = max(found.bracket_mass_kg, 0.0)
+    return damping_half_width_n_s_per_m(bearing.bracket, mass_kg, bearing.accuracy)
+
+
+def _evidence_budgets(found: DynamicStiffness, bearing: Bearing) -> dict[str, Budget | None]:
+    """Of what is measured beside the film; a fitted mass is proportional to the stiffness given."""
+    of_coherence = zip(found.coherence.tolist(), found.coherence_segments.tolist(), strict=True)
+    x, y = (coherence_budget(coherence, n) for coherence, n in of_coherence)
+    damping, mass_kg = _damping_half_width_n_s_per_m(found, bearing), found.bracket_mass_kg
+    stiffness = bearing.accuracy.bracket_stiffness
+    delay_lines = (
+        random_line(STATISTICS, found.delay_std_s),
+        systematic_line(DAMPING, damping, found.delay_per_damping),
+    )
+    mass_lines = (
+        random_line(STATISTICS, found.bracket_mass_std_kg),
+        systematic_line(BRACKET, stiffness, mass_kg),
+    )
+    known = math.isfinite(found.delay_std_s)
+    return {
+        "dynamic_coherence_x": x,
+        "dynamic_coherence_y": y,
+        "dynamic_delay_s": Budget(found.delay_s, delay_lines) if known else None,
+        "dynamic_bracket_mass_kg": Budget(mass_kg, mass_lines),
+    }

@@ -1,0 +1,357 @@
+"""From the segments or polls of a unit to the readings of one bearing."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import ComplexArray, FloatArray
+from core.checks.sensor_checks import stationarity
+from core.condition.probe_axes import Growth
+from core.condition.shaft_readings import position_results, slow_channels, slow_results
+from core.machine.channel import line_floor_um_pk
+from core.machine.unit import Bearing, Estimator, Unit
+from core.monitor.overall_readings import overall_readings
+from core.monitor.settings import AnalysisSettings
+from core.quality import (
+    NOT_MEASURED,
+    Level,
+    Quality,
+    Reading,
+    Reason,
+    bad,
+    missing,
+    uncertain,
+    worst,
+)
+from core.spectra.cross_spectrum import (
+    BEARING_X,
+    BEARING_Y,
+    NO_SPECTRUM,
+    SHAFT_X,
+    SHAFT_Y,
+    CrossSpectrum,
+    average,
+)
+from core.spectra.runout import RunoutVerdict
+from core.spectra.segments import ORDER1, VORTEX, Evidence, KeptSegments
+from core.stiffness.agreement import contradicting
+from core.stiffness.channel_budget import frequency_budget
+from core.stiffness.dynamic import DynamicStiffness
+from core.stiffness.dynamic_readings import NAMES as DYNAMIC_NAMES
+from core.stiffness.dynamic_readings import dynamic_readings
+from core.stiffness.estimators import preferred_stiffness, signs_checked
+from core.stiffness.order_line import OrderLine, other_line_hz
+from core.uncertainty import Budget, Budgeted, Found, with_budgets
+
+
+@dataclass(frozen=True)
+class BearingReadings:
+    """What some segments show of a bearing.
+
+    Parameters
+    ----------
+    readings
+        One for each quantity of the catalogue.
+    budgets
+        Of the readings whose uncertainty is known, by quantity.
+    estimators
+        Where `stiffness` came from, by axes "xx" and "yy".
+    spectrum
+        At the bins; empty of polls.
+    n_segments
+        Segments in which all four channels were usable.
+    coverage
+        Their share of those that there could have been.
+    """
+
+    readings: Mapping[str, Reading]
+    budgets: Mapping[str, Budget]
+    estimators: Mapping[str, Estimator | None]
+    spectrum: CrossSpectrum
+    n_segments: int
+    coverage: float
+    evidence: Evidence
+
+
+def bearing_readings(
+    unit: Unit,
+    bearing: Bearing,
+    settings: AnalysisSettings,
+    kept: KeptSegments,
+    n_expected: int,
+    last_growth: Growth | None = None,
+) -> BearingReadings:
+    """Evaluate one bearing over some segments or polls.
+
+    Parameters
+    ----------
+    kept
+        The segments, at least one.
+    n_expected
+        How many segments there could have been.
+    last_growth
+        Thermal growth of the gaps when it was last measured.
+    """
+    found = _Bearing(unit, bearing, settings, kept, n_expected)
+    readings, budgets, dynamic = found.readings(last_growth)
+    readings |= found.doubted(readings, budgets, dynamic)
+    chosen = {
+        axes: preferred_stiffness(readings, bearing.preference, axes) for axes in ("xx", "yy")
+    }
+    readings |= {f"stiffness_{axes}_n_per_m": reading for axes, (reading, _) in chosen.items()}
+    return BearingReadings(
+        readings,
+        budgets,
+        {axes: estimator for axes, (_, estimator) in chosen.items()},
+        found.spectrum or NO_SPECTRUM,
+        found.n_segments,
+        found.coverage,
+        found.evidence,
+    )
+
+
+class _Bearing:
+    """One bearing over some segments; holds nothing between evaluations."""
+
+    def __init__(
+        self,
+        unit: Unit,
+        bearing: Bearing,
+        settings: AnalysisSettings,
+        kept: KeptSegments,
+        n_expected: int,
+    ) -> None:
+        self._unit, self._bearing, self._settings = unit, bearing, settings
+        self._segments = segments = list(kept.segments)
+        self._min_segments = kept.min_segments
+        ids = [channel.id for channel in unit.channels]
+        rows = self._rows = [ids.index(id_) for id_ in bearing.channels]
+        self._usable = np.array([s.order_usable[:, rows] for s in segments])  # (n, 2, 4)
+        self._whole: npt.NDArray[np.bool_] = np.all(self._usable[:, ORDER1], axis=1)
+        self._phasors: ComplexArray = np.array([s.order_phasors_um_pk[rows] for s in segments])
+        self._order_hz = np.mean([segment.order_frequency_hz for segment in segments], axis=0)
+        self._bins: ComplexArray = np.array(
+            [s.bin_phasors_um_pk[rows] for s in segments if s.bin_phasors_um_pk is not None]
+        )
+        self.spectrum: CrossSpectrum | None = None
+        if kept.frequency_hz is not None:
+            self.spectrum = average(kept.frequency_hz, self._bins, self._usable[:, ORDER1])
+        self.n_segments = int(self._whole.sum())
+        self.coverage = self.n_segments / n_expected
+        self._lines = self._order_lines()
+        axes_quality = self._lines[ORDER1].axes_quality(unit.rotation_sense)
+        self._doubts = worst((self._steadiness(), axes_quality))
+
+    @property
+    def evidence(self) -> Evidence:
+        """What the results are made of."""
+        if self.spectrum is not None:
+            return Evidence.WAVEFORMS
+        phased = self._lines[ORDER1].phases_known
+        return Evidence.AMPLITUDE_AND_PHASE if phased else Evidence.AMPLITUDE_ONLY
+
+    def readings(
+        self, last_growth: Growth | None
+    ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
+        """All readings but the preferred stiffness, their budgets, and the film of `dynamic`."""
+        unit, segments = self._unit, self._segments
+        speed = segments[-1].speed
+        dynamic, dynamic_budgets, film = self._dynamic()
+        parts: list[Found] = [
+            with_budgets({"speed_rpm": (speed.rpm, speed.budget)}),
+            slow_results(segments, slow_channels(unit, self._bearing)),
+            position_results(unit, self._bearing, segments, last_growth),
+            self._order("order1_", ORDER1),
+            with_budgets(self._lines[ORDER1].phases(), "order1_"),
+            overall_readings(
+                segments, self._rows, self._bearing, unit.bearings.index(self._bearing)
+            ),
+            self._order("vortex_", VORTEX),
+            (dynamic, dynamic_budgets),
+        ]
+        readings: dict[str, Reading] = {}
+        budgets: dict[str, Budget] = {}
+        for some, of_some in parts:
+            readings |= some
+            budgets |= of_some
+        readings = signs_checked(readings)
+        known = {name: b for name, b in budgets.items() if readings[name].value is not None}
+        return readings, known, film
+
+    def doubted(
+        self,
+        readings: Mapping[str, Reading],
+        budgets: Mapping[str, Budget],
+        film: DynamicStiffness | None,
+    ) -> dict[str, Reading]:
+        """Readings of estimators that do not agree, and those that a delay reaches."""
+        names: dict[str, Reason] = {}
+        if readings["dynamic_k_xx_n_per_m"].quality.reason is Reason.CHANNEL_DELAY:
+            delayed = (name for name in budgets if "_transfer_" in name)
+            names = dict.fromkeys(delayed, Reason.CHANNEL_DELAY)
+        lines = {"order1": ORDER1, "vortex": VORTEX}
+        differing = contradicting(budgets, film, self._lines[ORDER1].orders, lines)
+        names |= dict.fromkeys(differing, Reason.ESTIMATORS_DISAGREE)
+        return {
+            name: replace(
+                readings[name], quality=worst((readings[name].quality, uncertain(reason)))
+            )
+            for name, reason in names.items()
+        }
+
+    def _order_lines(self) -> tuple[OrderLine, OrderLine]:
+        """1× and vortex; what is averaged at one is at the other, but for polls."""
+        marked = [segment.at_mark_um_pk for segment in self._segments]
+        nothing = np.zeros(len(self._unit.channels), dtype=np.complex128)
+        at_mark = np.array([nothing if m is None else m for m in marked])[:, self._rows]
+        has_mark = np.array([m is not None for m in marked])[:, np.newaxis]
+        has_phase = np.array([segment.has_phase[:, self._rows] for segment in self._segments])
+        orders = average(self._order_hz, self._phasors, self._usable[:, ORDER1])
+        lines = []
+        for line, quality in ((ORDER1, self._line_quality), (VORTEX, self._vortex_quality)):
+            of_line, at = orders, line
+            if self.spectrum is None:
+                parts = self._phasors[:, :, line : line + 1], self._usable[:, line]
+                of_line, at = average(self._order_hz[line : line + 1], *parts), 0
+            floors_um_pk = (
+                line_floor_um_pk(self._unit.channels[row], float(self._order_hz[line]))
+                for row in self._rows
+            )
+            lines.append(
+                OrderLine(
+                    bearing=self._bearing,
+                    settings=self._settings,
+                    orders=of_line,
+                    at=at,
+                    line=line,
+                    bins=self.spectrum,
+                    min_segments=self._min_segments,
+                    quality=quality,
+                    phasors_um_pk=self._phasors[:, :, line],
+                    usable=self._usable[:, line],
+                    has_phase=has_phase[:, line],
+                    at_mark_um_pk=at_mark,
+                    has_mark=has_mark & has_phase[:, ORDER1],
+                    floors_um_pk=tuple(floors_um_pk),
+                    round_shafts=frozenset(p for p in (SHAFT_X, SHAFT_Y) if self._is_round(p)),
+                )
+            )
+        return lines[0], lines[1]
+
+    def _is_round(self, place: int) -> bool:
+        """Whether runout was taken off all that is averaged; one segment with it is too much."""
+        channel = self._bearing.channels[place]
+        counted = zip(self._segments, self._usable[:, ORDER1, place], strict=True)
+        return all(s.runout[channel] is RunoutVerdict.APPLIED for s, usable in counted if usable)
+
+    def _steadiness(self) -> Quality:
+        """Whether speed and load stood still over the averaging window."""
+        power = self._unit.power_channel
+        speeds = [segment.speed.rpm for segment in self._segments]
+        powers = (
+            [segment.slow.get(power, NOT_MEASURED) for segment in self._segments] if power else []
+        )
+        return stationarity(
+            _numbers(speeds), _numbers(powers), self._settings.sensors, self._unit.rated_power_mw
+        )
+
+    def _order(self, prefix: str, line: int) -> Found:
+        found = self._lines[line].readings()
+        return with_budgets({**found, "frequency_hz": self._frequency(line)}, prefix)
+
+    def _dynamic(self) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
+        """All eight coefficients from the segments in which every channel was usable."""
+        if self.spectrum is None:
+            return dict.fromkeys(DYNAMIC_NAMES, missing(Reason.NOT_MEASURED)), {}, None
+        settings, quality = self._settings.dynamic, self._line_quality(*range(len(self._rows)))
+        if isinstance(quality, Reading) or not self.n_segments:
+            reason = quality.quality if isinstance(quality, Reading) else quality
+            nothing = None, (0.0, 0.0), bad(reason.reason), settings
+            return dynamic_readings(self._bearing, *nothing)
+        whole = [s for s, counts in zip(self._segments, self._whole, strict=True) if counts]
+        turns_hz = [float(segment.order_frequency_hz[ORDER1]) for segment in whole]
+        spectrum = self.spectrum
+        if not self._whole.all():
+            all_usable = np.ones((len(whole), len(self._rows)), dtype=np.bool_)
+            spectrum = average(spectrum.frequency_hz, self._bins[self._whole], all_usable)
+        return dynamic_readings(
+            self._bearing,
+            spectrum,
+            (min(turns_hz), max(turns_hz)),
+            quality,
+            settings,
+            self._n_integrations,
+        )
+
+    @property
+    def _n_integrations(self) -> tuple[int, int]:
+        x, y = (self._unit.channels[self._rows[place]] for place in (BEARING_X, BEARING_Y))
+        return x.measurand.n_integrations, y.measurand.n_integrations
+
+    def _frequency(self, line: int) -> Budgeted:
+        speed, frequency_hz = self._segments[-1].speed, float(self._order_hz[line])
+        each_hz = np.array([segment.order_frequency_hz[line] for segment in self._segments])
+        if self.spectrum is None and line == VORTEX and not self._unit.has_vortex:
+            return missing(Reason.SWITCHED_OFF), None
+        if speed.rpm.value is None:
+            return speed.rpm, None
+        if line == ORDER1 or self.spectrum is None:
+            budget = frequency_budget(frequency_hz, each_hz, speed)
+            return Reading(frequency_hz, speed.rpm.quality), budget
+        qualities = [self._vortex_quality(shaft) for shaft in (SHAFT_X, SHAFT_Y)]
+        known = [q for q in qualities if isinstance(q, Quality)]
+        quality = known[0] if known else qualities[0]
+        if quality == missing(Reason.OUTSIDE_BAND):
+            return Reading(self._other_line_hz, uncertain(Reason.OUTSIDE_BAND)), None
+        if isinstance(quality, Reading):
+            return quality, None
+        budget = frequency_budget(frequency_hz, each_hz, None)
+        return Reading(frequency_hz, speed.rpm.quality), budget
+
+    def _vortex_quality(self, *places: int) -> Quality | Reading:
+        """As `_line_quality`, at the vortex: nothing is read where there is none."""
+        if not self._unit.has_vortex:
+            return missing(Reason.SWITCHED_OFF)
+        quality = self._line_quality(*places, line=VORTEX)
+        if isinstance(quality, Reading) or self.spectrum is None:
+            return quality
+        if quality.reason is Reason.FEW_SEGMENTS:
+            return missing(Reason.FEW_SEGMENTS)
+        return self._no_vortex or quality
+
+    @cached_property
+    def _no_vortex(self) -> Reading | None:
+        """Why no vortex shows in this bearing; None if one does."""
+        if self._segments[-1].has_vortex_peak and self._lines[VORTEX].is_of_shaft:
+            return None
+        found = self._other_line_hz
+        return missing(Reason.NO_VORTEX if found is None else Reason.OUTSIDE_BAND)
+
+    @cached_property
+    def _other_line_hz(self) -> float | None:
+        turn_hz, (low, high) = float(self._order_hz[ORDER1]), self._settings.vortex_band
+        band_hz = (low * turn_hz, high * turn_hz)
+        if self.spectrum is None:
+            return None
+        return other_line_hz(self.spectrum, turn_hz, band_hz, self._settings.min_line_to_floor)
+
+    def _line_quality(self, *places: int, line: int = ORDER1) -> Quality | Reading:
+        """Quality of what is read off a line of these channels, or the reason why nothing is."""
+        newest, few = self._segments[-1], uncertain(Reason.FEW_SEGMENTS)
+        own = [newest.line_quality(self._rows[place], line) for place in places]
+        now = worst([newest.speed.rpm.quality, self._doubts, *own])
+        n_segments = self._lines[line].n_segments(places[0], places[-1])
+        if newest.speed.rpm.value is None or now.level is Level.BAD or n_segments == 0:
+            return missing(now.reason)
+        if n_segments < self._min_segments:
+            return worst([now, few] if self.spectrum is None else [few, now])
+        if self.coverage < self._settings.min_coverage:
+            return worst([now, uncertain(Reason.LOW_COVERAGE)])
+        return now
+
+
+def _numbers(readings: Sequence[Reading]) -> FloatArray:
+    return np.array([np.nan if r.value is None else r.value for r in readings])

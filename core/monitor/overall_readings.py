@@ -1,0 +1,146 @@
+"""Broad-band vibration of one bearing over some segments, and vibration of the newest."""
+
+import math
+from collections.abc import Sequence
+
+from core.machine.unit import Bearing
+from core.quality import Level, Reading, Reason, current_mean, missing, worst
+from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
+from core.spectra.overall import RecentReadings
+from core.spectra.segments import ORDER1, Segment
+from core.stiffness.channel_budget import amplitude_lines
+from core.uncertainty import Budget, Budgeted, Found, mean_budget, numbers, with_budgets
+from core.units import ns_from_s
+
+SHAFT_SPANS = {
+    "overall_shaft_x_um_pp": SHAFT_X,
+    "overall_shaft_y_um_pp": SHAFT_Y,
+}
+SHAFTS = {SHAFT_X: "shaft_x", SHAFT_Y: "shaft_y"}
+BEARING_SPEEDS = {
+    "overall_bearing_x_mm_s_rms": BEARING_X,
+    "overall_bearing_y_mm_s_rms": BEARING_Y,
+}
+ORBIT = "overall_shaft_um_pk"
+
+OVERALL_NAMES = (*SHAFT_SPANS, ORBIT, *BEARING_SPEEDS)
+"""Broad-band quantities of the catalogue."""
+
+
+def overall_readings(
+    segments: Sequence[Segment], rows: Sequence[int], bearing: Bearing, number: int
+) -> Found:
+    """Broad-band vibration, averaged over the segments, and its budgets, by quantity.
+
+    Peak-to-peak values and the farthest excursions are averaged as they are, velocities as power.
+
+    Parameters
+    ----------
+    rows
+        Of the bearing's four channels.
+    number
+        The bearing's place in the unit.
+    """
+    if segments[-1].overall is None:
+        return dict.fromkeys(OVERALL_NAMES, missing(Reason.NOT_MEASURED)), {}
+    found: dict[str, Budgeted] = {}
+    grazed = [segments[-1].is_grazed(row) or segments[-1].usable[row] for row in rows]
+    for name, place in SHAFT_SPANS.items():
+        spans = [segment.spans_um_pp[rows[place]] for segment in segments]
+        mean = current_mean(spans, is_grazed=grazed[place])
+        found[name] = mean, _mean_budget(mean, spans, bearing, place)
+    orbits = [_orbit(segment, rows[:2], number) for segment in segments]
+    mean = current_mean(orbits, is_grazed=all(grazed[:2]))
+    found[ORBIT] = mean, _mean_budget(mean, orbits, bearing, SHAFT_X)
+    for name, place in BEARING_SPEEDS.items():
+        speeds = [segment.velocities_mm_s_rms[rows[place]] for segment in segments]
+        squares = [r if r.value is None else Reading(r.value**2, r.quality) for r in speeds]
+        mean = _root(current_mean(squares, is_grazed=grazed[place]))
+        found[name] = mean, _mean_budget(mean, squares, bearing, place, is_root=True)
+    return with_budgets(found)
+
+
+def recent_readings(
+    segment: Segment, rows: Sequence[int], rate_hz: float
+) -> tuple[RecentReadings, ...]:
+    """Shaft vibration of the newest parts of a segment, and bearing velocity of all of it.
+
+    Parameters
+    ----------
+    rows
+        Of the bearing's four channels.
+    """
+    recent, overall, found = segment.recent, segment.overall, []
+    if recent is None or overall is None:
+        return ()
+    for part, stop in enumerate(recent.stop.tolist()):
+        behind_ns = ns_from_s((segment.stop_index - segment.first_index - stop) / rate_hz)
+        readings = {}
+        for place, name in SHAFTS.items():
+            row = rows[place]
+            is_span = not math.isnan(overall.peak_to_peak_um[row])
+            span = recent.peak_to_peak_um[part, row] if is_span else math.nan
+            readings[f"overall_{name}_um_pp"] = segment.reading((row,), float(span))
+            readings[f"order1_{name}_um_pk"] = _turning(
+                segment, segment.reading((row,), float(recent.order1_um_pk[part, row]))
+            )
+        found.append(RecentReadings(segment.stop_ns - behind_ns, readings))
+    speeds = {
+        name: segment.velocities_mm_s_rms[rows[place]] for name, place in BEARING_SPEEDS.items()
+    }
+    newest = found[-1]
+    return (*found[:-1], RecentReadings(newest.time_ns, {**newest.readings, **speeds}))
+
+
+def polled_readings(polls: Sequence[Segment], rows: Sequence[int]) -> tuple[RecentReadings, ...]:
+    """Shaft vibration at 1× of each of some polls.
+
+    Parameters
+    ----------
+    rows
+        Of the bearing's four channels.
+    """
+    return tuple(
+        RecentReadings(
+            poll.stop_ns,
+            {
+                f"order1_{name}_um_pk": _turning(poll, _polled(poll, rows[place]))
+                for place, name in SHAFTS.items()
+            },
+        )
+        for poll in polls
+    )
+
+
+def _polled(poll: Segment, row: int) -> Reading:
+    quality = poll.order_quality[ORDER1][row]
+    if quality.level is Level.BAD:
+        return missing(quality.reason)
+    return Reading(float(abs(poll.order_phasors_um_pk[row, ORDER1])), quality)
+
+
+def _turning(segment: Segment, amplitude: Reading) -> Reading:
+    """An amplitude at 1×, as far as the speed is known."""
+    speed = segment.speed.rpm
+    if speed.value is None or amplitude.value is None:
+        return speed if speed.value is None else amplitude
+    return Reading(amplitude.value, worst((amplitude.quality, speed.quality)))
+
+
+def _mean_budget(
+    reading: Reading, parts: Sequence[Reading], bearing: Bearing, place: int, is_root: bool = False
+) -> Budget | None:
+    if not reading.value:
+        return None
+    lines = amplitude_lines(bearing, place, reading.value)
+    sensitivity = 0.5 / reading.value if is_root else 1.0
+    return mean_budget(reading.value, numbers(parts), lines, sensitivity)
+
+
+def _orbit(segment: Segment, rows: Sequence[int], bearing: int) -> Reading:
+    overall = segment.overall
+    return segment.reading(rows, float(overall.orbit_um_pk[bearing]) if overall else math.nan)
+
+
+def _root(mean: Reading) -> Reading:
+    return mean if mean.value is None else Reading(math.sqrt(max(mean.value, 0.0)), mean.quality)

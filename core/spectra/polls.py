@@ -1,0 +1,219 @@
+"""What a rack reports of a unit at one moment, as a segment without bins.
+
+A block of a rack has one sample for each poll, and a row for each quantity that the rack gives of a
+channel: amplitudes zero-to-peak in the channel's engineering unit, phases in degrees, positive
+where the reading leads the key-phase, gaps in micrometres. Each row has its own quality. Speed and
+temperatures are slow channels, as ever.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import ComplexArray, FloatArray, SampleArray
+from core.machine.channel import displacement_factor
+from core.machine.unit import Unit
+from core.quality import Level, Quality, Reason, bad
+from core.samples.blocks import SampleBlock
+from core.spectra.lines import SegmentSettings
+from core.spectra.runout import runout_verdict
+from core.spectra.segments import ORDER1, VORTEX, KeptSegments, Segment
+from core.spectra.speed import running_speed
+from core.units import hz_from_rpm
+
+NOT_GIVEN = bad(Reason.NOT_MEASURED)
+
+_NO_LINES: FloatArray = np.empty(0)
+
+
+class VectorPart(StrEnum):
+    """What a rack gives of a channel."""
+
+    ORDER1_AMPLITUDE = "order1_amplitude"
+    ORDER1_PHASE = "order1_phase"
+    VORTEX_AMPLITUDE = "vortex_amplitude"
+    OVERALL = "overall"
+    GAP = "gap"
+
+
+AMPLITUDE_PARTS = (
+    VectorPart.ORDER1_AMPLITUDE,
+    VectorPart.VORTEX_AMPLITUDE,
+    VectorPart.OVERALL,
+)
+"""Parts that have a detector; the overall amplitude is carried along, nothing is made of it."""
+
+
+@dataclass(frozen=True)
+class VectorRow:
+    """One row: which channel, by id, and what of it."""
+
+    channel: str
+    part: VectorPart
+
+    @property
+    def id(self) -> str:
+        """Name of the row, in register maps."""
+        return f"{self.channel}.{self.part}"
+
+
+@dataclass(frozen=True)
+class PollSettings:
+    """Which polls make a result.
+
+    Parameters
+    ----------
+    n_polls
+        Polls in the averaging window; 60 of 5 s are five minutes.
+    hop_polls
+        Polls from one result to the next, after which limits of vibration are judged.
+    min_polls
+        Polls with a changed vector below which a result is uncertain; at least 2.
+    """
+
+    n_polls: int = 60
+    hop_polls: int = 4
+    min_polls: int = 4
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.hop_polls <= self.n_polls:
+            raise ValueError(
+                f"a result comes every 1 to {self.n_polls} polls, got {self.hop_polls}"
+            )
+        if not 2 <= self.min_polls <= self.n_polls:
+            raise ValueError(
+                f"a window of {self.n_polls} has 2 polls or more, got {self.min_polls}"
+            )
+
+
+class PollTransform(KeptSegments):
+    """Makes segments without bins of the samples of blocks whose rows are vectors.
+
+    Parameters
+    ----------
+    unit
+        Its rate is that of the polls.
+    rows
+        What the rows of a block are.
+    settings
+        What counts as a speed; lengths of segments play no part here.
+    averaging
+        Which polls make a result.
+
+    Raises
+    ------
+    ValueError
+        If a row is of a channel that the unit has not, or there twice.
+    """
+
+    def __init__(
+        self,
+        unit: Unit,
+        rows: Sequence[VectorRow],
+        settings: SegmentSettings,
+        averaging: PollSettings | None = None,
+    ) -> None:
+        averaging = averaging or PollSettings()
+        n_polls, hop_polls = averaging.n_polls, averaging.hop_polls
+        super().__init__(len(rows), n_polls, averaging.min_polls, result_samples=hop_polls)
+        self._unit, self._settings = unit, settings
+        self._row = {(row.channel, row.part): n for n, row in enumerate(rows)}
+        known = {channel.id for channel in unit.channels}
+        for row in rows:
+            if row.channel not in known:
+                raise ValueError(f"row {row.id!r} is of no channel of unit {unit.id!r}")
+        if len(self._row) < len(rows):
+            raise ValueError(f"two of {len(rows)} rows are the same")
+        # a rack's phase has another reference than a slow-roll vector of padwatch's
+        self._runout = {
+            c.id: runout_verdict(c.slow_roll, c.probe, unit.rated_speed_rpm, has_key_phase=False)
+            for c in unit.channels
+        }
+
+    def add(self, window: SampleBlock) -> Segment:
+        """Read the one sample of a window, and keep it as a segment."""
+        sample, qualities = window.samples[:, 0], window.channel_quality
+        speed = running_speed(self._unit, window.slow, _NO_LINES, _NO_LINES, self._settings)
+        turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
+        order_hz = turn_hz * np.array([1.0, self._settings.vortex_order])
+        amplitude, quality = self._amplitudes(sample, qualities)
+        angle_rad, has_phase = self._phases(sample, qualities)
+        factor = np.array([displacement_factor(c, order_hz) for c in self._unit.channels])
+        # without a phase the factor's own angle would pass for one
+        turned: ComplexArray = np.where(has_phase[:, np.newaxis], factor, np.abs(factor))
+        phasors: ComplexArray = amplitude * turned
+        phasors[:, ORDER1] *= np.exp(1j * angle_rad)
+        gaps = [self._row_of(c.id, VectorPart.GAP, sample, qualities) for c in self._unit.channels]
+        gap_quality = tuple(quality for _, quality in gaps)
+        return self.keep(
+            Segment(
+                epoch=window.epoch,
+                first_index=window.first_index,
+                stop_index=window.stop_index,
+                stop_ns=window.start_ns,
+                channel_quality=gap_quality,
+                usable=_usable(gap_quality),
+                slow=window.slow,
+                mean=np.array([gap_um for gap_um, _ in gaps]),
+                speed=speed,
+                bin_phasors_um_pk=None,
+                order_frequency_hz=order_hz,
+                has_vortex_peak=False,
+                order_phasors_um_pk=phasors,
+                order_quality=quality,
+                order_usable=np.array([_usable(of_line) for of_line in quality]),
+                has_phase=np.array([has_phase, np.zeros_like(has_phase)]),
+                at_mark_um_pk=phasors[:, ORDER1],
+                runout=self._runout,
+                overall=None,
+                clipped_share=np.zeros(len(gaps)),
+                recent=None,
+            )
+        )
+
+    def _row_of(
+        self, channel: str, part: VectorPart, sample: SampleArray, qualities: Sequence[Quality]
+    ) -> tuple[float, Quality]:
+        row = self._row.get((channel, part))
+        if row is None:
+            return 0.0, NOT_GIVEN
+        value, quality = float(sample[row]), qualities[row]
+        if quality.level is not Level.GOOD:
+            return 0.0, bad(quality.reason)  # a rack's gap is a mean already
+        return (value, quality) if np.isfinite(value) else (0.0, bad(Reason.NOT_FINITE))
+
+    def _amplitudes(
+        self, sample: SampleArray, qualities: Sequence[Quality]
+    ) -> tuple[FloatArray, tuple[tuple[Quality, ...], tuple[Quality, ...]]]:
+        """(n_channels, 2) amplitudes in the channels' units, and their qualities by line."""
+        found = [
+            tuple(
+                _not_below_zero(*self._row_of(channel.id, part, sample, qualities))
+                for part in (VectorPart.ORDER1_AMPLITUDE, VectorPart.VORTEX_AMPLITUDE)
+            )
+            for channel in self._unit.channels
+        ]
+        amplitude = np.array([[value for value, _ in pair] for pair in found])
+        order1, vortex = (tuple(pair[n][1] for pair in found) for n in (ORDER1, VORTEX))
+        return amplitude, (order1, vortex)
+
+    def _phases(
+        self, sample: SampleArray, qualities: Sequence[Quality]
+    ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+        found = [
+            self._row_of(channel.id, VectorPart.ORDER1_PHASE, sample, qualities)
+            for channel in self._unit.channels
+        ]
+        known = np.array([quality.level is not Level.BAD for _, quality in found])
+        return np.deg2rad([angle for angle, _ in found]), known
+
+
+def _usable(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
+    return np.array([quality.level is not Level.BAD for quality in qualities])
+
+
+def _not_below_zero(amplitude: float, quality: Quality) -> tuple[float, Quality]:
+    return (amplitude, quality) if amplitude >= 0.0 else (0.0, bad(Reason.OUT_OF_RANGE))

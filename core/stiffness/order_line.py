@@ -1,0 +1,408 @@
+"""One order line of a bearing: amplitudes, phases, equation (5) and transfer, with evidence."""
+
+import cmath
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import ComplexArray, FloatArray
+from core.checks.sensor_checks import axes_quality, backward_share
+from core.machine.unit import Bearing
+from core.quality import GOOD, Quality, Reading, Reason, missing, worst
+from core.spectra.cross_spectrum import (
+    BEARING_X,
+    BEARING_Y,
+    SHAFT_X,
+    SHAFT_Y,
+    CrossSpectrum,
+    average,
+    independent_segments,
+)
+from core.spectra.segments import ORDER1, VORTEX
+from core.spectra.vortex import roundness, vortex_frequency_hz
+from core.stiffness.channel_budget import (
+    amplitude_budget,
+    amplitude_lines,
+    coherence_budget,
+    phase_budget,
+    phase_lines,
+    roundness_budget,
+)
+from core.stiffness.evidence import EvidenceSettings, LineLimits, chance_coherence, line_excitation
+from core.stiffness.stiffness_budget import (
+    n_changed,
+    n_effective,
+    polls_ratio_budget,
+    ratio_budget,
+    transfer_budgets,
+)
+from core.stiffness.transfer import effective_stiffness_n_per_m, line_transfer
+from core.uncertainty import Budgeted
+
+FLOOR_REACH = 12
+"""Bins to each side of a line in which its surroundings are judged."""
+
+MAIN_LOBE = 2
+"""Bins to each side of a tone that a Hann taper spreads it over."""
+
+DIRECTIONS = {"xx": (SHAFT_X, BEARING_X), "yy": (SHAFT_Y, BEARING_Y)}
+
+AMPLITUDES = {
+    "shaft_x": SHAFT_X,
+    "shaft_y": SHAFT_Y,
+    "bearing_x": BEARING_X,
+    "bearing_y": BEARING_Y,
+}
+
+
+@dataclass(frozen=True)
+class OrderLine:
+    """An order line of one bearing over some segments or polls.
+
+    Parameters
+    ----------
+    orders
+        Cross-spectrum that holds the line.
+    at
+        Index of the line in `orders`.
+    line
+        `ORDER1` or `VORTEX`.
+    bins
+        Cross-spectrum at the bins, for the surroundings of the line; None of polls.
+    min_segments
+        Independent segments or polls below which there is no `transfer`.
+    quality
+        Quality of a reading from some channels at this line, or the reason why there is none.
+    phasors_um_pk, usable, has_phase : (n, 4)
+        Of each segment or poll: the line, whether the channel counts, whether its phase is known.
+    at_mark_um_pk, has_mark : (n, 4)
+        1× phasors when the shaft's mark passes the pick-up, and whether they are known.
+    floors_um_pk
+        Of (u_x, u_y, v_x, v_y): amplitude of a line of each transducer's own noise.
+    round_shafts
+        Shaft channels whose runout was taken off at 1×.
+    """
+
+    bearing: Bearing
+    settings: EvidenceSettings
+    orders: CrossSpectrum
+    at: int
+    line: int
+    bins: CrossSpectrum | None
+    min_segments: int
+    quality: Callable[..., Quality | Reading]
+    phasors_um_pk: ComplexArray
+    usable: npt.NDArray[np.bool_]
+    has_phase: npt.NDArray[np.bool_]
+    at_mark_um_pk: ComplexArray
+    has_mark: npt.NDArray[np.bool_]
+    floors_um_pk: tuple[float, ...]
+    round_shafts: frozenset[int] = frozenset()
+
+    @property
+    def frequency_hz(self) -> float:
+        """Mean over the segments."""
+        return float(self.orders.frequency_hz[self.at])
+
+    def n_segments(self, first: int, last: int) -> int:
+        """Segments in which two channels are usable; of polls, those that differ from the last."""
+        if self.bins is not None:
+            return int(self.orders.n_segments[first, last])
+        both = self.usable[:, first] & self.usable[:, last]
+        return n_changed(*np.abs(self.phasors_um_pk[both][:, [first, last]]).T)
+
+    def readings(self) -> dict[str, Budgeted]:
+        """Amplitudes, roundness, coherence, equation (5) and transfer, by quantity."""
+        amplitudes = {f"{name}_um_pk": self._amplitude(p) for name, p in AMPLITUDES.items()}
+        found = {**amplitudes, "roundness": self._roundness()}
+        for axes, (shaft, bearing) in DIRECTIONS.items():
+            found |= self._direction(axes, shaft, bearing)
+        return found
+
+    def phases(self) -> dict[str, Budgeted]:
+        """Phases of the mean 1× vectors at the mark, deg, positive where a vector leads."""
+        return {f"{name}_phase_deg": self._phase(place) for name, place in AMPLITUDES.items()}
+
+    def axes_quality(self, rotation_sense: int) -> Quality:
+        """Whether shaft and bearing whirl with the rotation, where their line stands out."""
+        return worst(
+            self._pair_quality(x, y, rotation_sense)
+            for x, y in ((SHAFT_X, SHAFT_Y), (BEARING_X, BEARING_Y))
+        )
+
+    @property
+    def is_of_shaft(self) -> bool:
+        """Whether the shaft moves at the line, in one direction at least."""
+        return self._stands_out(SHAFT_X) or self._stands_out(SHAFT_Y)
+
+    @cached_property
+    def phases_known(self) -> bool:
+        """Whether the phase of all four channels is known in any segment or poll."""
+        return bool((self.usable & self.has_phase).all(axis=1).any())
+
+    def _runout_um_pk(self, place: int) -> float:
+        """Runout in a channel: it is locked to the shaft, so that the vortex is free of it."""
+        is_shaft = place in (SHAFT_X, SHAFT_Y)
+        free = not is_shaft or self.line != ORDER1 or place in self.round_shafts
+        return 0.0 if free else self.bearing.runout_um_pk
+
+    def _phased(self, first: int, second: int) -> CrossSpectrum | None:
+        """Averages where the phases of two channels are known; None if they never are."""
+        if self.bins is not None:
+            return self.orders
+        known = self.usable & self.has_phase
+        if not known[:, [first, second]].all(axis=1).any():
+            return None
+        return average(self.orders.frequency_hz, self.phasors_um_pk[:, :, np.newaxis], known)
+
+    def _amplitude(self, place: int) -> Budgeted:
+        quality = self.quality(place)
+        if isinstance(quality, Reading):
+            return quality, None
+        amplitude = float(self.orders.amplitude_um_pk(place)[self.at])
+        counted = self.phasors_um_pk[self.usable[:, place], place]
+        lines = amplitude_lines(self.bearing, place, amplitude, self._runout_um_pk(place))
+        return Reading(amplitude, quality), amplitude_budget(amplitude, counted, lines)
+
+    def _phase(self, place: int) -> Budgeted:
+        quality = self.quality(place)
+        if isinstance(quality, Reading):
+            return quality, None
+        if not self.has_mark[-1, place]:
+            return missing(Reason.NOT_MEASURED), None
+        vectors = self.at_mark_um_pk[self.usable[:, place] & self.has_mark[:, place], place]
+        mean = complex(vectors.mean()) if vectors.size else 0j
+        if mean == 0j:
+            return missing(Reason.INSUFFICIENT_EXCITATION), None
+        phase_deg = math.degrees(cmath.phase(mean)) % 360.0
+        lines = phase_lines(self._runout_um_pk(place), abs(mean))
+        return Reading(phase_deg, quality), phase_budget(phase_deg, vectors, lines)
+
+    def _roundness(self) -> Budgeted:
+        quality, phased = self.quality(SHAFT_X, SHAFT_Y), self._phased(SHAFT_X, SHAFT_Y)
+        if isinstance(quality, Reading) or phased is None:
+            nothing = quality if isinstance(quality, Reading) else missing(Reason.NOT_MEASURED)
+            return nothing, None
+        found, shafts = roundness(phased, self.at), [SHAFT_X, SHAFT_Y]
+        known = (self.usable & self.has_phase)[:, shafts].all(axis=1)
+        counted = self.phasors_um_pk[known][:, shafts]
+        runout_um_pk = tuple(self._runout_um_pk(place) for place in shafts)
+        return Reading(found, quality), roundness_budget(self.bearing, found, counted, runout_um_pk)
+
+    def _pair_quality(self, x: int, y: int, rotation_sense: int) -> Quality:
+        phased = self._phased(x, y)
+        if phased is None or not self._turns(phased, x, y):
+            return GOOD
+        power, cross = phased.power[self.at], complex(phased.matrix[self.at, x, y])
+        share = backward_share(float(power[x, y]), float(power[y, x]), cross)
+        return axes_quality(share, rotation_sense, self.settings.sensors)
+
+    def _turns(self, phased: CrossSpectrum, x: int, y: int) -> bool:
+        """Whether a pair of channels moves so much that its sense of turning means anything."""
+        if self.bins is not None:
+            return bool(phased.n_segments[x, y] and self._stands_out(x) and self._stands_out(y))
+        # runout is as round as the shaft's orbit, and turns as it does or against it
+        least_um_pk = max(self.floors_um_pk[x], self.floors_um_pk[y], self._runout_um_pk(x))
+        power = phased.power[self.at]
+        return bool(min(power[x, y], power[y, x]) > least_um_pk**2)
+
+    def _direction(self, axes: str, shaft: int, bearing: int) -> dict[str, Budgeted]:
+        """Coherence, equation (5) and transfer of one direction."""
+        coherence, k_eff, k, c = (
+            f"coherence_{axes}",
+            f"k_eff_{axes}_n_per_m",
+            f"transfer_k_{axes}_n_per_m",
+            f"transfer_c_{axes}_n_s_per_m",
+        )
+        quality = self.quality(shaft, bearing)
+        if isinstance(quality, Reading):
+            found = dict.fromkeys((coherence, k_eff, k, c), (quality, None))
+            return found | ({} if self.bins is not None else {coherence: NOT_MEASURED})
+        few = self.n_segments(shaft, bearing) < self.min_segments
+        u, v = self._common(shaft, bearing)
+        n = (
+            n_effective(u, v)
+            if self.bins is None
+            else independent_segments(
+                int(self.orders.n_segments[shaft, bearing]), self.settings.overlap
+            )
+        )
+        shown = self._coherence(shaft, bearing, quality, n, few)
+        reason = self._exclusion_reason(shaft, bearing, n, few)
+        if reason is not Reason.OK:
+            return {coherence: shown} | dict.fromkeys((k_eff, k, c), (missing(reason), None))
+        of_k, of_c = self._transfer(shaft, bearing, quality, n, few)
+        return {
+            coherence: shown,
+            k_eff: self._ratio(shaft, bearing, quality, n),
+            k: of_k,
+            c: of_c,
+        }
+
+    def _coherence(
+        self, shaft: int, bearing: int, quality: Quality, n_segments: float, few: bool
+    ) -> Budgeted:
+        if self.bins is None:
+            return NOT_MEASURED
+        if few:
+            return missing(Reason.FEW_SEGMENTS), None
+        coherence = self.orders.coherence_at(self.at, shaft, bearing)
+        return Reading(coherence, quality), coherence_budget(coherence, n_segments)
+
+    def _ratio(self, shaft: int, bearing: int, quality: Quality, n_segments: float) -> Budgeted:
+        bracket, accuracy = self.bearing.bracket, self.bearing.accuracy
+        runout_um_pk = self._runout_um_pk(shaft)
+        if self.bins is not None:
+            budget = ratio_budget(
+                self.orders, self.at, shaft, bearing, bracket, accuracy, n_segments, runout_um_pk
+            )
+        else:
+            phased = self._phased(shaft, bearing)
+            known = 0.0 if phased is None else phased.coherence_at(self.at, shaft, bearing)
+            budget = polls_ratio_budget(
+                *self._common(shaft, bearing),
+                self.frequency_hz,
+                bracket,
+                accuracy,
+                max(self.settings.min_coherence, known),
+                runout_um_pk,
+                self._across(shaft),
+            )
+        if budget is not None:
+            return budget.reading(quality), budget
+        ratio = float(self.orders.amplitude_ratio(bearing, shaft)[self.at])
+        k_eff = effective_stiffness_n_per_m(ratio, 1.0, self.bearing.bracket_stiffness_n_per_m)
+        return Reading(k_eff, quality), None
+
+    def _transfer(
+        self, shaft: int, bearing: int, quality: Quality, n_segments: float, few: bool
+    ) -> tuple[Budgeted, Budgeted]:
+        phased, bracket = self._phased(shaft, bearing), self.bearing.bracket
+        if phased is None:
+            return NOT_MEASURED, NOT_MEASURED
+        found = line_transfer(phased, self.at, shaft, bearing, bracket, n_segments)
+        if few or found is None:
+            nothing = missing(Reason.FEW_SEGMENTS), None
+            return nothing, nothing
+        of_k, of_c = transfer_budgets(
+            found, bracket, self.bearing.accuracy, self._runout_um_pk(shaft)
+        )
+        return (of_k.reading(quality), of_k), (of_c.reading(quality), of_c)
+
+    def _exclusion_reason(self, shaft: int, bearing: int, n_segments: float, few: bool) -> Reason:
+        """Why no stiffness may be read from the line; OK if one may."""
+        quiet, at = Reason.INSUFFICIENT_EXCITATION, self.at
+        if self.orders.power[at, shaft, bearing] <= 0.0:
+            return quiet
+        if self.orders.amplitude_um_pk(bearing)[at] < self.floors_um_pk[bearing]:
+            return quiet
+        runout_um_pk = self._runout_um_pk(shaft)
+        if self.bins is None:
+            limits = LineLimits(0.0, runout_um_pk)
+            reason = line_excitation(self.orders, at, shaft, bearing, limits)
+            phased = self._phased(shaft, bearing)
+            if reason is Reason.OK and phased is not None:  # phases that change at random
+                limits = LineLimits(self.settings.min_coherence, runout_um_pk)
+                reason = line_excitation(phased, at, shaft, bearing, limits)
+            return Reason.OK if reason is Reason.FEW_SEGMENTS else reason
+        # what is no line must not be read as the vortex's
+        if (few or self.line == VORTEX) and not self._stands_out(shaft):
+            return quiet
+        if few and not self._stands_out(bearing):
+            return quiet
+        # few segments are coherent with anything
+        least = 0.0 if few else max(self.settings.min_coherence, chance_coherence(n_segments))
+        limits = LineLimits(least, runout_um_pk)
+        reason = line_excitation(self.orders, at, shaft, bearing, limits)
+        return Reason.OK if few and reason is Reason.FEW_SEGMENTS else reason
+
+    def _common(self, shaft: int, bearing: int) -> tuple[FloatArray, FloatArray]:
+        """Amplitudes of both where both are usable and the shaft moves."""
+        amplitudes = np.abs(self.phasors_um_pk)
+        both = self.usable[:, shaft] & self.usable[:, bearing] & (amplitudes[:, shaft] > 0.0)
+        return amplitudes[both, shaft], amplitudes[both, bearing]
+
+    def _across(self, shaft: int) -> float:
+        """Shaft motion across a direction per motion along it; 1 where that is not known."""
+        power = self.orders.power[self.at]
+        across = SHAFT_Y if shaft == SHAFT_X else SHAFT_X
+        along, beside = float(power[shaft, across]), float(power[across, shaft])
+        return (beside / along) ** 0.5 if along > 0.0 else 1.0
+
+    def _stands_out(self, place: int) -> bool:
+        """Whether the line stands above its surroundings, less those of the other order line."""
+        if self.bins is None:
+            return False
+        lines_hz = self.orders.frequency_hz
+        floor = floor_power(self.bins, place, self.frequency_hz, lines_hz)
+        peak = self.orders.power[self.at, place, place]
+        return bool(peak > self.settings.min_line_to_floor * floor)
+
+
+NOT_MEASURED: Budgeted = (missing(Reason.NOT_MEASURED), None)
+
+
+def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
+    """Where to mark a line in a spectrum; None if there is none, or it is not the one meant.
+
+    Parameters
+    ----------
+    line
+        "order1" or "vortex".
+    """
+    reading = readings[f"{line}_frequency_hz"]
+    return None if reading.quality.reason is Reason.OUTSIDE_BAND else reading.value
+
+
+def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: FloatArray) -> float:
+    """Median power of a channel around a line, µm².
+
+    Parameters
+    ----------
+    bins
+        Cross-spectrum at evenly spaced frequencies.
+    lines_hz
+        Lines whose main lobes are left out.
+    """
+    bin_hz = bins.frequency_hz[1] - bins.frequency_hz[0]
+    number = np.arange(bins.frequency_hz.size)
+    near = np.abs(number - (round(line_hz / bin_hz) - 1)) <= FLOOR_REACH
+    positions = (lines_hz / bin_hz).round() - 1
+    in_lobe = (np.abs(number[:, np.newaxis] - positions) <= MAIN_LOBE).any(axis=1)
+    ordered = np.sort(bins.power[near & ~in_lobe, place, place])
+    return float(ordered[(ordered.size - 1) // 2] + ordered[ordered.size // 2]) / 2.0
+
+
+def other_line_hz(
+    bins: CrossSpectrum, turn_hz: float, band_hz: tuple[float, float], min_line_to_floor: float
+) -> float | None:
+    """Frequency of a line below 1×, outside the vortex band, that shaft and bearing share.
+
+    Parameters
+    ----------
+    bins
+        Cross-spectrum at evenly spaced frequencies.
+    band_hz
+        In which the vortex is looked for.
+
+    Returns
+    -------
+    None if no such line stands out.
+    """
+    bin_hz = float(bins.frequency_hz[1] - bins.frequency_hz[0])
+    margin_hz = (MAIN_LOBE + 1) * bin_hz
+    for low, high in ((margin_hz, band_hz[0]), (band_hz[1], turn_hz - margin_hz)):
+        found_hz = vortex_frequency_hz([bins], (low, high)) if low < high else None
+        if found_hz is None:
+            continue
+        peak = round(found_hz / bin_hz) - 1
+        lines_hz = np.array([found_hz, turn_hz])
+        for place in (SHAFT_X, SHAFT_Y):
+            floor = floor_power(bins, place, found_hz, lines_hz)
+            if bins.power[peak, place, place] > min_line_to_floor * floor:
+                return found_hz
+    return None
