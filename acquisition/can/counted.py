@@ -14,7 +14,7 @@ from acquisition.can.plan import (
     RefusalCounts,
 )
 from acquisition.can.rivals import Rivals
-from acquisition.delivery.epochs import Epochs
+from core.samples.axis import Epochs
 
 MAX_PENDING = 64
 """Instants that may be incomplete at the same time."""
@@ -163,7 +163,7 @@ class CountedInstants:
                 return []
             if frame.epoch is not None:
                 self._told_epoch = frame.epoch
-                self._epochs.tell(frame.epoch)
+                self._epochs.begin_first(frame.epoch)
             self._axis.anchor(mark.counter, mark.arrived_ns)
             return [Placed(frame.part, frame.data, mark.counter)]
         if self._doubted and self._confirms(frame):

@@ -15,8 +15,7 @@ from acquisition.can.gate import Frame, FrameGate, lost_in_controller, require_b
 from acquisition.can.plan import Refusal, RefusalCounts
 from acquisition.can.slcan import SlcanBus
 from acquisition.clock import Clock
-from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.interface_clock import InterfaceClock
+from acquisition.delivery.arrival import Arrival, InterfaceClock
 from acquisition.errors import FrameError, LinkError
 from core.samples.device_clock import StampFault
 

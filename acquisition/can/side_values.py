@@ -18,7 +18,7 @@ from acquisition.can.plan import (
     Refusal,
     RefusalCounts,
 )
-from acquisition.delivery.host_stamps import HostStamps
+from acquisition.delivery.arrival import HostStamps
 from acquisition.delivery.raw import RawBlock
 from core.arrays import RawArray
 from core.samples.blocks import Rejection

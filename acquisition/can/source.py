@@ -15,9 +15,9 @@ from acquisition.can.reader import FrameReader
 from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.can.uncounted import MAX_UNSURE_NS
 from acquisition.clock import Clock
+from acquisition.delivery.arrival import InterfaceClock
 from acquisition.delivery.blocks import Delivery
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.interface_clock import InterfaceClock
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock

@@ -1,7 +1,7 @@
 """`UncountedInstants`: sample instants of a device that counts nothing; the clock finds losses."""
 
 from acquisition.can.plan import Instant, Part, Plan, Refusal, RefusalCounts
-from acquisition.delivery.epochs import Epochs
+from core.samples.axis import Epochs
 from core.units import NS_PER_S
 
 MAX_UNSURE_NS = NS_PER_S

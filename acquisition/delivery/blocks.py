@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from acquisition.delivery.arrival import Arrival
+from acquisition.delivery.arrival import Arrival, ArrivalModel
 from acquisition.delivery.block_grid import BlockGrid
 from acquisition.delivery.calibration import UnitCalibration, calibrate
-from acquisition.delivery.clock_estimate import ClockEstimate
 from acquisition.delivery.raw import RawBlock
 from acquisition.delivery.stamps import StampCheck
 from core.samples.blocks import SampleBlock
@@ -40,7 +39,7 @@ class Delivery:
         self._samples_when_asked = samples_when_asked
         self._grid = BlockGrid(calibration.block_samples)
         self._stamps = StampCheck()
-        self._clock = ClockEstimate()
+        self._arrivals = ArrivalModel(calibration.rate_hz)
         self._fault: StampFault | None = None
 
     def note_fault(self, fault: StampFault) -> None:
@@ -105,7 +104,7 @@ class Delivery:
         return [calibrate(raw, self._calibration) for raw in self._grid.flush()]
 
     def _reading(self) -> DeviceClock:
-        clock = self._clock.reading(self._stamps.n_faults)
+        clock = self._arrivals.device_clock(self._stamps.n_faults)
         if self._samples_when_asked:
             return replace(clock, drift_ppm=None, u_drift_ppm=None)
         return clock
@@ -113,13 +112,7 @@ class Delivery:
     def _note_arrival(self, raw: RawBlock, is_good: bool, arrived: Arrival) -> None:
         stop_ns = raw.start_ns + ns_from_s(raw.n_samples / raw.rate_hz)
         own_stamp = self._stamped and is_good
-        self._clock.add(
-            raw.epoch,
-            raw.stop_index,
-            raw.rate_hz,
-            stop_ns if own_stamp else None,
-            arrived,
-        )
+        self._arrivals.add(raw.epoch, raw.stop_index, stop_ns if own_stamp else None, arrived)
 
     def _sample_block(self, raw: RawBlock, fault: StampFault | None) -> SampleBlock:
         block = calibrate(raw, self._calibration)

@@ -3,12 +3,11 @@
 from dataclasses import replace
 
 from acquisition.delivery.raw import RawBlock
+from core.samples.axis import ClockTolerance
 from core.samples.device_clock import StampFault
 from core.units import NS_PER_S, ns_from_s
 
-_TOLERANCE_NS = NS_PER_S
-_DRIFT = 1e-3
-"""A device's clock may be corrected by a second and run a permille wrong; the index is exact."""
+_TOLERANCE = ClockTolerance()
 
 _POSSIBLE_NS = range(946_684_800 * NS_PER_S, 4_102_444_800 * NS_PER_S)
 """From 2000 to 2100: a clock that leaves it (1904, 1970, 2106) was not set but has failed."""
@@ -67,6 +66,6 @@ def _fault(before: RawBlock, after: RawBlock) -> StampFault | None:
         return StampFault.REPEATED
     if elapsed_ns * expected_ns < 0:
         return StampFault.REGRESSED
-    if abs(elapsed_ns - expected_ns) > _TOLERANCE_NS + _DRIFT * abs(expected_ns):
+    if abs(elapsed_ns - expected_ns) > _TOLERANCE.over(expected_ns):
         return StampFault.JUMPED
     return None

@@ -5,22 +5,25 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 from acquisition.clock import Clock
-from acquisition.delivery.arrival import Arrival
+from acquisition.delivery.arrival import Arrival, HostStamps
 from acquisition.delivery.blocks import Delivery
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.freshness import Freshness
-from acquisition.delivery.host_stamps import HostStamps
 from acquisition.delivery.raw import RawBlock
 from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.client import ModbusClient
-from acquisition.modbus.counted_samples import CountedSamples
-from acquisition.modbus.fifo_assembly import ChannelAssembly, PlacedSamples, place_records
+from acquisition.modbus.fifo_assembly import (
+    ChannelAssembly,
+    CountedSamples,
+    PlacedSamples,
+    UncountedSamples,
+    place_records,
+)
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout, FifoPiece
 from acquisition.modbus.transport import LinkSettings
-from acquisition.modbus.uncounted_samples import UncountedSamples
+from core.samples.axis import Epochs
 from core.samples.blocks import SampleBlock
-from core.units import NS_PER_S
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,11 +76,11 @@ class FifoSource:
         self._freshness = Freshness("the newest sample", settings.stale_after_s)
         self._newest = (0, 0)
         self._connections = 0
-        epoch = clock.now_ns() // NS_PER_S
+        epochs = Epochs(clock.now_ns(), trusts_device=False)
         self._uncounted = UncountedSamples(
-            calibration.rate_hz, tolerance_s=settings.loss_tolerance_s, epoch=epoch
+            calibration.rate_hz, epochs, tolerance_s=settings.loss_tolerance_s
         )
-        self._counted = CountedSamples(calibration.rate_hz, removes=layout.removes, epoch=epoch)
+        self._counted = CountedSamples(calibration.rate_hz, epochs, removes=layout.removes)
         self._channels = ChannelAssembly(layout.n_channels, self._counted)
 
     @asynccontextmanager
@@ -140,7 +143,7 @@ class FifoSource:
                 raise
             if not drained:
                 continue
-            self._counted.note_seen_all(arrived.steady_s)
+            self._counted.note_drained(arrived.steady_s)
             if not self._layout.has_counter and self._uncounted.has_lost(arrived.steady_s):
                 waiting.clear()  # nobody knows where among these the loss is
                 self._uncounted.begin()

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.clock import Clock
-from acquisition.delivery.arrival import Arrival
+from acquisition.delivery.arrival import Arrival, HostStamps
 from acquisition.delivery.blocks import Delivery
 from acquisition.delivery.calibration import ChannelCalibration, UnitCalibration
 from acquisition.delivery.freshness import Freshness
-from acquisition.delivery.host_stamps import HostStamps
 from acquisition.delivery.raw import RawBlock
 from acquisition.delivery.ticks import Ticks
 from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link

@@ -3,7 +3,6 @@
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from acquisition.delivery.epochs import Epochs
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.client import ModbusClient
@@ -17,6 +16,7 @@ from acquisition.modbus.ring_profile import (
     decode_slot,
 )
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
+from core.samples.axis import Epochs
 from core.samples.blocks import Rejection
 
 _N_TRIES = 4
@@ -186,7 +186,7 @@ class RingFollower:
         before = self._header
         if before is None:
             self._timeline = Timeline(header.layout)
-            self._epochs.tell(header.epoch)
+            self._epochs.begin_first(header.epoch)
             self._handled = header.newest - 1
         elif (before.epoch, before.layout) != (header.epoch, header.layout):
             await self._require_again(reader, header)

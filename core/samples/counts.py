@@ -6,12 +6,10 @@ index alone, all that it then delivers has been there; its time says that it is 
 
 from dataclasses import dataclass, replace
 
+from core.samples.axis import RECOUNTED_EPOCHS
 from core.samples.blocks import SampleBlock
 from core.samples.outage import Reach, begins_anew
 from core.units import NS_PER_S
-
-ANEW = 1 << 33
-"""Epochs that devices tell and adapters count are below this."""
 
 _SECONDS = 1 << 32
 
@@ -64,7 +62,9 @@ class Counts:
         epoch, is_new = block.epoch, True
         if count is not None and block.epoch == count.told:
             anew = begins_anew(Reach(block.epoch, count.stop_index, count.stop_ns), block)
-            epoch = ANEW + block.start_ns // NS_PER_S % _SECONDS if anew else count.epoch
+            epoch = (
+                RECOUNTED_EPOCHS + block.start_ns // NS_PER_S % _SECONDS if anew else count.epoch
+            )
             is_new = anew or block.stop_index >= count.stop_index
         if is_new:
             self.count = Count(block.epoch, epoch, block.stop_index, block.stop_ns)

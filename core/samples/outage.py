@@ -8,12 +8,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from core.samples.account import Gap
+from core.samples.axis import ClockTolerance
 from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S, ns_from_s
 
-TOLERANCE_NS = NS_PER_S
-DRIFT = 1e-3
-"""A device's clock may be corrected by a second and run a permille wrong; not more than that."""
+_TOLERANCE = ClockTolerance()
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def begins_anew(reach: Reach, block: SampleBlock) -> bool:
     """
     if block.epoch != reach.epoch or block.first_index >= reach.stop_index:
         return False
-    return block.start_ns >= reach.stop_ns - TOLERANCE_NS and not _goes_on(reach, block)
+    return block.start_ns - reach.stop_ns >= -_TOLERANCE.over(0) and not _goes_on(reach, block)
 
 
 def n_missed(stop_ns: int, block: SampleBlock) -> int:
@@ -83,8 +82,7 @@ def n_missed(stop_ns: int, block: SampleBlock) -> int:
         Time up to which samples have arrived, of counts before.
     """
     counted_ns = ns_from_s(block.first_index / block.rate_hz)
-    tolerance_ns = TOLERANCE_NS + DRIFT * counted_ns
-    return block.first_index if _begin_ns(block) >= stop_ns - tolerance_ns else 0
+    return block.first_index if _begin_ns(block) - stop_ns >= -_TOLERANCE.over(counted_ns) else 0
 
 
 def _goes_on(reach: Reach, block: SampleBlock) -> bool:
@@ -94,7 +92,7 @@ def _goes_on(reach: Reach, block: SampleBlock) -> bool:
     passed_ns = ns_from_s((block.first_index - reach.stop_index) / block.rate_hz)
     deviation_ns = abs(block.start_ns - reach.stop_ns - passed_ns)
     poll_ns = ns_from_s(2.0 / block.rate_hz)  # where a sample is a poll, this may be a minute
-    return deviation_ns <= TOLERANCE_NS + poll_ns + DRIFT * abs(passed_ns)
+    return deviation_ns <= poll_ns + _TOLERANCE.over(passed_ns)
 
 
 def _counted(reach: Reach, block: SampleBlock) -> Iterator[Gap]:
@@ -112,7 +110,7 @@ def _counted(reach: Reach, block: SampleBlock) -> Iterator[Gap]:
 
 def _is_older(gap: Gap, reach: Reach) -> bool:
     """Whether a gap is of an earlier count of the same epoch, that had come farther."""
-    return gap.stop_ns < reach.stop_ns - TOLERANCE_NS
+    return gap.stop_ns - reach.stop_ns < -_TOLERANCE.over(0)
 
 
 def _piece(block: SampleBlock, start: int, stop: int) -> Gap:

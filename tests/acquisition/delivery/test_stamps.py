@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.delivery.host_stamps import HostStamps
+from acquisition.delivery.arrival import HostStamps
 from acquisition.delivery.raw import RawBlock
 from acquisition.delivery.stamps import StampCheck
 from core.samples.device_clock import StampFault

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.clock_estimate import ClockEstimate
+from acquisition.delivery.arrival import Arrival, ArrivalModel
 from acquisition.delivery.ring_pace import out_of_step_s
 from acquisition.errors import ConfigError, LinkError
 from acquisition.simulated.devices import faults
@@ -131,7 +130,7 @@ LIMIT_PPM = 200.0
 
 def readings(drift_ppm: float, period_s: float, slot_samples: int, seed: int):
     """Clock estimate every ten seconds for a ring whose link takes 3 ms, at times more."""
-    random, estimate = np.random.default_rng(seed), ClockEstimate()
+    random, estimate = np.random.default_rng(seed), ArrivalModel(RATE_HZ)
     slot_s = slot_samples / RATE_HZ
     begun_s = random.uniform(0.0, slot_s)
     told_s, seen, pace_s = 0.0, 0, out_of_step_s(period_s, slot_s)
@@ -142,10 +141,10 @@ def readings(drift_ppm: float, period_s: float, slot_samples: int, seed: int):
         seen = n_slots
         arrived_s = polled_s + 0.003 + random.exponential(0.002)
         arrived = Arrival(1_767_225_600 * 10**9 + round(arrived_s * 1e9), arrived_s)
-        estimate.add(1, n_slots * slot_samples, RATE_HZ, None, arrived)
+        estimate.add(1, n_slots * slot_samples, None, arrived)
         if polled_s - told_s >= 10.0:
             told_s = polled_s
-            yield estimate.reading()
+            yield estimate.device_clock()
 
 
 @pytest.mark.parametrize(("period_s", "slot_samples"), [(0.25, 50), (0.25, 600), (1.0, 60)])
