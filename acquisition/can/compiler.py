@@ -16,6 +16,7 @@ from acquisition.can.layout import (
 from acquisition.can.plan import (
     EPOCH,
     HOLD,
+    MAX_INSTANTS_PER_S,
     MICROSECONDS,
     OK_BITS,
     SECONDS,
@@ -26,7 +27,6 @@ from acquisition.can.plan import (
 )
 from acquisition.can.settings import CanChannel, CanSettings, CanSlowChannel
 from acquisition.can.signals import Place, SignalTable
-from acquisition.can.uncounted import MAX_INSTANTS_PER_S
 from acquisition.can.units import known_unit, spellings
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.errors import ConfigError

@@ -6,14 +6,13 @@ from contextlib import aclosing, asynccontextmanager
 
 import can
 
-from acquisition.can.assembly import Assembler
+from acquisition.can.assembly import MAX_UNSURE_S, FrameAssembler
 from acquisition.can.bus import LINUX_ERROR_FRAMES, open_bus
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.plan import SECONDS
 from acquisition.can.reader import FrameReader
 from acquisition.can.settings import CanLinkSettings, CanSettings
-from acquisition.can.uncounted import MAX_UNSURE_NS
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import InterfaceClock
 from acquisition.delivery.blocks import Delivery
@@ -21,14 +20,14 @@ from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
-from core.units import NS_PER_S, ns_from_s
+from core.units import ns_from_s
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
 """Opens a bus that delivers frames of these ids; `acquisition.can.bus.open_bus`."""
 
 _LOOK_S = 0.2
 
-_MAX_DOUBT_S = 2 * MAX_UNSURE_NS / NS_PER_S
+_MAX_DOUBT_S = 2 * MAX_UNSURE_S
 """What samples get to be placed by the clock, which looks at them for half of that at a time."""
 
 _MIN_STALE_INSTANTS = 3
@@ -65,7 +64,7 @@ class CanSource:
         instant_s = self._plan.samples_per_frame / calibration.rate_hz
         self._stale_after_s = max(settings.stale_after_s, _MIN_STALE_INSTANTS * instant_s)
         self._delivery = Delivery(calibration, stamped=SECONDS in self._plan.quantities)
-        self._assembler = Assembler(
+        self._assembler = FrameAssembler(
             self._plan,
             n_channels=len(calibration.channels),
             n_slow=len(calibration.slow),

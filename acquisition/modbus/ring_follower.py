@@ -129,7 +129,6 @@ class RingFollower:
         }
         self._header: RingHeader | None = None
         self._timeline: Timeline
-        self._n_resets = 0
         self._epochs = Epochs(begun_ns, trusts_device=True)
         self._handled = 0
         self._rejected: Counter[Refusal] = Counter()
@@ -185,14 +184,13 @@ class RingFollower:
         """Find the place to read from, when this is not simply the one after the last."""
         before = self._header
         if before is None:
-            self._timeline = Timeline(header.layout)
+            self._timeline = Timeline(header.layout, self._epochs)
             self._epochs.begin_first(header.epoch)
             self._handled = header.newest - 1
         elif (before.epoch, before.layout) != (header.epoch, header.layout):
             await self._require_again(reader, header)
             slot = await self._newest_slot(reader, header)
-            self._timeline = Timeline(header.layout, self._timeline.n_resets)
-            self._n_resets = self._timeline.n_resets
+            self._timeline = Timeline(header.layout, self._epochs)
             self._epochs.begin(header.epoch if before.epoch != header.epoch else None)
             if slot is not None:
                 self._timeline.anchor(slot)
@@ -276,9 +274,6 @@ class RingFollower:
     def _raw_block(self, slot: Slot, index: int, header: RingHeader) -> RawBlock:
         rejected = tuple(Rejection(str(r), n) for r, n in self._rejected.items())
         self._rejected.clear()
-        if self._timeline.n_resets != self._n_resets:  # the counters went back, and nobody told
-            self._n_resets = self._timeline.n_resets
-            self._epochs.begin()
         return RawBlock(
             epoch=self._epochs.number,
             first_index=index,

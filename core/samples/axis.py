@@ -132,11 +132,6 @@ class SampleAxis:
         """
         self.index, self._at_ns = index, at_ns
 
-    def nearest(self, counter: int, modulus: int) -> int:
-        """Index of a counter's reading that is nearest to where the axis stands."""
-        index = self.index or 0
-        return index + signed_distance(counter, index, modulus)
-
     def forward(self, counter: int, modulus: int) -> int:
         """Samples from where the axis stands up to a counter's reading, without whole wraps."""
         return (counter - (self.index or 0)) % modulus

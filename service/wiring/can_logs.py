@@ -1,6 +1,6 @@
 """Frames of an imported CAN log through the decoder of live ones."""
 
-from acquisition.can.assembly import Assembler
+from acquisition.can.assembly import FrameAssembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanSettings
@@ -27,7 +27,7 @@ class CanLogDecoder:
 
     def __init__(self, settings: CanSettings, calibration: UnitCalibration) -> None:
         plan = compile_plan(settings, calibration)
-        self._assembler = Assembler(
+        self._assembler = FrameAssembler(
             plan,
             n_channels=len(calibration.channels),
             n_slow=len(calibration.slow),
