@@ -15,7 +15,7 @@ from acquisition.can.reader import FrameReader
 from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import InterfaceClock
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import LinkError
@@ -63,7 +63,7 @@ class CanSource:
         self._plan = compile_plan(settings, calibration)
         instant_s = self._plan.samples_per_frame / calibration.rate_hz
         self._stale_after_s = max(settings.stale_after_s, _MIN_STALE_INSTANTS * instant_s)
-        self._delivery = Delivery(calibration, stamped=SECONDS in self._plan.quantities)
+        self._delivery = BlockAssembler(calibration, stamped=SECONDS in self._plan.quantities)
         self._assembler = FrameAssembler(
             self._plan,
             n_channels=len(calibration.channels),

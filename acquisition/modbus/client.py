@@ -7,7 +7,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from acquisition.delivery.stopping import let_stop_through
+from acquisition.delivery.network import let_stop_through
 from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
 from acquisition.modbus.framing import Asked
 from acquisition.modbus.identity import Identification, require_identity

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival, HostStamps
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.freshness import Freshness
+from acquisition.delivery.polling import Freshness, wrong_replies_drop_the_link
 from acquisition.delivery.raw import RawBlock
-from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.fifo_assembly import (
@@ -71,7 +70,7 @@ class FifoSource:
             )
         self._settings, self._layout = settings, layout
         self._calibration, self._clock = calibration, clock
-        self._delivery = Delivery(calibration, stamped=False)
+        self._delivery = BlockAssembler(calibration, stamped=False)
         self._stamps = HostStamps(calibration.rate_hz)
         self._freshness = Freshness("the newest sample", settings.stale_after_s)
         self._newest = (0, 0)

@@ -11,12 +11,10 @@ import numpy as np
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival, HostStamps
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import ChannelCalibration, UnitCalibration
-from acquisition.delivery.freshness import Freshness
+from acquisition.delivery.polling import Freshness, PollClock, wrong_replies_drop_the_link
 from acquisition.delivery.raw import RawBlock
-from acquisition.delivery.ticks import Ticks
-from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import ConfigError
 from acquisition.modbus.cells import BIT_FUNCTIONS, reads_as
 from acquisition.modbus.client import ModbusClient
@@ -158,14 +156,14 @@ class PolledSource:
         self._settings, self._clock = settings, clock
         self._decoder = MapDecoder(registers)
         self._assembly = _Assembly(registers, rows, calibration, 1.0 / settings.poll_period_s)
-        self._ticks = Ticks(clock, settings.poll_period_s)
+        self._ticks = PollClock(clock, settings.poll_period_s)
         self._freshness = Freshness("nothing that is read", settings.stale_after_s)
         self._stamps = HostStamps(1.0 / settings.poll_period_s)
         time = registers.time
         self._stamped = (
             time is not None and settings.poll_period_s >= _LEAST_STAMP_STEPS * time.resolution_s
         )
-        self._delivery = Delivery(calibration, stamped=self._stamped, samples_when_asked=True)
+        self._delivery = BlockAssembler(calibration, stamped=self._stamped, samples_when_asked=True)
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:

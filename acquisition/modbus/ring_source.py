@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.ring_pace import out_of_step_s
+from acquisition.delivery.polling import incommensurate_period_s
 from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.requests import READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS
@@ -66,7 +66,7 @@ class ModbusRingSource:
         self, settings: ModbusRingSettings, calibration: UnitCalibration, clock: Clock
     ) -> None:
         self._settings = settings
-        self._delivery = Delivery(calibration)
+        self._delivery = BlockAssembler(calibration)
         self._clock = clock
         self._follower = RingFollower(
             len(calibration.channels),
@@ -113,7 +113,7 @@ class ModbusRingSource:
             self._fresh_at_s = self._clock.monotonic_s()
 
     async def _blocks(self, reader: RingReader) -> AsyncGenerator[SampleBlock, None]:
-        period_s = out_of_step_s(self._settings.poll_period_s, self._slot_s)
+        period_s = incommensurate_period_s(self._settings.poll_period_s, self._slot_s)
         due_s = self._clock.monotonic_s()
         while True:
             begun_s = self._clock.monotonic_s()

@@ -7,8 +7,7 @@ from contextlib import asynccontextmanager
 
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import SlowCalibration, slow_reading
-from acquisition.delivery.freshness import Freshness
-from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
+from acquisition.delivery.polling import Freshness, wrong_replies_drop_the_link
 from acquisition.errors import AcquisitionError, ConfigError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import MapDecoder, MapReading

@@ -6,7 +6,7 @@ from enum import StrEnum
 from itertools import count
 from typing import Literal, TypeAlias, get_args
 
-from acquisition.delivery.names import KnownAddresses
+from acquisition.delivery.network import KnownAddresses
 from acquisition.errors import ConfigError
 from acquisition.modbus.identity import Identity
 

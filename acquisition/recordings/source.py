@@ -4,7 +4,7 @@ from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager, closing
 
 from acquisition.clock import Clock
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.recordings.progress import Progress
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.selection import Selection, all_of
@@ -44,7 +44,7 @@ class RecordingSource:
         self._recording = recording
         self._clock = clock
         self._selection = selection or all_of(recording.manifest)
-        self._delivery = Delivery(self._selection.calibration)
+        self._delivery = BlockAssembler(self._selection.calibration)
         self._speed = speed
         self._start_s: float | None = None
         self._next_block = 0

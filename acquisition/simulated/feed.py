@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from acquisition.delivery.block_grid import BlockGrid
+from acquisition.delivery.blocks import BlockGrid
 from acquisition.delivery.raw import FeedEndedError, RawBlock, RawFeed
 
 

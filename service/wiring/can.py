@@ -8,24 +8,16 @@ from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, C
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import COUNTS_FULL_SCALE
 from acquisition.delivery.raw import RawFeed
+from acquisition.delivery.units import UNIT_OF
 from acquisition.simulated.devices.can_bus import CanBusServer
 from acquisition.simulated.devices.can_dbc import daq_settings
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.port import DaqServer
-from core.machine.unit import Measurand
 from service.conversion import calibration_of
 from service.settings import can as settings
 from service.settings.units import UnitSettings
-
-UNITS = {
-    Measurand.GAP_UM: "um",
-    Measurand.DISPLACEMENT_UM: "um",
-    Measurand.VELOCITY_MM_S: "mm/s",
-    Measurand.ACCELERATION_M_S2: "m/s2",
-    Measurand.KEY_PHASE_V: "V",
-}
 
 
 def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSettings:
@@ -38,7 +30,7 @@ def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSett
         "when_full": source.when_full,
         "stamps": source.stamps,
     }
-    units = tuple(UNITS[channel.measurand] for channel in unit.channel)
+    units = tuple(UNIT_OF[channel.measurand] for channel in unit.channel)
     if source.profile is not None:
         return daq_settings(can_shape_of(unit, source), link, units, **others)
     return CanSettings(
@@ -91,7 +83,7 @@ def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
         channels=tuple(
             DaqSignal(
                 c.id,
-                UNITS[c.measurand] if floats else "V",
+                UNIT_OF[c.measurand] if floats else "V",
                 1.0 if floats else c.scale["full_scale_v"] / COUNTS_FULL_SCALE,
             )
             for c in unit.channel

@@ -6,8 +6,9 @@ from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from acquisition.delivery.block_grid import BlockGrid
+from acquisition.delivery.blocks import BlockGrid
 from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.units import slow_conversion, waveform_factor
 from acquisition.errors import ConfigError
 from acquisition.recordings.frames import FrameDecoder
 from acquisition.recordings.imports.job import (
@@ -18,7 +19,6 @@ from acquisition.recordings.imports.job import (
     SlowColumn,
     TimeAxis,
 )
-from acquisition.recordings.imports.units import slow_conversion, waveform_factor
 from acquisition.recordings.manifest import Manifest, read_manifest
 from acquisition.recordings.reading import Reading, reading
 from acquisition.recordings.writer import RecordingWriter

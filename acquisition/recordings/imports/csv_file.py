@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.delivery.units import require_unit, unit_in
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.candump import CUT_OFF
 from acquisition.recordings.imports.job import ImportJob, Place
 from acquisition.recordings.imports.rows import Rows, SlowValues
 from acquisition.recordings.imports.scaling import counts_are_kept, engineering_units
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns, text_to_ns
-from acquisition.recordings.imports.units import require_unit, unit_in
 from core.arrays import FloatArray, RawArray
 
 MAX_LINE_BYTES = 1_000_000

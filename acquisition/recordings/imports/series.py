@@ -6,12 +6,12 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from acquisition.delivery.units import require_unit
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, Place, SlowColumn
 from acquisition.recordings.imports.rows import Rows, SlowValues
 from acquisition.recordings.imports.scaling import counts_are_kept, engineering_units
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns
-from acquisition.recordings.imports.units import require_unit
 from core.arrays import RawArray
 
 MAX_SAMPLES = 2**29

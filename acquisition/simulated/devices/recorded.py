@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from acquisition.delivery.block_grid import BlockGrid
+from acquisition.delivery.blocks import BlockGrid
 from acquisition.delivery.raw import FeedEndedError, RawBlock
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.selection import Selection, all_of

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from acquisition.delivery.arrival import HostStamps
+from acquisition.delivery.blocks import StampCheck
 from acquisition.delivery.raw import RawBlock
-from acquisition.delivery.stamps import StampCheck
 from core.samples.device_clock import StampFault
 
 NS = 1_000_000_000

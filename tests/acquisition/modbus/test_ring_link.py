@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from acquisition.delivery.arrival import Arrival, ArrivalModel
-from acquisition.delivery.ring_pace import out_of_step_s
+from acquisition.delivery.polling import incommensurate_period_s
 from acquisition.errors import ConfigError, LinkError
 from acquisition.simulated.devices import faults
 from acquisition.simulated.devices.ring_device import RingDevice
@@ -94,7 +94,7 @@ async def test_a_source_waits_a_poll_period_and_never_piles_polls_up(
         device.memory.before_read = note
         for _ in range(6):
             await anext(stream)
-    pace_s = out_of_step_s(1.0, device.layout.slot_duration_s)
+    pace_s = incommensurate_period_s(1.0, device.layout.slot_duration_s)
     assert np.diff(polled_at_s) == pytest.approx([pace_s, pace_s, pace_s, 7.3, pace_s])
 
 
@@ -133,7 +133,7 @@ def readings(drift_ppm: float, period_s: float, slot_samples: int, seed: int):
     random, estimate = np.random.default_rng(seed), ArrivalModel(RATE_HZ)
     slot_s = slot_samples / RATE_HZ
     begun_s = random.uniform(0.0, slot_s)
-    told_s, seen, pace_s = 0.0, 0, out_of_step_s(period_s, slot_s)
+    told_s, seen, pace_s = 0.0, 0, incommensurate_period_s(period_s, slot_s)
     for polled_s in np.arange(pace_s, DURATION_S, pace_s).tolist():
         n_slots = int((begun_s + polled_s) * (1.0 + drift_ppm * 1e-6) / slot_s)
         if n_slots == seen:
@@ -163,7 +163,7 @@ def test_a_ring_that_is_polled_in_step_with_its_slots_tells_its_drift(
 
 @pytest.mark.parametrize("slot_s", [0.01, 0.0833, 0.1, 0.24, 0.25, 0.26, 0.5, 1.0, 7.0])
 def test_polls_come_no_later_than_asked_for_and_not_much_sooner(slot_s) -> None:
-    period_s = out_of_step_s(0.25, slot_s)
+    period_s = incommensurate_period_s(0.25, slot_s)
     assert 0.5 * 0.25 < period_s <= 0.25
     if slot_s > 1.0 or slot_s < 0.05:
         assert period_s > 0.8 * 0.25

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from acquisition.delivery.names import NameLookUp
+from acquisition.delivery.network import NameLookUp
 from service.delivery.network import Timeouts, Trust
 from service.delivery.outcome import Failed
 from service.delivery.webhook import Webhook, WebhookTarget
@@ -31,7 +31,7 @@ class NameServer:
 @pytest.fixture
 def names(monkeypatch: pytest.MonkeyPatch) -> Iterator[NameServer]:
     server = NameServer()
-    monkeypatch.setattr("acquisition.delivery.names.socket.getaddrinfo", server.getaddrinfo)
+    monkeypatch.setattr("acquisition.delivery.network.socket.getaddrinfo", server.getaddrinfo)
     yield server
     server.may_answer.set()
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.simulated.life.course import LifeCourse, LifePlan, course_from, history_until
 from acquisition.simulated.life.damage import Damage, DamageKind
 from acquisition.simulated.life.inputs import LifeInputs, draw_inputs
@@ -148,7 +148,7 @@ def test_samples_go_on_where_readings_stop(damage_h: float) -> None:
     plan = LifePlan(2, 0.95, (Damage(DamageKind.STIFFNESS_LOSS, "LJB", onset_ns, 0.2),))
     window_ns = ns_from_s(WINDOW_SAMPLES / UNIT.rate_hz)
     unit = SimulatedUnit(UNIT, CALIBRATION, course_from(plan, NOW_NS, UNIT), 5, NOW_NS)
-    delivery, monitor = Delivery(CALIBRATION), UnitMonitor(UNIT, SETTINGS)
+    delivery, monitor = BlockAssembler(CALIBRATION), UnitMonitor(UNIT, SETTINGS)
     newest: list[Assessment] = []
     for _ in range(WINDOW_SAMPLES // CHUNK_SAMPLES + 1):
         for block in delivery.take(unit.advance(CHUNK_SAMPLES)):

@@ -1,4 +1,4 @@
-"""Units as files write them, and what they are in the units of channels; nothing is guessed."""
+"""Units as files and DBCs write them, and their factors to those of channels; none is guessed."""
 
 import re
 from collections.abc import Iterable
@@ -23,10 +23,19 @@ _SAME = {
     "Hz": ("Hz",),
     "MW": ("MW",),
     "kW": ("kW",),
-    "degC": ("degC", "\u00b0C", "\u2103"),
+    "degC": ("degC", "\u00b0C", "\u2103", "deg C"),
     "K": ("K",),
 }
 _CANONICAL = {spelling: unit for unit, spellings in _SAME.items() for spelling in spellings}
+
+UNIT_OF = {
+    Measurand.GAP_UM: "um",
+    Measurand.DISPLACEMENT_UM: "um",
+    Measurand.VELOCITY_MM_S: "mm/s",
+    Measurand.ACCELERATION_M_S2: "m/s2",
+    Measurand.KEY_PHASE_V: "V",
+}
+"""Engineering units of waveform channels, spelt so that every tool can print them."""
 
 _LENGTH_UM = {"um": 1.0, "mm": 1e3, "m": 1e6, "mil": 25.4}
 _WAVEFORMS = {
@@ -47,8 +56,18 @@ _SLOW: dict[str, dict[str, tuple[float, float]]] = {
 
 
 def canonical(unit: str) -> str:
-    """The one spelling of a unit that padwatch knows; any other text stays what it is."""
+    """The one spelling that padwatch uses for a unit; an unknown unit stays as it is."""
     return _CANONICAL.get(unit.strip(), unit.strip())
+
+
+def known_unit(spelling: str) -> str | None:
+    """The unit that a spelling stands for; None if it is unknown."""
+    return _CANONICAL.get(spelling)
+
+
+def spellings(unit: str) -> str:
+    """All spellings of a unit, for a message."""
+    return ", ".join(f'"{spelling}"' for spelling in _SAME[unit])
 
 
 def waveform_factor(measurand: Measurand, unit: str, unit_per_v: float) -> float:
@@ -105,4 +124,4 @@ def require_unit(place: object, found: str | None, mapped: str) -> None:
 
 
 def _misfit(unit: str, wanted: str, known: Iterable[str]) -> ConfigError:
-    return ConfigError(f"unit {unit[:40]!r} is none for {wanted}; known are {', '.join(known)}")
+    return ConfigError(f"unit {unit[:40]!r} does not fit {wanted}; use one of {', '.join(known)}")
