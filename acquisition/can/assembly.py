@@ -48,7 +48,7 @@ _WIDE = 1 << 32
 class FrameAssembler:
     """Keeps its place on the sample axis across connections.
 
-    Where messages carry counters, these say to which instant a frame belongs. Where they carry
+    Where messages carry counters, these show to which instant a frame belongs. Where they carry
     none, the frames of an instant come in a fixed order, and instants are counted here. In both
     cases the host's clock has to confirm complete instants. Samples that are late on their way are
     followed within a second by others that are not. Where that does not happen, a device with a
@@ -235,7 +235,7 @@ class FrameAssembler:
         return blocks
 
     def _note(self, frame: PlacedFrame) -> None:
-        """Take over what a frame says beside its waveforms, for the samples it belongs to."""
+        """Note the values beside a counted frame's waveforms, for the samples it belongs to."""
         for key, value in self._early.items():
             self._builder.side.set(key, frame.index, value, self._hold)
         self._early.clear()
@@ -245,7 +245,7 @@ class FrameAssembler:
             self._builder.side.set(key, frame.index, read(frame.data), hold)
 
     def _note_now(self, part: Part, data: bytes) -> None:
-        """Take over what a message without counter says: it holds from now on, for a while."""
+        """Note the values of a frame without counter: they hold from now on, for a while."""
         if part.epoch is not None:
             self._note_epoch(int(part.epoch(data)))
         start: int | None = self._next

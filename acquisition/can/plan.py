@@ -73,7 +73,7 @@ class MessagePlan:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that the assembly needs to know.
+    """How all frames of a device are read.
 
     Parameters
     ----------

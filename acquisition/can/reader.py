@@ -1,8 +1,7 @@
-"""`FrameReader`: a thread of its own that listens, and a bounded queue to the event loop."""
+"""Thread that listens on a bus, and its bounded queue to the event loop."""
 
 import asyncio
 import threading
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from acquisition.can.slcan import SlcanBus
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival, InterfaceClock
 from acquisition.errors import FrameError, LinkError
-from core.samples.device_clock import StampFault
+from core.samples.blocks import StampFault
 
 _RECEIVE_S = 0.1
 _REST_S = 0.005
@@ -49,7 +48,7 @@ class Batch:
 
 
 class FrameReader:
-    """Listens from `start` to `stop`; whatever ends the thread is raised where frames are awaited.
+    """Listens from `start` to `stop`; an error that ends the thread is raised by `next_batch`.
 
     Parameters
     ----------
@@ -88,11 +87,10 @@ class FrameReader:
         self._judges_errors = judges_errors
         self._stamps = stamps
         self._stamp_fault: StampFault | None = None
-        self._batches: deque[Batch] = deque()
+        self._queue: asyncio.Queue[Batch | BaseException] = asyncio.Queue()
         self._n_waiting = 0
         self._room = threading.Condition()
         self._stopping = threading.Event()
-        self._news = asyncio.Event()
         self._ended = asyncio.Event()
         self._arrived = Arrival(0, 0.0)
         self._failure: BaseException | None = None
@@ -130,7 +128,7 @@ class FrameReader:
         finally:
             self._thread.join(_RECEIVE_S)
             if self._opened.done():
-                self._opened.exception()  # told, or no longer of interest
+                self._opened.exception()  # else asyncio logs it as never retrieved
 
     async def next_batch(self, timeout_s: float) -> Batch | None:
         """Return the next frames, or None if there are none in time.
@@ -140,36 +138,31 @@ class FrameReader:
         LinkError
             If the bus is lost.
         """
-        if not self._batches and self._failure is None:
-            self._news.clear()
-            try:
-                async with asyncio.timeout(timeout_s):
-                    await self._news.wait()
-            except TimeoutError:
-                return None
-        if self._batches:
-            with self._room:
-                batch = self._batches.popleft()
-                self._n_waiting -= len(batch.frames)
-                self._room.notify_all()
-            return batch
-        if self._failure is not None:
-            raise self._failure
-        return None
+        try:
+            async with asyncio.timeout(timeout_s):
+                batch = await self._queue.get()
+        except TimeoutError:
+            return None
+        if isinstance(batch, BaseException):
+            raise batch
+        with self._room:
+            self._n_waiting -= len(batch.frames)
+            self._room.notify_all()
+        return batch
 
     def _run(self) -> None:
         try:
             with foreign_errors_renamed(self._where):
                 bus = self._open_bus()
                 try:
-                    self._tell(self._set_opened)
+                    self._call(self._set_opened)
                     self._listen(bus)
                 finally:
                     bus.shutdown()
         except BaseException as exc:
             self._failure = exc
         finally:
-            self._tell(self._set_ended)
+            self._call(self._set_ended)
 
     def _listen(self, bus: can.BusABC) -> None:
         while not self._stopping.is_set():
@@ -183,7 +176,7 @@ class FrameReader:
                     self._hand_over(Batch(frames, self._arrived, self._stamp_fault))
                     self._stamp_fault = None
             if not frames and bus.state is can.BusState.ERROR:
-                raise LinkError(f"{self._where}: the interface says that it is in error")
+                raise LinkError(f"{self._where}: the interface reports an error state")
 
     def _collect(self, bus: can.BusABC, frames: list[Frame]) -> None:
         """Wait for a frame, then go on for a while, since a batch costs more than its frames."""
@@ -217,7 +210,7 @@ class FrameReader:
             self._stamp_fault = self._stamp_fault or fault
 
     def _next_message(self, bus: can.BusABC, timeout_s: float) -> can.Message | None:
-        """Next message, over what nobody can read; a bus that says nothing else is lost."""
+        """Next readable message; a bus that delivers no others for long is lost."""
         for _ in range(_MAX_NONSENSE):
             try:
                 with foreign_errors_renamed(self._where):
@@ -239,24 +232,24 @@ class FrameReader:
             if not self._has_room(n_frames):
                 self._refused[Refusal.OVERFLOW] += n_frames
                 return
-            self._batches.append(batch)
             self._n_waiting += n_frames
-        self._tell(self._news.set)
+        self._call(lambda: self._queue.put_nowait(batch))
 
     def _has_room(self, n_frames: int) -> bool:
-        return not self._batches or self._n_waiting + n_frames <= self._max_frames
+        return not self._n_waiting or self._n_waiting + n_frames <= self._max_frames
 
     def _set_opened(self) -> None:
         if not self._opened.done():
             self._opened.set_result(None)
 
     def _set_ended(self) -> None:
+        failure = self._failure or LinkError(f"{self._where}: closed before it was open")
         if not self._opened.done():
-            failure = self._failure or LinkError(f"{self._where}: closed before it was open")
             self._opened.set_exception(failure)
-        self._news.set()
+        self._queue.put_nowait(failure)
         self._ended.set()
 
-    def _tell(self, what: Callable[[], None]) -> None:
+    def _call(self, function: Callable[[], None]) -> None:
+        """Call a function in the event loop."""
         with suppress(RuntimeError):  # the loop has ended while a driver was hanging
-            self._loop.call_soon_threadsafe(what)
+            self._loop.call_soon_threadsafe(function)

@@ -30,7 +30,7 @@ _US_PER_S = 1_000_000
 _START = itemgetter(0)
 
 _Entry = tuple[int, float, int | None]
-"""First sample, value, and for how many samples it holds; None if another quantity says so."""
+"""First sample, value, and for how many samples it holds; None if another quantity gives that."""
 
 
 class SideTable:
@@ -49,7 +49,7 @@ class SideTable:
         self._entries: dict[str | int, list[_Entry]] = {key: [] for key in self._plan.quantities}
 
     def set(self, key: str | int, start: int, value: float, hold: int | None) -> None:
-        """Note what a frame says; see `_Entry`."""
+        """Note a value; see `_Entry`."""
         entries = self._entries[key]
         at = bisect_right(entries, start, key=_START)
         replaces = at > 0 and entries[at - 1][0] == start
@@ -97,8 +97,8 @@ class SideTable:
         """First sample at which an entry does not hold."""
         start, _, hold = entry
         if hold is None:
-            said = self._entry(HOLD, start)
-            hold = int(said[1]) if said is not None and said[0] == start else 0
+            other = self._entry(HOLD, start)
+            hold = int(other[1]) if other is not None and other[0] == start else 0
         return start + hold
 
 
@@ -167,7 +167,7 @@ class RawBlockBuilder:
         )
 
     def _ok(self, index: int) -> tuple[bool, ...]:
-        """The device's verdict on each channel; good only as long as the device says so."""
+        """The device's verdict on each channel; good only while the device reports it so."""
         if OK_BITS not in self._plan.quantities:
             return (True,) * self._n_channels
         bits = int(self.side.at(OK_BITS, index) or 0)

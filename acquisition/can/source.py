@@ -28,16 +28,16 @@ BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
 _LOOK_S = 0.2
 
 _MAX_DOUBT_S = 2 * MAX_UNSURE_S
-"""What samples get to be placed by the clock, which looks at them for half of that at a time."""
+"""Time in which the clock has to place samples; it observes them for half of that at a time."""
 
 _MIN_STALE_INSTANTS = 3
-"""So many sample instants make the least silence that means something."""
+"""A silence shorter than this many sample instants is normal."""
 
 
 class CanSource:
-    """Samples of one unit from CAN frames; remembers where it stood when connected again.
+    """Samples of one unit from CAN frames; keeps its place across connections.
 
-    It only listens. A CAN device keeps nothing: what passes while nobody is connected is a gap.
+    It only listens. A CAN device keeps nothing: what passes while the bus is not open is a gap.
 
     Parameters
     ----------

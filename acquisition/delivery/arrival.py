@@ -1,4 +1,4 @@
-"""When samples arrive, and what that says of their times and of the device's clock.
+"""When samples arrive, and what follows for their times and for the device's clock.
 
 Samples can arrive late, never early. The least delay therefore shows how a device's clock stands
 against the host's, and how late a sample is; all of this module follows from that.
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.clock import Clock
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, StampFault
 from core.units import NS_PER_S, ns_from_s
 
 
@@ -274,7 +274,7 @@ class InterfaceClock:
             When it was read.
         """
         if not math.isfinite(stamp_s) or stamp_s <= 0.0:
-            return read, StampFault.REPEATED  # an interface without stamps says 0 for ever
+            return read, StampFault.REPEATED  # an interface without stamps sends 0
         pair = _Pair(stamp_s, read)
         good, doubted = self._good, self._doubted
         fault = None if good is None else _fault(good, self._delay.least_s or 0.0, pair)

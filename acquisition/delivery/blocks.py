@@ -9,8 +9,7 @@ from acquisition.delivery.arrival import Arrival, ArrivalModel
 from acquisition.delivery.calibration import UnitCalibration, calibrate
 from acquisition.delivery.raw import RawBlock
 from core.samples.axis import ClockTolerance
-from core.samples.blocks import SampleBlock
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, SampleBlock, StampFault
 from core.units import NS_PER_S, ns_from_s
 
 _STAMP_NS = 1000
@@ -97,10 +96,10 @@ _POSSIBLE_NS = range(946_684_800 * NS_PER_S, 4_102_444_800 * NS_PER_S)
 
 
 class StampCheck:
-    """Compares each block's stamp with what the sample index says; the index rules.
+    """Compares each block's stamp with the sample index, which is exact.
 
     A stamp that does not fit is replaced by the one that follows from the last good stamp, and the
-    block says what was wrong. Two in a row that agree with each other show that the device's clock
+    block names the fault. Two in a row that agree with each other show that the device's clock
     was set: from then on they are believed, unless they have left the years of 2000 to 2100.
 
     Attributes
@@ -165,7 +164,7 @@ class BlockAssembler:
     stamped
         Whether ``start_ns`` of the raw blocks comes from the device rather than from the host.
     samples_when_asked
-        Whether the host says when to sample: then the device has no rate that could drift.
+        Whether the device samples when the host polls it: it then has no rate that could drift.
     """
 
     def __init__(

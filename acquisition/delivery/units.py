@@ -104,7 +104,7 @@ def slow_conversion(channel_unit: str, unit: str) -> tuple[float, float]:
 
 
 def unit_in(heading: str) -> str | None:
-    """The unit that a heading states behind its name, as in ``shaft x [um]``; else None."""
+    """The unit that a heading states after its name, as in ``shaft x [um]``; else None."""
     found = re.search(r"\[([^\[\]]{1,16})\]\s*$", heading)
     return found[1] if found and found[1].strip() in _CANONICAL else None
 

@@ -91,7 +91,7 @@ class Timeline:
         self._refused, self._n_miscounted = None, 0
 
     def _is_miscounted(self, reference: Slot, slot: Slot) -> bool:
-        """Whether index and time agree about where a slot belongs, whatever its number says.
+        """Whether index and time agree about where a slot belongs, whatever its sequence number.
 
         A device that was reset lately counts low numbers at a later time, by two slots at least.
         """

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from acquisition.recordings.reader import BlockHead, Recording
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from core.units import ns_from_s
 
 MAX_GAPS_LISTED = 1000

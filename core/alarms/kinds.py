@@ -10,7 +10,7 @@ from core.checks.sensor_checks import MAX_CLIPPED_SHARE
 from core.limits import WITHIN, AlarmLevel, Condition
 from core.machine.unit import Bearing, Unit
 from core.quality import Level, Quality, Reading, Reason, missing
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, StampFault
 
 
 @dataclass(frozen=True)

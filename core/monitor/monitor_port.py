@@ -6,9 +6,8 @@ from typing import Protocol
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
 from core.monitor.monitor_state import MonitorState
-from core.samples.account import Gap, SampleAccount
 from core.samples.blocks import SampleBlock
-from core.samples.outage import Reach
+from core.samples.gaps import Gap, Reach, SampleAccount
 
 
 class Monitor(Protocol):

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from core.condition.probe_axes import Growth
-from core.samples.account import SampleAccount
+from core.samples.gaps import SampleAccount
 
 
 @dataclass(frozen=True)

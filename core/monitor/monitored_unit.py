@@ -8,10 +8,8 @@ from core.machine.adoption import bearings_with_new_references, require_same_mac
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
 from core.monitor.monitor_state import MonitorState
-from core.samples.account import Gap, SampleAccount
-from core.samples.blocks import SampleBlock
-from core.samples.misfit import BlockMisfitError
-from core.samples.outage import Reach, outage, restart
+from core.samples.blocks import BlockMisfitError, SampleBlock
+from core.samples.gaps import Gap, Reach, SampleAccount, outage, restart
 from core.samples.ring import Ring
 
 

@@ -7,9 +7,8 @@ from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
 from core.monitor.monitor_port import Monitor
 from core.monitor.monitor_state import MonitorState
-from core.samples.account import Gap, SampleAccount
 from core.samples.blocks import SampleBlock
-from core.samples.outage import Reach
+from core.samples.gaps import Gap, Reach, SampleAccount
 from service.metrics.polls import TimedSource
 from service.metrics.timings import Timings
 from service.roles.watched_unit import WatchedUnit

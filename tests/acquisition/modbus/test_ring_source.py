@@ -11,8 +11,7 @@ from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from core.quality import Reason
-from core.samples.blocks import Rejection
-from core.samples.device_clock import StampFault
+from core.samples.blocks import Rejection, StampFault
 
 U32 = 2**32
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from core.monitor.catalogue import CATALOGUE
 from core.quality import GOOD
-from core.samples.account import Gap, SampleAccount
-from core.samples.blocks import SampleBlock
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, SampleBlock, StampFault
+from core.samples.gaps import Gap, SampleAccount
 from service.store.port import UnitGap
 
 

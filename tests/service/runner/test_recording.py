@@ -22,7 +22,7 @@ from core.alarms.event import AlarmNews
 from core.alarms.life_cycle import advance
 from core.limits import AlarmLevel, Condition
 from core.monitor.assessment import Assessment
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from service import recorder as recording
 from service.api.app import create_app
 from service.api.context import Context

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from service.store.port import Store, StoreError, UnitGap
 from service.store.positions_port import StreamPosition
 

@@ -6,8 +6,7 @@ from typing import Any
 from rigs.assessments import assessment
 from rigs.store_fixtures import at
 
-from core.samples.account import Gap
-from core.samples.outage import Reach
+from core.samples.gaps import Gap, Reach
 from service.store.port import UnitGap
 
 

@@ -12,8 +12,7 @@ from nats import connect
 from rigs.memory_folder import memory_folder, path_in_memory  # noqa: F401 - a fixture
 
 from core.quality import GOOD, Reading, Reason, missing, uncertain
-from core.samples.blocks import Rejection, SampleBlock
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, Rejection, SampleBlock, StampFault
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.stream.identity import UnitIdentity, fingerprint

@@ -18,8 +18,7 @@ from acquisition.simulated.devices.ring_shape import RingDeviceSettings
 from acquisition.simulated.devices.rtu_server import ModbusRtuServer
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.simulated.feed import Ledger
-from core.samples.blocks import Rejection
-from core.samples.device_clock import StampFault
+from core.samples.blocks import Rejection, StampFault
 
 
 class Turnstile:
