@@ -179,7 +179,10 @@ class FrameAssembler:
             placed = [] if part.wave is None else self._place_in_turn(part, part.wave, data)
         else:
             placed = self._counters.place(part, data, passed_ns)
-        blocks = self._after_restart(arrived_ns) if placed else []
+        blocks: list[RawBlock] = []
+        if placed and self._axis.epoch != self._epoch:  # finish what belongs to the old epoch
+            blocks = self._built(arrived_ns)
+            self._begin_count()
         for frame in placed:
             if part.counter is not None:
                 self._note(frame)
@@ -226,23 +229,15 @@ class FrameAssembler:
             self._sets.give_up(self._next)
             self._next += self._plan.samples_per_frame
 
-    def _after_restart(self, arrived_ns: int) -> list[RawBlock]:
-        """Finish what belongs to the epoch that has ended."""
-        if self._axis.epoch == self._epoch:
-            return []
-        blocks = self._built(arrived_ns)
-        self._begin_count()
-        return blocks
-
     def _note(self, frame: PlacedFrame) -> None:
         """Note the values beside a counted frame's waveforms, for the samples it belongs to."""
         for key, value in self._early.items():
-            self._builder.side.set(key, frame.index, value, self._hold)
+            self._builder.side.set(key, frame.first_index, value, self._hold)
         self._early.clear()
         part = frame.part
         hold = self._plan.hold_samples if part.wave is None else self._plan.samples_per_frame
         for key, read in part.values:
-            self._builder.side.set(key, frame.index, read(frame.data), hold)
+            self._builder.side.set(key, frame.first_index, read(frame.data), hold)
 
     def _note_now(self, part: Part, data: bytes) -> None:
         """Note the values of a frame without counter: they hold from now on, for a while."""

@@ -70,9 +70,14 @@ class CounterFollower:
         """
         if part.counter is None:
             return []
-        counter = int(part.counter.read(data)) * part.counter.step
+        counter, modulus = int(part.counter.read(data)) * part.counter.step, part.counter.modulus
         epoch = int(part.epoch(data)) if part.epoch else None
-        frame = _CountedFrame(part, data, counter, part.counter.modulus, epoch, arrived_ns)
+        fits = epoch is None or epoch == self._epoch
+        if fits and not self._doubted:
+            index = self._near_index(counter, modulus, arrived_ns)
+            if index is not None:
+                return [PlacedFrame(part, data, index)]
+        frame = _CountedFrame(part, data, counter, modulus, epoch, arrived_ns)
         if self._axis.index is None:
             return self._first(frame)
         if self._doubted and self._confirms(frame):
@@ -81,7 +86,7 @@ class CounterFollower:
             self._refused[Refusal.IMPOSSIBLE_COUNTER] += 1
             self._senders.note_contradiction()
         self._doubted.clear()
-        index = self._near_index(frame) if epoch in (None, self._epoch) else None
+        index = self._near_index(counter, modulus, arrived_ns) if fits else None
         if index is None:
             self._doubted.append(frame)
             return []
@@ -97,18 +102,21 @@ class CounterFollower:
         self._axis.stand_at(frame.counter, frame.arrived_ns)
         return [PlacedFrame(frame.part, frame.data, frame.counter)]
 
-    def _near_index(self, frame: _CountedFrame) -> int | None:
+    def _near_index(self, counter: int, modulus: int, arrived_ns: int) -> int | None:
         """Index of a frame that is close to the newest one; None if it is not."""
-        axis, half = self._axis, frame.modulus // 2
-        if axis.index is None or axis.elapsed(frame.arrived_ns) > min(
-            _SILENCE_S * self._rate_hz, half
-        ):
+        axis, half = self._axis, modulus // 2
+        if axis.index is None:
             return None
-        ahead = axis.forward(frame.counter, frame.modulus)
+        if arrived_ns != axis.at_ns:
+            silence = axis.elapsed(arrived_ns)
+            if silence > min(_SILENCE_S * self._rate_hz, half):
+                return None
+        ahead = (counter - axis.index) % modulus
         if ahead <= min(self._near_samples, half):
-            axis.stand_at(axis.index + ahead, frame.arrived_ns)
-            return axis.index
-        behind = frame.modulus - ahead
+            index = axis.index + ahead
+            axis.stand_at(index, arrived_ns)
+            return index
+        behind = modulus - ahead
         return axis.index - behind if behind <= min(self._near_samples, half // 2) else None
 
     def _confirms(self, frame: _CountedFrame) -> bool:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from acquisition.can.plan import Part, Plan, Refusal, RefusalCounts
 
@@ -60,13 +61,12 @@ class DuplicateSenderDetector:
         self._n_fitting = self._n_contrary = 0
 
 
-@dataclass(frozen=True)
-class PlacedFrame:
+class PlacedFrame(NamedTuple):
     """A frame whose place on the sample axis is known."""
 
     part: Part
     data: bytes
-    index: int
+    first_index: int
 
 
 @dataclass(frozen=True)
@@ -159,23 +159,37 @@ class FrameSets:
 
     def add(self, frame: PlacedFrame, epoch: int) -> Instant | None:
         """Put a frame to the others of its instant; return that, if it is complete."""
-        part, index, wave = frame.part, frame.index, frame.part.wave
+        part, index, wave = frame.part, frame.first_index, frame.part.wave
         if wave is None:
             return None
-        last = self._newest[wave]
-        if index <= last or index < self.stop:
-            self._refuse_old(wave, index, frame.data)
+        if self._plan.counted and not self._is_new(wave, index, frame.data):
             return None
-        self._senders.note_fit()
-        self._newest[wave] = index
-        self._remember(wave, index, frame.data)
-        n_samples = self._n_samples(part, frame.data)
-        pending = self.pending.setdefault(index, PendingInstant(self._plan.n_waves, n_samples))
+        n_samples = self._plan.samples_per_frame
+        if part.n_samples is not None and self._plan.counted:
+            n_samples = min(n_samples, int(part.n_samples(frame.data)))
+        pending = self.pending.get(index)
+        if pending is None:
+            pending = self.pending[index] = PendingInstant(self._plan.n_waves, n_samples)
         frames = pending.put(wave, frame.data, n_samples)
         if frames is None:
-            self._limit()
+            if len(self.pending) > MAX_PENDING:
+                self._n_incomplete += self.pending.pop(min(self.pending)).n_samples
             return None
         return self._finished(epoch, index, pending.n_samples, frames)
+
+    def _is_new(self, wave: int, index: int, data: bytes) -> bool:
+        """Whether a frame is of a sample that is not past; it is then remembered."""
+        last = self._newest[wave]
+        if index <= last or index < self.stop:
+            self._refuse_old(wave, index, data)
+            return False
+        self._senders.note_fit()
+        self._newest[wave] = index
+        seen = self._seen[wave]
+        seen[index] = data
+        if len(seen) > _MAX_REMEMBERED:
+            del seen[next(iter(seen))]
+        return True
 
     def _refuse_old(self, wave: int, index: int, data: bytes) -> None:
         """Count a frame of a sample that is past; a device alone never sends one in two ways."""
@@ -191,22 +205,6 @@ class FrameSets:
             return seen[index] != data
         n_samples = self._plan.samples_per_frame
         return any(n in seen for n in range(index - n_samples + 1, index + n_samples))
-
-    def _remember(self, wave: int, index: int, data: bytes) -> None:
-        seen = self._seen[wave]
-        seen[index] = data
-        if len(seen) > _MAX_REMEMBERED:
-            del seen[next(iter(seen))]
-
-    def _n_samples(self, part: Part, data: bytes) -> int:
-        most = self._plan.samples_per_frame
-        if part.n_samples is None or not self._plan.counted:
-            return most
-        return min(most, int(part.n_samples(data)))
-
-    def _limit(self) -> None:
-        if len(self.pending) > MAX_PENDING:
-            self._n_incomplete += self.pending.pop(min(self.pending)).n_samples
 
     def _finished(
         self, epoch: int, index: int, n_samples: int, frames: tuple[bytes, ...]
@@ -225,8 +223,10 @@ class FrameSets:
         """What of the jump up to an index was refused; the rest of it never came."""
         n_jump = index - self.stop if self.stop >= 0 else 0
         incomplete = min(self._n_incomplete, n_jump)
-        unusable = min(min(self._n_unusable), n_jump - incomplete)
+        unusable = min(*self._n_unusable, n_jump - incomplete)
         self._n_incomplete = 0
         self._n_unusable = [0] * self._plan.n_waves
+        if not n_jump:
+            return {}
         found = {Refusal.INCOMPLETE: incomplete, Refusal.WRONG_LENGTH: unusable}
         return {reason: n for reason, n in found.items() if n}

@@ -176,7 +176,7 @@ class FrameReader:
                     self._hand_over(Batch(frames, self._arrived, self._stamp_fault))
                     self._stamp_fault = None
             if not frames and bus.state is can.BusState.ERROR:
-                raise LinkError(f"{self._where}: the interface reports an error state")
+                raise LinkError(f"{self._where}: the interface reports that it is in error")
 
     def _collect(self, bus: can.BusABC, frames: list[Frame]) -> None:
         """Wait for a frame, then go on for a while, since a batch costs more than its frames."""

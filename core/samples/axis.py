@@ -104,23 +104,20 @@ class SampleAxis:
     ----------
     index
         Where the axis stands; None before the first sample.
+    at_ns
+        When it came to stand there.
     """
 
     def __init__(self, rate_hz: float, epochs: Epochs) -> None:
         self.epochs = epochs
         self._rate_hz = rate_hz
-        self._at_ns = 0
+        self.at_ns = 0
         self.index: int | None = None
 
     @property
     def epoch(self) -> int:
         """Number of the present count."""
         return self.epochs.number
-
-    @property
-    def at_ns(self) -> int:
-        """Time of the last `stand_at`."""
-        return self._at_ns
 
     def stand_at(self, index: int, at_ns: int) -> None:
         """Begin the axis, or go on at another place.
@@ -130,7 +127,7 @@ class SampleAxis:
         at_ns
             By a clock that is never set.
         """
-        self.index, self._at_ns = index, at_ns
+        self.index, self.at_ns = index, at_ns
 
     def forward(self, counter: int, modulus: int) -> int:
         """Samples from where the axis stands up to a counter's reading, without whole wraps."""
@@ -143,7 +140,7 @@ class SampleAxis:
 
     def elapsed(self, at_ns: int) -> float:
         """Samples that a device takes in the time since the axis came to where it stands."""
-        return max(0, at_ns - self._at_ns) / NS_PER_S * self._rate_hz
+        return max(0, at_ns - self.at_ns) / NS_PER_S * self._rate_hz
 
     def allowance(self, at_ns: int, tolerance: ClockTolerance) -> float:
         """Samples by which a jump up to now may differ from those that the clock expects."""
