@@ -283,7 +283,7 @@ class InterfaceClock:
                 self._doubted = pair
                 return read, fault
             self._delay = LeastDelay(_MAX_INTERFACE_DRIFT)
-            self._delay.late_s(doubted.difference_s, doubted.read.steady_s)
+            self._delay.late_s(doubted.difference_s, read.steady_s)
         self._good, self._doubted = pair, None
         late_s = max(0.0, self._delay.late_s(pair.difference_s, read.steady_s))
         return Arrival(read.host_ns - ns_from_s(late_s), read.steady_s - late_s), None
