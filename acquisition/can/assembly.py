@@ -1,10 +1,10 @@
-"""From admitted frames, in the order in which they arrived, to raw blocks."""
+"""Assembly of admitted frames, in the order of their arrival, into raw blocks."""
 
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
 
-from acquisition.can.counters import CounterFollower
+from acquisition.can.counters import JUMP_TOLERANCE, CounterFollower
 from acquisition.can.frame_sets import (
     DuplicateSenderDetector,
     FrameSets,
@@ -31,11 +31,6 @@ _MAX_DRIFT = 300e-6
 """Share by which a device that does not count may sample too slowly: twice what the crystals of
 device and host can differ, and some."""
 
-_MAX_LATE_S = 0.5
-_MAX_SLOW = 0.05
-"""As far as counter and clock may disagree about a jump (`counters`): a device that samples ever
-later, by less than this share, has a wrong rate and has not stopped."""
-
 _WINDOW_S = 0.25
 _FAST_SHARE = 0.2
 _FAST_WINDOWS = 2
@@ -46,7 +41,7 @@ _WIDE = 1 << 32
 
 
 class FrameAssembler:
-    """Keeps its place on the sample axis across connections.
+    """Assembles frames of one device into raw blocks; keeps its place across connections.
 
     Where messages carry counters, these show to which instant a frame belongs. Where they carry
     none, the frames of an instant come in a fixed order, and instants are counted here. In both
@@ -114,7 +109,7 @@ class FrameAssembler:
         self._builder.begin_epoch()
 
     def _begin_timing(self) -> None:
-        self._delay = LeastDelay(_MAX_SLOW if self._plan.counted else _MAX_DRIFT)
+        self._delay = LeastDelay(JUMP_TOLERANCE.drift if self._plan.counted else _MAX_DRIFT)
         self._origin_ns: int | None = None
         self._window_s = self._early_s = 0.0
         self._late_since_s: float | None = None
@@ -265,7 +260,7 @@ class FrameAssembler:
         """Whether the clock agrees that as many samples were taken as are held."""
         late_s, now_s = self._late_s(now_ns)
         is_counted = self._plan.counted
-        if late_s < (_MAX_LATE_S if is_counted else self._instant_s / 2):
+        if late_s < (JUMP_TOLERANCE.step_s if is_counted else self._instant_s / 2):
             self._late_since_s = None
             return True
         has_grown = not is_counted and late_s > self._least_late_s + _OTHER_LOSS_S

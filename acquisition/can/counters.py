@@ -14,8 +14,9 @@ _NEAR_FRAMES = 64
 _SILENCE_S = 1.0
 """So does the first frame after a silence, in which the device may have begun anew."""
 
-_TOLERANCE = ClockTolerance(step_s=0.5, drift=0.05)
-"""How far the host's clock and a counter may disagree about a jump over a wrap."""
+JUMP_TOLERANCE = ClockTolerance(step_s=0.5, drift=0.05)
+"""How far the host's clock and a counter may disagree about a jump over a wrap, or about a device
+that has stopped: one that samples ever later, by less than this share, has a wrong rate."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,7 @@ class CounterFollower:
         if reports and axis.forward(counter, modulus) <= modulus // 2:
             return True
         deviation = axis.jump(counter, modulus, at_ns) - axis.elapsed(at_ns)
-        return abs(deviation) <= axis.allowance(at_ns, _TOLERANCE)
+        return abs(deviation) <= axis.allowance(at_ns, JUMP_TOLERANCE)
 
     def _resumes(self, frame: _CountedFrame, epoch: int | None) -> bool:
         """Whether a count goes on that was left for another one within the last second."""

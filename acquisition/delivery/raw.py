@@ -1,7 +1,6 @@
-"""`RawBlock`: samples as a device delivers them, before calibration; and what produces them."""
+"""Samples as a device delivers them, before calibration."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 from core.arrays import RawArray
 from core.samples.blocks import Rejection
@@ -14,8 +13,8 @@ class RawBlock:
     Parameters
     ----------
     counts
-        (n_channels, n_samples) int16 counts of the converter; or, from a device that has no such
-        thing, float32 engineering units, not a number where the device has none.
+        (n_channels, n_samples) int16 counts of the converter; or, from a device that has none,
+        float32 engineering units, not a number where the device has no sample.
     start_ns
         Time of the first sample, by the device's stamps or by the host's clock.
     ok
@@ -42,24 +41,3 @@ class RawBlock:
     def stop_index(self) -> int:
         """Index of the first sample after the block."""
         return self.first_index + self.n_samples
-
-
-class FeedEndedError(Exception):
-    """A raw feed has nothing more to give, as at the end of a recording."""
-
-
-class RawFeed(Protocol):
-    """A device's converter: the simulated DAQ pulls its samples from one of these."""
-
-    def advance(self, n_samples: int) -> RawBlock:
-        """Produce the next samples.
-
-        A simulated unit gives just as many, following directly on the previous ones. A recording
-        gives fewer before a gap or a restart of the device, and then goes on behind it.
-
-        Raises
-        ------
-        FeedEndedError
-            If there are no more.
-        """
-        ...

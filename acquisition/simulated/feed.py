@@ -1,9 +1,31 @@
 """Samples without a wire: a feed cut into slots, and the ledger of what a device has offered."""
 
 from collections import Counter
+from typing import Protocol
 
 from acquisition.delivery.blocks import BlockGrid
-from acquisition.delivery.raw import FeedEndedError, RawBlock, RawFeed
+from acquisition.delivery.raw import RawBlock
+
+
+class FeedEndedError(Exception):
+    """A feed has no more samples, as at the end of a recording."""
+
+
+class RawFeed(Protocol):
+    """The converter of a simulated device."""
+
+    def advance(self, n_samples: int) -> RawBlock:
+        """Produce the next samples.
+
+        A simulated unit gives as many, following directly on the previous ones. A recording gives
+        fewer before a gap or a restart of the device, and continues after it.
+
+        Raises
+        ------
+        FeedEndedError
+            If there are no more.
+        """
+        ...
 
 
 class Ledger:

@@ -8,8 +8,8 @@ import typer
 import uvloop
 
 from acquisition.clock import FastClock, SystemClock
-from acquisition.delivery.raw import RawFeed
 from acquisition.errors import AcquisitionError
+from acquisition.simulated.feed import RawFeed
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.daq_program import run_daq
 from service.settings.plant import PlantFile

@@ -7,7 +7,6 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import COUNTS_FULL_SCALE
-from acquisition.delivery.raw import RawFeed
 from acquisition.delivery.units import UNIT_OF
 from acquisition.simulated.devices.can_bus import CanBusServer
 from acquisition.simulated.devices.can_dbc import daq_settings
@@ -15,6 +14,7 @@ from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.port import DaqServer
+from acquisition.simulated.feed import RawFeed
 from service.conversion import calibration_of
 from service.settings import can as settings
 from service.settings.units import UnitSettings

@@ -1,10 +1,10 @@
 """Simulated DAQs in front of any raw feed, where the unit's source looks for them."""
 
 from acquisition.clock import Clock
-from acquisition.delivery.raw import RawFeed
 from acquisition.simulated.devices.port import DaqServer
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings
+from acquisition.simulated.feed import RawFeed
 from service.conversion import calibration_of, machine_of
 from service.settings import modbus_sources, sources
 from service.settings.can import CanSettings

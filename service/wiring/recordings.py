@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition.clock import Clock
-from acquisition.delivery.raw import RawFeed
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import read_manifest
 from acquisition.recordings.reader import Recording, open_recording
@@ -13,6 +12,7 @@ from acquisition.recordings.selection import Selection, select
 from acquisition.recordings.source import RecordingSource
 from acquisition.recordings.writer import RecordingWriter
 from acquisition.simulated.devices.recorded import RecordedFeed
+from acquisition.simulated.feed import RawFeed
 from acquisition.source import SampleSource
 from service.conversion import calibration_of, machine_of
 from service.settings.plant import PlantFile

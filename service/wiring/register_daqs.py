@@ -4,13 +4,13 @@ from pathlib import Path
 
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawFeed
 from acquisition.simulated.devices.fifo_device import FifoDevice
 from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.modbus_server import ModbusDevice, ModbusServer
 from acquisition.simulated.devices.rtu_server import ModbusRtuServer
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
 from acquisition.simulated.devices.vector_device import VectorDevice
+from acquisition.simulated.feed import RawFeed
 from core.machine.unit import Unit
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_sources import (

@@ -12,10 +12,11 @@ import numpy as np
 from rigs.command_line import padwatch
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.raw import RawBlock, RawFeed
+from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.reader import open_recording
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.feed import RawFeed
 from service.settings.loading import load_plant_file
 from service.wiring.simulations import simulated_feed
 

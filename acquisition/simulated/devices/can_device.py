@@ -3,11 +3,11 @@
 from collections import deque
 from dataclasses import replace
 
-from acquisition.delivery.raw import FeedEndedError, RawBlock, RawFeed
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.simulated.devices.can_frames import FrameEncoder, WireFrame
 from acquisition.simulated.devices.can_shape import CanShape
-from acquisition.simulated.feed import Ledger
+from acquisition.simulated.feed import FeedEndedError, Ledger, RawFeed
 from core.units import NS_PER_S
 
 _U32 = 1 << 32

@@ -7,11 +7,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from acquisition.delivery.raw import RawFeed
 from acquisition.errors import ConfigError
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.simulated.devices.map_device import MapDevice
-from acquisition.simulated.feed import Ledger, SlotFeed
+from acquisition.simulated.feed import Ledger, RawFeed, SlotFeed
 from core.arrays import CountArray
 
 _Record: TypeAlias = tuple[int, CountArray]

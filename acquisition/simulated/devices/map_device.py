@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock, RawFeed
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.read_plan import plan_reads
 from acquisition.modbus.register_map import MapValue, RegisterMap
 from acquisition.simulated.devices.register_image import RegisterImage, no_value
-from acquisition.simulated.feed import Ledger, SlotFeed
+from acquisition.simulated.feed import Ledger, RawFeed, SlotFeed
 from core.arrays import FloatArray
 
 _BEAT_MODULUS = 65536

@@ -3,9 +3,10 @@
 from collections import deque
 
 from acquisition.delivery.blocks import BlockGrid
-from acquisition.delivery.raw import FeedEndedError, RawBlock
+from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.selection import Selection, all_of
+from acquisition.simulated.feed import FeedEndedError
 
 
 class RecordedFeed:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from acquisition.delivery.raw import RawBlock, RawFeed
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.ring_profile import (
     U32,
@@ -20,7 +20,7 @@ from acquisition.simulated.devices.faults import Repetition, SlotFault
 from acquisition.simulated.devices.reading_watch import ReadingWatch
 from acquisition.simulated.devices.register_memory import RegisterMemory
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings, layout_of
-from acquisition.simulated.feed import Ledger, SlotFeed
+from acquisition.simulated.feed import Ledger, RawFeed, SlotFeed
 
 _LAST_LOOKS = 2
 """A reader that looks a second time has got the answer to the first, and all that it asked for."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock, RawFeed
+from acquisition.delivery.raw import RawBlock
 from acquisition.modbus.register_map import RegisterMap
 from acquisition.simulated.devices.map_device import MapDevice, in_units
-from acquisition.simulated.feed import Ledger
+from acquisition.simulated.feed import Ledger, RawFeed
 from core.arrays import FloatArray
 from core.spectra.lines import exact_phasors, tapered
 from core.spectra.vector_rows import VectorPart, VectorRow

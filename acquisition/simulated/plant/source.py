@@ -6,7 +6,7 @@ from contextlib import aclosing, asynccontextmanager
 from acquisition.clock import Clock
 from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawFeed
+from acquisition.simulated.feed import RawFeed
 from core.samples.blocks import SampleBlock
 
 SKIP_SAMPLES = 65536

@@ -11,10 +11,11 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
-from acquisition.delivery.raw import FeedEndedError, RawBlock
+from acquisition.delivery.raw import RawBlock
 from acquisition.simulated.devices.can_dbc import daq_settings
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
+from acquisition.simulated.feed import FeedEndedError
 from core.samples.blocks import SampleBlock
 
 NS_PER_S = 1_000_000_000

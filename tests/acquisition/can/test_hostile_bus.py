@@ -13,11 +13,11 @@ import pytest
 from rigs.tiers import covering, fast_and_long
 
 from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.raw import FeedEndedError
 from acquisition.errors import LinkError
 from acquisition.simulated.devices.can_bus import CanBusServer
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.simulated.feed import FeedEndedError
 
 N_EACH = 200
 N_CHANNELS = 4

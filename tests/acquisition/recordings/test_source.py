@@ -13,13 +13,14 @@ import pytest
 
 from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration, calibrate
-from acquisition.delivery.raw import FeedEndedError, RawBlock
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.selection import select
 from acquisition.recordings.source import RecordingSource
 from acquisition.simulated.devices.recorded import RecordedFeed
+from acquisition.simulated.feed import FeedEndedError
 from core.machine.unit import Channel, Measurand, Unit
 from core.samples.blocks import Rejection
 

@@ -11,7 +11,7 @@ import pytest
 from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.delivery.blocks import BlockGrid
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import FeedEndedError, RawBlock
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
 from acquisition.recordings.reading import reading
@@ -19,6 +19,7 @@ from acquisition.simulated.devices.can_dbc import daq_dbc, daq_settings
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_frames import WireFrame
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal
+from acquisition.simulated.feed import FeedEndedError
 from service.wiring.can_logs import CanLogDecoder
 
 START_S = 1_767_225_600

@@ -12,7 +12,6 @@ from rigs.can import shape_of
 from rigs.tiers import fast_and_long
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.raw import FeedEndedError
 from acquisition.errors import ConfigError, LinkError
 from acquisition.simulated.devices.can_bus import CanBusServer
 from acquisition.simulated.devices.can_dbc import daq_dbc
@@ -21,6 +20,7 @@ from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, dbc_nam
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.rtu_server import ModbusRtuServer
+from acquisition.simulated.feed import FeedEndedError
 
 SHAPE = CanShape(
     channels=(DaqSignal("a", "V"), DaqSignal("b", "V")),

@@ -8,7 +8,7 @@ from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import FeedEndedError, RawBlock
+from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import RingLayout
 from acquisition.modbus.ring_source import ModbusRingSettings, ModbusRingSource
@@ -17,6 +17,7 @@ from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.devices.ring_shape import RingDeviceSettings
 from acquisition.simulated.devices.rtu_server import ModbusRtuServer
 from acquisition.simulated.devices.tcp_server import ModbusTcpServer
+from acquisition.simulated.feed import FeedEndedError
 from core.samples.blocks import SampleBlock
 
 START_NS = 1_767_225_600 * 10**9
