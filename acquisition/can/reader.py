@@ -2,6 +2,7 @@
 
 import asyncio
 import threading
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
@@ -87,10 +88,11 @@ class FrameReader:
         self._judges_errors = judges_errors
         self._stamps = stamps
         self._stamp_fault: StampFault | None = None
-        self._queue: asyncio.Queue[Batch | BaseException] = asyncio.Queue()
+        self._batches: deque[Batch] = deque()
         self._n_waiting = 0
         self._room = threading.Condition()
         self._stopping = threading.Event()
+        self._news = asyncio.Event()
         self._ended = asyncio.Event()
         self._arrived = Arrival(0, 0.0)
         self._failure: BaseException | None = None
@@ -138,17 +140,22 @@ class FrameReader:
         LinkError
             If the bus is lost.
         """
-        try:
-            async with asyncio.timeout(timeout_s):
-                batch = await self._queue.get()
-        except TimeoutError:
-            return None
-        if isinstance(batch, BaseException):
-            raise batch
-        with self._room:
-            self._n_waiting -= len(batch.frames)
-            self._room.notify_all()
-        return batch
+        if not self._batches and self._failure is None:
+            self._news.clear()
+            try:
+                async with asyncio.timeout(timeout_s):
+                    await self._news.wait()
+            except TimeoutError:
+                return None
+        if self._batches:
+            with self._room:
+                batch = self._batches.popleft()
+                self._n_waiting -= len(batch.frames)
+                self._room.notify_all()
+            return batch
+        if self._failure is not None:
+            raise self._failure
+        return None
 
     def _run(self) -> None:
         try:
@@ -232,21 +239,22 @@ class FrameReader:
             if not self._has_room(n_frames):
                 self._refused[Refusal.OVERFLOW] += n_frames
                 return
+            self._batches.append(batch)
             self._n_waiting += n_frames
-        self._call(lambda: self._queue.put_nowait(batch))
+        self._call(self._news.set)
 
     def _has_room(self, n_frames: int) -> bool:
-        return not self._n_waiting or self._n_waiting + n_frames <= self._max_frames
+        return not self._batches or self._n_waiting + n_frames <= self._max_frames
 
     def _set_opened(self) -> None:
         if not self._opened.done():
             self._opened.set_result(None)
 
     def _set_ended(self) -> None:
-        failure = self._failure or LinkError(f"{self._where}: closed before it was open")
         if not self._opened.done():
+            failure = self._failure or LinkError(f"{self._where}: closed before it was open")
             self._opened.set_exception(failure)
-        self._queue.put_nowait(failure)
+        self._news.set()
         self._ended.set()
 
     def _call(self, function: Callable[[], None]) -> None:
