@@ -19,8 +19,7 @@ from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
 from core.quality import GOOD, Reading, Reason, bad
-from core.samples.blocks import SampleBlock
-from core.samples.device_clock import DeviceClock
+from core.samples.blocks import DeviceClock, SampleBlock
 from service.conversion import calibration_of, machine_of
 from service.origin import Origin
 from service.settings.loading import load_plant_file

@@ -7,7 +7,7 @@ ones; so are the settings.
 import math
 from dataclasses import dataclass
 
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.simulated.life.bearing import LIFE_BEARINGS, LifeBearing
 from acquisition.simulated.life.truth import RUNOUT_UM_PK
@@ -98,7 +98,7 @@ def readings(window: Window) -> list[FilmReading]:
     """Sample, analyse and read; one reading of every bearing, its condition yet to be told."""
     start_ns = window.time_ns - ns_from_s(WINDOW_SAMPLES / RATE_HZ)
     feed = SimulatedUnit(UNIT, CALIBRATION, window.scenario, window.seed, start_ns)
-    delivery, monitor = Delivery(CALIBRATION), UnitMonitor(UNIT, SETTINGS)
+    delivery, monitor = BlockAssembler(CALIBRATION), UnitMonitor(UNIT, SETTINGS)
     newest: list[Assessment] = []
     for _ in range(math.ceil(WINDOW_SAMPLES / CHUNK_SAMPLES)):
         for block in delivery.take(feed.advance(CHUNK_SAMPLES)):

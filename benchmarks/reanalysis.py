@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.recordings.writer import RecordingWriter
 from service.conversion import calibration_of
 from service.settings.loading import load_plant_file
@@ -28,7 +28,7 @@ def record(folder: Path) -> None:
     """Record an hour as fast as it can be simulated."""
     unit = load_plant_file(PLANT).unit[0]
     feed = simulated_feed(unit, SystemClock())
-    delivery = Delivery(calibration_of(unit))
+    delivery = BlockAssembler(calibration_of(unit))
     with RecordingWriter(folder, recorded_unit(unit), "benchmark") as writer:
         for _ in range(round(SECONDS * unit.rate_hz / unit.block_samples)):
             for block in delivery.take(feed.advance(unit.block_samples)):

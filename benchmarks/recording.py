@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from core.samples.blocks import SampleBlock
 from service.continuous.joining import join
 from service.continuous.pieces import TapeSettings
@@ -29,7 +29,7 @@ S_PER_DAY = 86_400.0
 
 def blocks_of(unit: UnitSettings) -> list[SampleBlock]:
     """Twenty minutes, beginning with an hour so that they are two whole stretches."""
-    feed, delivery = simulated_feed(unit, FullHour()), Delivery(calibration_of(unit))
+    feed, delivery = simulated_feed(unit, FullHour()), BlockAssembler(calibration_of(unit))
     n_slots = round(SECONDS * unit.rate_hz / unit.block_samples)
     return [
         block for _ in range(n_slots) for block in delivery.take(feed.advance(unit.block_samples))

@@ -11,7 +11,7 @@ from prometheus_client.process_collector import ProcessCollector
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from core.monitor.monitor import UnitMonitor
-from core.samples.outage import Reach
+from core.samples.gaps import Reach
 from service.alarms.gone_alarms import SHARED
 from service.alarms.health import StreamLook, recording_error
 from service.bus import Bus

@@ -8,9 +8,8 @@ from acquisition.clock import Clock
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.quality import Quality, Reading, Reason, bad, missing
-from core.samples.account import SampleAccount
-from core.samples.blocks import SampleBlock
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, SampleBlock, StampFault
+from core.samples.gaps import SampleAccount
 from service.capture.history import BlockHistory
 
 HELD_S = 10.0

@@ -11,6 +11,6 @@ if "asammdf" not in sys.modules:
 
     del sys.modules["asammdf"]
 
-# Whatever python-can would log comes back as an exception, and is told once, by who catches it.
+# All that python-can would log is raised as well, and logged once where it is caught.
 for _name in ("can", "cantools"):
     logging.getLogger(_name).setLevel(logging.CRITICAL)

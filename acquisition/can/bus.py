@@ -1,4 +1,4 @@
-"""Opening a bus of python-can; the one place where its interfaces are called by name."""
+"""Opening a bus of python-can; the one module that names its interfaces."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -25,7 +25,7 @@ LINUX_ERROR_FRAMES = ("socketcan", "slcan", "gs_usb", "virtual")
 
 @contextmanager
 def foreign_errors_renamed(where: str) -> Iterator[None]:
-    """Let no exception of python-can, pyserial, cantools or the system through as it is."""
+    """Rename every exception of python-can, pyserial, cantools and the system."""
     try:
         yield
     except AcquisitionError:
@@ -52,7 +52,7 @@ def open_bus(settings: CanLinkSettings, ids: Iterable[int] | None) -> can.BusABC
     LinkError
         If it is not there now.
     ConfigError
-        If this interface can never work here, or does not know an option.
+        If this interface can never work here, or has no such option.
     """
     where = str(settings)
     with foreign_errors_renamed(where):

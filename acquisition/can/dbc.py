@@ -1,10 +1,11 @@
-"""A DBC file, read by cantools and turned into plain values; the one place that knows cantools."""
+"""A DBC file as plain values; the one module that uses cantools."""
 
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from can.util import CAN_FD_DLC
 from cantools.database import load_string
 from cantools.database.can import Database, Message, Signal
 from cantools.database.errors import Error as DatabaseError
@@ -13,10 +14,10 @@ from acquisition.delivery.small_file import read_small_file
 from acquisition.errors import ConfigError, FrameError
 
 MAX_FILE_BYTES = 8_000_000
-MAX_SAID = 500
-"""Characters of a mistake that are shown."""
+MAX_REASON = 500
+"""Characters of a parser's message that are shown."""
 
-_FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
+_MAX_CLASSIC_BYTES = 8
 _EXTENDED_FLAG = 1 << 31
 _MAX_MULTIPLEXER_VALUES = 100_000
 _MULTIPLEXER_LINE = re.compile(r"SG_MUL_VAL_[^;]*")
@@ -55,7 +56,7 @@ class DbcSignal:
 
 @dataclass(frozen=True)
 class DbcMessage:
-    """A message; frames are told apart by `key`, which standard and extended ids never share.
+    """A message; `key` identifies its frames, and standard and extended ids never share one.
 
     Parameters
     ----------
@@ -79,7 +80,7 @@ class DbcMessage:
 
     @property
     def key(self) -> int:
-        """What distinguishes its frames: the id, and whether it is extended."""
+        """Identifies its frames: the id, and whether it is extended."""
         return frame_key(self.frame_id, self.extended)
 
     def raw_value(self, name: str, data: bytes) -> int | float:
@@ -129,8 +130,8 @@ def parse_dbc(text: str, path: Path) -> dict[str, DbcMessage]:
     try:
         database = load_string(text, database_format="dbc")
     except (DatabaseError, ValueError, KeyError) as exc:
-        said = str(exc)[:MAX_SAID]  # cantools repeats a line, which may be the whole file
-        raise ConfigError(f"{path}: not a DBC file that can be used: {said}") from exc
+        reason = str(exc)[:MAX_REASON]  # cantools repeats a line, which may be the whole file
+        raise ConfigError(f"{path}: not a DBC file that can be used: {reason}") from exc
     if not isinstance(database, Database) or not database.messages:
         raise ConfigError(f"{path}: no message in it; a DBC has lines that begin with BO_")
     messages = [_message(message) for message in database.messages]
@@ -186,8 +187,8 @@ def _message(source: Message) -> DbcMessage:
         name=source.name,
         frame_id=source.frame_id,
         extended=source.is_extended_frame,
-        fd=bool(source.is_fd) or source.length > _FD_LENGTHS[8],
-        length=next((n for n in _FD_LENGTHS if n >= source.length), source.length),
+        fd=bool(source.is_fd) or source.length > _MAX_CLASSIC_BYTES,
+        length=next((n for n in CAN_FD_DLC if n >= source.length), source.length),
         multiplexer=roots[0] if roots else None,
         nested=len(multiplexers) > 1,
         source=source,

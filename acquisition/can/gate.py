@@ -11,7 +11,7 @@ Frame: TypeAlias = tuple[int, bytes | None]
 
 
 class Message(Protocol):
-    """The part of python-can's message that is looked at."""
+    """The part of python-can's message that the gate reads."""
 
     arbitration_id: int
     is_extended_id: bool
@@ -39,7 +39,7 @@ class FrameGate:
         self._refused = refused
 
     def admit(self, message: Message) -> Frame | None:
-        """Return the frame; None if it is none of the configured ones."""
+        """Return the frame; None if it is not a configured one."""
         key = frame_key(message.arbitration_id, message.is_extended_id)
         shape = self._shapes.get(key)
         if shape is None or message.is_error_frame:
@@ -66,7 +66,6 @@ class FrameGate:
 
 BUS_OFF = 0x40
 CONTROLLER = 0x04
-RESTARTED = 0x100
 PROTOCOL = 0x08
 BUS_ERROR = 0x80
 RX_OVERFLOW = 0x01
@@ -76,7 +75,7 @@ _CONTROLLER_BYTE = 1
 
 
 def require_bus(message: Message) -> None:
-    """Refuse to go on when an error frame says that the controller is off the bus, or nearly so.
+    """Refuse an error frame that reports the controller off the bus, or nearly so.
 
     Raises
     ------
@@ -90,10 +89,10 @@ def require_bus(message: Message) -> None:
 
 
 def lost_in_controller(message: Message) -> bool:
-    """Whether an error frame says that frames were lost before they could be read."""
+    """Whether an error frame reports frames lost before they could be read."""
     return bool(_controller_state(message) & RX_OVERFLOW)
 
 
 def _controller_state(message: Message) -> int:
-    told = message.arbitration_id & CONTROLLER and len(message.data) > _CONTROLLER_BYTE
-    return message.data[_CONTROLLER_BYTE] if told else 0
+    has_state = message.arbitration_id & CONTROLLER and len(message.data) > _CONTROLLER_BYTE
+    return message.data[_CONTROLLER_BYTE] if has_state else 0

@@ -1,7 +1,7 @@
 """The signals of a frame as a numpy layout, and those of many frames as waveforms."""
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -10,17 +10,17 @@ import numpy.typing as npt
 
 from acquisition.can.dbc import DbcMessage, DbcSignal
 from acquisition.can.settings import CanChannel
-from acquisition.can.units import known_unit, spellings
 from acquisition.delivery.calibration import COUNTS_FULL_SCALE, ChannelCalibration
+from acquisition.delivery.units import known_unit, spellings
 from acquisition.errors import ConfigError
-from core.arrays import RawArray, SampleArray
+from core.arrays import RawArray
 
 ScalarReader: TypeAlias = Callable[[bytes], int | float]
 """Reads one signal from one frame, not scaled."""
 
 _BITS_PER_BYTE = 8
-_INTEGER_BITS = (8, 16, 32, 64)
-_FLOAT_BITS = (32, 64)
+_INTEGERS = {8: "b", 16: "h", 32: "i", 64: "q"}
+_FLOATS = {32: "f", 64: "d"}
 
 
 class FrameLayout:
@@ -37,7 +37,7 @@ class FrameLayout:
         self.dtype = np.dtype(
             {
                 "names": [s.name for s in aligned],
-                "formats": [_format(s) for s in aligned],
+                "formats": [_format_of(s) for s in aligned],
                 "offsets": [byte_offset(s) or 0 for s in aligned],
                 "itemsize": message.length,
             }
@@ -62,7 +62,7 @@ def byte_offset(signal: DbcSignal) -> int | None:
     """First byte of a signal that fills bytes and has a numpy type; else None."""
     offset, bit = divmod(signal.start, _BITS_PER_BYTE)
     first_bit = _BITS_PER_BYTE - 1 if signal.big_endian else 0
-    lengths = _FLOAT_BITS if signal.is_float else _INTEGER_BITS
+    lengths = _FLOATS if signal.is_float else _INTEGERS
     return offset if bit == first_bit and signal.n_bits in lengths else None
 
 
@@ -72,27 +72,24 @@ def scalar_reader(signal: DbcSignal) -> ScalarReader:
     if offset is None:
         message, name = signal.message, signal.name
         return lambda data: message.raw_value(name, data)
-    unpack = struct.Struct(_struct_format(signal)).unpack_from
+    unpack = struct.Struct(_format_of(signal)).unpack_from
     return lambda data: unpack(data, offset)[0]
 
 
-def _format(signal: DbcSignal) -> str:
-    kind = "f" if signal.is_float else "i" if signal.signed else "u"
-    order = ">" if signal.big_endian else "<"
-    return f"{order}{kind}{signal.n_bits // _BITS_PER_BYTE}"
-
-
-def _struct_format(signal: DbcSignal) -> str:
+def _format_of(signal: DbcSignal) -> str:
+    """Byte order and type of a signal, as numpy and struct write them."""
     order = ">" if signal.big_endian else "<"
     if signal.is_float:
-        return order + {32: "f", 64: "d"}[signal.n_bits]
-    letter = {8: "b", 16: "h", 32: "i", 64: "q"}[signal.n_bits]
+        return order + _FLOATS[signal.n_bits]
+    letter = _INTEGERS[signal.n_bits]
     return order + (letter if signal.signed else letter.upper())
 
 
 _FACTOR_TOLERANCE = 1e-6
 _COUNT_BITS = 16
 _V_PER = {"V": 1.0, "mV": 1e-3}
+_COUNTS = ("", "1", "count", "counts")
+"""What stands for the unit of a plain count."""
 
 
 @dataclass(frozen=True)
@@ -146,37 +143,28 @@ class WaveformDecoder:
         columns = [layout.columns(f) for layout, f in zip(self._layouts, frames, strict=True)]
         n_per_frame = len(self._channels[0].signals)
         shape = (len(self._channels), len(frames[0]) * n_per_frame)
-        if self.in_counts:
-            counts = np.empty(shape, dtype=np.int16)
-            for row, channel in zip(counts, self._channels, strict=True):
-                for n, name in enumerate(channel.signals):
-                    row[n::n_per_frame] = columns[channel.part][name]
-            return counts
-        return self._engineering_units(columns, shape)
-
-    def _engineering_units(
-        self, columns: Sequence[Mapping[str, npt.NDArray[Any]]], shape: tuple[int, int]
-    ) -> SampleArray:
-        units = np.empty(shape, dtype=np.float32)
-        for row, channel in zip(units, self._channels, strict=True):
+        samples: RawArray = (
+            np.empty(shape, np.int16) if self.in_counts else np.empty(shape, np.float32)
+        )
+        for row, channel in zip(samples, self._channels, strict=True):
+            is_scaled = not self.in_counts and (channel.gain, channel.offset) != (1.0, 0.0)
             for n, name in enumerate(channel.signals):
                 raw = columns[channel.part][name]
-                if (channel.gain, channel.offset) != (1.0, 0.0):  # else to the last bit
-                    raw = raw.astype(np.float64) * channel.gain + channel.offset
-                row[n :: len(channel.signals)] = raw
-        return units
+                row[n::n_per_frame] = (
+                    raw.astype(np.float64) * channel.gain + channel.offset if is_scaled else raw
+                )
+        return samples
 
 
 def is_counts(signal: DbcSignal) -> bool:
     """Whether a signal is a 16-bit converter's count: signed, in volts or without unit."""
     plain = signal.signed and not signal.is_float and signal.n_bits == _COUNT_BITS
-    unit = known_unit(signal.unit)
-    unscaled = unit == "counts" and signal.scale == 1.0
+    unscaled = signal.unit in _COUNTS and signal.scale == 1.0
     return (
         plain
         and byte_offset(signal) is not None
         and signal.offset == 0.0
-        and (unit in _V_PER or unscaled)
+        and (known_unit(signal.unit) in _V_PER or unscaled)
     )
 
 
@@ -213,7 +201,7 @@ def gain_and_offset(
         If the DBC's unit is neither the channel's nor volts.
     """
     unit = known_unit(signal.unit)
-    if unit == "counts" and is_counts(signal):
+    if signal.unit in _COUNTS and is_counts(signal):
         return calibration.unit_per_count, 0.0
     if unit in _V_PER:
         scale = _V_PER[unit] * calibration.unit_per_v

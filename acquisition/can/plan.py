@@ -1,4 +1,4 @@
-"""What is done with each frame, and the sample instants that frames make."""
+"""What is done with each frame, and why frames are refused."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -8,6 +8,10 @@ from enum import StrEnum
 from acquisition.can.dbc import DbcMessage
 from acquisition.can.layout import ScalarReader, WaveformDecoder
 from core.samples.blocks import UNCOUNTED_LOSS as UNCOUNTED
+
+MAX_INSTANTS_PER_S = 1250.0
+"""Without counters: a second of drift is then less than half an instant, so that the loss of each
+one shows by the clock."""
 
 EPOCH, OK_BITS, SECONDS, MICROSECONDS, HOLD = "epoch", "ok_bits", "seconds", "microseconds", "hold"
 """Quantities that are carried beside the waveforms; slow values follow, by their number."""
@@ -69,7 +73,7 @@ class MessagePlan:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that the assembly needs to know.
+    """How all frames of a device are read.
 
     Parameters
     ----------
@@ -91,6 +95,12 @@ class Plan:
     widest_modulus: int
     quantities: frozenset[str | int]
     hold_samples: int | None
+
+    @property
+    def reports_epoch(self) -> bool:
+        """Whether counted messages carry the epoch of the count."""
+        parts = (part for m in self.messages.values() for part in m.parts.values())
+        return any(part.epoch is not None and part.counter is not None for part in parts)
 
 
 class Refusal(StrEnum):
@@ -115,56 +125,6 @@ class Refusal(StrEnum):
     FOREIGN = "foreign_id"
     MALFORMED = "malformed_line"
     OVERFLOW = "queue_overflow"
-
-
-@dataclass(frozen=True)
-class Instant:
-    """A complete set of frames.
-
-    Parameters
-    ----------
-    epoch
-        Of the device's count.
-    index
-        Of the first sample.
-    n_samples
-        Valid samples of each channel, at most those that a frame can carry.
-    frames
-        One for each waveform message.
-    rejected
-        Samples refused directly before, by reason.
-    """
-
-    epoch: int
-    index: int
-    n_samples: int
-    frames: tuple[bytes, ...]
-    rejected: Mapping[Refusal, int] = field(default_factory=dict)
-
-    @property
-    def stop_index(self) -> int:
-        """Index of the first sample after it."""
-        return self.index + self.n_samples
-
-
-class PendingInstant:
-    """A set of frames that is still being collected."""
-
-    def __init__(self, n_waves: int, n_samples: int) -> None:
-        self._frames: list[bytes | None] = [None] * n_waves
-        self._n_missing = n_waves
-        self.n_samples = n_samples
-        self._spoilt = False
-
-    def put(self, wave: int, data: bytes, n_samples: int) -> tuple[bytes, ...] | None:
-        """Take a frame; return all of them once they are complete and agree with each other."""
-        if self._frames[wave] is None:
-            self._n_missing -= 1
-        self._frames[wave] = data
-        self._spoilt |= n_samples != self.n_samples
-        if self._n_missing or self._spoilt:
-            return None
-        return tuple(frame for frame in self._frames if frame is not None)
 
 
 RefusalCounts = Counter[Refusal]

@@ -1,4 +1,4 @@
-"""`FrameReader`: a thread of its own that listens, and a bounded queue to the event loop."""
+"""Thread that listens on a bus, and its bounded queue to the event loop."""
 
 import asyncio
 import threading
@@ -15,10 +15,9 @@ from acquisition.can.gate import Frame, FrameGate, lost_in_controller, require_b
 from acquisition.can.plan import Refusal, RefusalCounts
 from acquisition.can.slcan import SlcanBus
 from acquisition.clock import Clock
-from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.interface_clock import InterfaceClock
+from acquisition.delivery.arrival import Arrival, InterfaceClock
 from acquisition.errors import FrameError, LinkError
-from core.samples.device_clock import StampFault
+from core.samples.blocks import StampFault
 
 _RECEIVE_S = 0.1
 _REST_S = 0.005
@@ -50,7 +49,7 @@ class Batch:
 
 
 class FrameReader:
-    """Listens from `start` to `stop`; whatever ends the thread is raised where frames are awaited.
+    """Listens from `start` to `stop`; an error that ends the thread is raised by `next_batch`.
 
     Parameters
     ----------
@@ -131,7 +130,7 @@ class FrameReader:
         finally:
             self._thread.join(_RECEIVE_S)
             if self._opened.done():
-                self._opened.exception()  # told, or no longer of interest
+                self._opened.exception()  # else asyncio logs it as never retrieved
 
     async def next_batch(self, timeout_s: float) -> Batch | None:
         """Return the next frames, or None if there are none in time.
@@ -163,14 +162,14 @@ class FrameReader:
             with foreign_errors_renamed(self._where):
                 bus = self._open_bus()
                 try:
-                    self._tell(self._set_opened)
+                    self._call(self._set_opened)
                     self._listen(bus)
                 finally:
                     bus.shutdown()
         except BaseException as exc:
             self._failure = exc
         finally:
-            self._tell(self._set_ended)
+            self._call(self._set_ended)
 
     def _listen(self, bus: can.BusABC) -> None:
         while not self._stopping.is_set():
@@ -184,7 +183,7 @@ class FrameReader:
                     self._hand_over(Batch(frames, self._arrived, self._stamp_fault))
                     self._stamp_fault = None
             if not frames and bus.state is can.BusState.ERROR:
-                raise LinkError(f"{self._where}: the interface says that it is in error")
+                raise LinkError(f"{self._where}: the interface reports that it is in error")
 
     def _collect(self, bus: can.BusABC, frames: list[Frame]) -> None:
         """Wait for a frame, then go on for a while, since a batch costs more than its frames."""
@@ -218,7 +217,7 @@ class FrameReader:
             self._stamp_fault = self._stamp_fault or fault
 
     def _next_message(self, bus: can.BusABC, timeout_s: float) -> can.Message | None:
-        """Next message, over what nobody can read; a bus that says nothing else is lost."""
+        """Next readable message; a bus that delivers no others for long is lost."""
         for _ in range(_MAX_NONSENSE):
             try:
                 with foreign_errors_renamed(self._where):
@@ -242,7 +241,7 @@ class FrameReader:
                 return
             self._batches.append(batch)
             self._n_waiting += n_frames
-        self._tell(self._news.set)
+        self._call(self._news.set)
 
     def _has_room(self, n_frames: int) -> bool:
         return not self._batches or self._n_waiting + n_frames <= self._max_frames
@@ -258,6 +257,7 @@ class FrameReader:
         self._news.set()
         self._ended.set()
 
-    def _tell(self, what: Callable[[], None]) -> None:
+    def _call(self, function: Callable[[], None]) -> None:
+        """Call a function in the event loop."""
         with suppress(RuntimeError):  # the loop has ended while a driver was hanging
-            self._loop.call_soon_threadsafe(what)
+            self._loop.call_soon_threadsafe(function)

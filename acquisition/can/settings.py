@@ -1,4 +1,4 @@
-"""What a CAN source has to be told: the bus, the DBC, and which signal is what."""
+"""Settings of a CAN source: the bus, the DBC, and what each signal means."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -72,14 +72,14 @@ class CanSettings:
     dbc
         The DBC file.
     dbc_text
-        What would stand in it, where it is no file but follows from a profile.
+        Its text, where it follows from a profile and there is no file.
     counters
-        Signals that say to which sample a message belongs, at most one for each message. All
+        Signals that count the sample that a message belongs to, at most one for each message. All
         messages of the waveform channels have one, or none has; without, frames are counted.
     counter_counts
         Whether these counters count samples or frames.
     frame_samples
-        Signals that say how many of a multi-sample frame's samples there are, if it can be fewer.
+        Signals that give the number of samples in a multi-sample frame, if it can be fewer.
     epoch
         Changes when the device begins to count anew.
     ok_bits
@@ -88,13 +88,13 @@ class CanSettings:
         UTC of the sample that the message belongs to.
     hold_samples
         For how many samples, from the one its counter names, a message without waveforms is valid:
-        a number, or the signal that says so.
+        a number, or the signal that gives it.
     hold_s
         For how long a message without waveforms and without counter is valid.
     stale_after_s
         A bus without a complete new sample for longer than this is not connected; above 0.
     stamps
-        When frames come is told by the "host", as they are read, or by the "interface".
+        Whether the "host" stamps frames as they are read, or the "interface" does.
     queue_frames
         Frames that wait for the event loop at most.
     when_full

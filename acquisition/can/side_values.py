@@ -1,24 +1,25 @@
-"""What stands beside the samples and for which of them; blocks of both."""
+"""Values beside the samples, each valid from one sample on; blocks of samples with their values."""
 
 import itertools
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from operator import itemgetter
 
 import numpy as np
 
+from acquisition.can.frame_sets import Instant
 from acquisition.can.plan import (
     EPOCH,
     HOLD,
     MICROSECONDS,
     OK_BITS,
     SECONDS,
-    Instant,
     Plan,
     Refusal,
     RefusalCounts,
 )
-from acquisition.delivery.host_stamps import HostStamps
+from acquisition.delivery.arrival import HostStamps
 from acquisition.delivery.raw import RawBlock
 from core.arrays import RawArray
 from core.samples.blocks import Rejection
@@ -26,74 +27,45 @@ from core.units import NS_PER_S
 
 _MAX_ENTRIES = 4096
 _US_PER_S = 1_000_000
+_START = itemgetter(0)
+
+_Entry = tuple[int, float, int | None]
+"""First sample, value, and for how many samples it holds; None if another quantity gives that."""
 
 
-class Track:
-    """Values of one quantity, each from a sample on; older ones are forgotten."""
+class SideTable:
+    """All quantities beside the waveforms of one epoch, as the device sent them.
 
-    def __init__(self) -> None:
-        self.starts: list[int] = []
-        self._values: list[float] = []
-        self._holds: list[int | None] = []
-
-    def set(self, start: int, value: float, hold: int | None) -> None:
-        """Note a value; None as hold if another quantity tells for how many samples it holds."""
-        at = bisect_right(self.starts, start)
-        if at and self.starts[at - 1] == start:
-            at -= 1
-            del self.starts[at], self._values[at], self._holds[at]
-        self.starts.insert(at, start)
-        self._values.insert(at, value)
-        self._holds.insert(at, hold)
-        if len(self.starts) > _MAX_ENTRIES:
-            self.forget(1)
-
-    def entry(self, index: int) -> tuple[int, float, int | None] | None:
-        """Start, value and hold of the newest value that is not newer than a sample."""
-        at = bisect_right(self.starts, index) - 1
-        return None if at < 0 else (self.starts[at], self._values[at], self._holds[at])
-
-    def forget_before(self, index: int) -> None:
-        """Forget what was replaced before a sample."""
-        self.forget(bisect_right(self.starts, index) - 1)
-
-    def forget(self, n_entries: int) -> None:
-        """Forget the oldest."""
-        if n_entries > 0:
-            del self.starts[:n_entries], self._values[:n_entries], self._holds[:n_entries]
-
-
-class Tracks:
-    """All quantities beside the waveforms of one epoch.
-
-    An old value never passes for a new one: beyond the samples it was said for there is none.
+    An old value never passes for a new one: beyond the samples that it holds for there is none.
     """
 
     def __init__(self, plan: Plan, rate_hz: float) -> None:
         self._plan = plan
         self._rate_hz = rate_hz
-        self._tracks = {key: Track() for key in plan.quantities}
-
-    def set(self, key: str | int, start: int, value: float, hold: int | None) -> None:
-        """Note what a frame said."""
-        self._tracks[key].set(start, value, hold)
+        self.clear()
 
     def clear(self) -> None:
         """Forget all, as when the device begins to count anew."""
-        self._tracks = {key: Track() for key in self._plan.quantities}
+        self._entries: dict[str | int, list[_Entry]] = {key: [] for key in self._plan.quantities}
+
+    def set(self, key: str | int, start: int, value: float, hold: int | None) -> None:
+        """Note a value; see `_Entry`."""
+        entries = self._entries[key]
+        at = bisect_right(entries, start, key=_START)
+        replaces = at > 0 and entries[at - 1][0] == start
+        entries[at - replaces : at] = [(start, value, hold)]
+        if len(entries) > _MAX_ENTRIES:
+            del entries[0]
 
     def forget_before(self, index: int) -> None:
         """Forget what no coming sample can need."""
-        for track in self._tracks.values():
-            track.forget_before(index)
+        for entries in self._entries.values():
+            del entries[: max(0, bisect_right(entries, index, key=_START) - 1)]
 
     def at(self, key: str | int, index: int) -> float | None:
-        """Value of a quantity at a sample; None if nothing valid was said."""
-        entry = self._tracks[key].entry(index) if key in self._tracks else None
-        if entry is None:
-            return None
-        start, value, hold = entry
-        return value if index < self._stop(start, hold) else None
+        """Value of a quantity at a sample; None if there is no valid one."""
+        entry = self._entry(key, index)
+        return None if entry is None or index >= self._stop(entry) else entry[1]
 
     def cuts(self, first: int, stop: int) -> list[int]:
         """Samples between these at which any quantity begins or ends to hold."""
@@ -101,38 +73,33 @@ class Tracks:
 
     def stamp_ns(self, index: int) -> int | None:
         """Time of a sample by the last stamp before it; None if there is none."""
-        if SECONDS not in self._tracks:
-            return None
-        seconds, microseconds = self._tracks[SECONDS], self._tracks[MICROSECONDS]
-        for start in reversed(seconds.starts[: bisect_right(seconds.starts, index)]):
-            whole, part = seconds.entry(start), microseconds.entry(start)
-            if whole and part and part[0] == start and part[1] < _US_PER_S:
-                stamp_ns = (int(whole[1]) * _US_PER_S + int(part[1])) * 1000
+        seconds = self._entries.get(SECONDS, [])
+        for start, second, _ in reversed(seconds[: bisect_right(seconds, index, key=_START)]):
+            part = self._entry(MICROSECONDS, start)
+            if part is not None and part[0] == start and part[1] < _US_PER_S:
+                stamp_ns = (int(second) * _US_PER_S + int(part[1])) * 1000
                 return stamp_ns + round((index - start) * NS_PER_S / self._rate_hz)
         return None
 
+    def _entry(self, key: str | int, index: int) -> _Entry | None:
+        """Newest entry that is not newer than a sample."""
+        entries = self._entries.get(key, [])
+        at = bisect_right(entries, index, key=_START)
+        return entries[at - 1] if at else None
+
     def _changes(self, first: int, stop: int) -> Iterator[int]:
-        for track in self._tracks.values():
-            before = max(0, bisect_right(track.starts, first) - 1)
-            for start in track.starts[before : bisect_right(track.starts, stop)]:
-                entry = track.entry(start)
-                yield start
-                if entry is not None:
-                    yield self._stop(start, entry[2])
+        for entries in self._entries.values():
+            before = max(0, bisect_right(entries, first, key=_START) - 1)
+            for entry in entries[before : bisect_right(entries, stop, key=_START)]:
+                yield from (entry[0], self._stop(entry))
 
-    def _stop(self, start: int, hold: int | None) -> int:
-        if hold is not None:
-            return start + hold
-        entry = self._tracks[HOLD].entry(start)
-        told = entry is not None and entry[0] == start
-        return start + int(entry[1]) if told and entry is not None else start
-
-
-def ok_flags(bits: float | None, told: bool, n_channels: int) -> tuple[bool, ...]:
-    """The device's verdict on each channel; a channel is OK only as long as the device says so."""
-    if not told:
-        return (True,) * n_channels
-    return tuple(bits is not None and bool(int(bits) >> c & 1) for c in range(n_channels))
+    def _stop(self, entry: _Entry) -> int:
+        """First sample at which an entry does not hold."""
+        start, _, hold = entry
+        if hold is None:
+            other = self._entry(HOLD, start)
+            hold = int(other[1]) if other is not None and other[0] == start else 0
+        return start + hold
 
 
 class RawBlockBuilder:
@@ -140,27 +107,23 @@ class RawBlockBuilder:
 
     Attributes
     ----------
-    tracks
-        What the device said beside the samples.
+    side
+        What the device sent beside the samples.
     """
 
     def __init__(self, plan: Plan, n_channels: int, n_slow: int, rate_hz: float) -> None:
         self._plan = plan
-        self._n_channels = n_channels
-        self._n_slow = n_slow
+        self._n_channels, self._n_slow = n_channels, n_slow
         self._rate_hz = rate_hz
-        self._needs_header = any(
-            part.epoch and part.counter and part.wave is None
-            for message in plan.messages.values()
-            for part in message.parts.values()
-        )
-        self.tracks = Tracks(plan, rate_hz)
+        parts = (part for m in plan.messages.values() for part in m.parts.values())
+        self._needs_header = any(p.epoch and p.counter and p.wave is None for p in parts)
+        self.side = SideTable(plan, rate_hz)
         self._stamps = HostStamps(rate_hz)
         self._rejected: RefusalCounts = Counter()
 
     def begin_epoch(self) -> None:
-        """Forget what was said and refused in the epoch that has ended."""
-        self.tracks.clear()
+        """Forget what was sent and refused in the epoch that has ended."""
+        self.side.clear()
         self._rejected.clear()
 
     def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[RawBlock]:
@@ -172,25 +135,24 @@ class RawBlockBuilder:
             first, stop = run[0].index, run[-1].stop_index
             self._rejected.update(run[0].rejected)
             samples = self._samples(run)
-            cuts = [first, *self.tracks.cuts(first, stop), stop]
+            cuts = [first, *self.side.cuts(first, stop), stop]
             for start, end in itertools.pairwise(cuts):
                 piece = samples[:, start - first : end - first]
                 block = self._block(run[0].epoch, start, piece)
                 if block is not None:
                     blocks.append(block)
-            self.tracks.forget_before(stop)
+            self.side.forget_before(stop)
         return blocks
 
     def _block(self, epoch: int, first_index: int, samples: RawArray) -> RawBlock | None:
-        start_ns = self._start_ns(first_index)
-        if self._needs_header and self.tracks.at(EPOCH, first_index) is None:
+        if self._needs_header and self.side.at(EPOCH, first_index) is None:
             self._rejected[Refusal.NO_HEADER] += samples.shape[1]
             return None
+        start_ns = self._start_ns(first_index)
         if start_ns is None:
             self._rejected[Refusal.NO_TIME] += samples.shape[1]
             return None
-        told = [self.tracks.at(number, first_index) for number in range(self._n_slow)]
-        ok_bits = self.tracks.at(OK_BITS, first_index)
+        slow = [self.side.at(number, first_index) for number in range(self._n_slow)]
         rejected = tuple(Rejection(reason.value, n) for reason, n in self._rejected.items() if n)
         self._rejected.clear()
         return RawBlock(
@@ -199,14 +161,21 @@ class RawBlockBuilder:
             start_ns=start_ns,
             rate_hz=self._rate_hz,
             counts=samples,
-            ok=ok_flags(ok_bits, OK_BITS in self._plan.quantities, self._n_channels),
-            slow=tuple(np.nan if value is None else value for value in told),
+            ok=self._ok(first_index),
+            slow=tuple(np.nan if value is None else value for value in slow),
             rejected=rejected,
         )
 
+    def _ok(self, index: int) -> tuple[bool, ...]:
+        """The device's verdict on each channel; good only while the device reports it so."""
+        if OK_BITS not in self._plan.quantities:
+            return (True,) * self._n_channels
+        bits = int(self.side.at(OK_BITS, index) or 0)
+        return tuple(bool(bits >> c & 1) for c in range(self._n_channels))
+
     def _start_ns(self, index: int) -> int | None:
         if SECONDS in self._plan.quantities:
-            return self.tracks.stamp_ns(index)
+            return self.side.stamp_ns(index)
         return self._stamps.start_ns(index)
 
     def _samples(self, run: Sequence[Instant]) -> RawArray:

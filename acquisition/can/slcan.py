@@ -1,8 +1,8 @@
 """slcan, the text protocol of serial CAN adapters: python-can's bus with a reader that is strict.
 
-python-can reads byte by byte, takes a line that is longer or shorter than its own length says, and
-raises ValueError or worse on what is no frame at all. Here a line is exactly a frame or it is
-refused, and bytes are read in chunks.
+python-can reads byte by byte, accepts a line that is longer or shorter than its own length field,
+and raises ValueError or worse on a line that is not a frame. Here a line is exactly a frame, or it
+is refused, and bytes are read in chunks.
 """
 
 from binascii import Error as HexError
@@ -15,6 +15,7 @@ from typing import Any
 from can import Message
 from can.exceptions import error_check
 from can.interfaces.slcan import slcanBus
+from can.util import CAN_FD_DLC
 
 from acquisition.can.gate import (
     BUS_ERROR,
@@ -29,7 +30,6 @@ from acquisition.errors import ConfigError, FrameError
 
 _MAX_LINE = 1 + 8 + 1 + 2 * 64
 _CHUNK_BYTES = 65536
-_FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
 _STATE_LINE = 8
 _FORMS = {
     # first letter: extended id, remote, FD
@@ -98,7 +98,7 @@ class SlcanBus(slcanBus):
 
     @classmethod
     def require_speed(cls, bitrate: int | None, data_bitrate: int | None) -> None:
-        """Refuse speeds that the protocol has no word for.
+        """Refuse speeds that the protocol cannot express.
 
         Raises
         ------
@@ -166,9 +166,9 @@ def _parsed(line: bytes, ids: frozenset[int] | None) -> Message | None:
         data = unhexlify(line[end + 1 :])
     except (HexError, IndexError) as exc:
         raise FrameError(f"not an slcan frame: {line[:40]!r}") from exc
-    length = _FD_LENGTHS[code] if fd else code
+    length = CAN_FD_DLC[code] if fd else code
     if len(data) != (0 if remote else length) or length > (64 if fd else 8):
-        raise FrameError(f"an slcan frame of {len(data)} bytes that says {length}")
+        raise FrameError(f"an slcan frame of {len(data)} bytes with length {length}")
     if frame_id >= (1 << 29 if extended else 1 << 11):
         raise FrameError(f"not a CAN id: {line[1:end]!r}")
     return Message(

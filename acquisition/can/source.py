@@ -6,39 +6,38 @@ from contextlib import aclosing, asynccontextmanager
 
 import can
 
-from acquisition.can.assembly import Assembler
+from acquisition.can.assembly import MAX_UNSURE_S, FrameAssembler
 from acquisition.can.bus import LINUX_ERROR_FRAMES, open_bus
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.plan import SECONDS
 from acquisition.can.reader import FrameReader
 from acquisition.can.settings import CanLinkSettings, CanSettings
-from acquisition.can.uncounted import MAX_UNSURE_NS
 from acquisition.clock import Clock
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.arrival import InterfaceClock
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.interface_clock import InterfaceClock
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
-from core.units import NS_PER_S, ns_from_s
+from core.units import ns_from_s
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
 """Opens a bus that delivers frames of these ids; `acquisition.can.bus.open_bus`."""
 
 _LOOK_S = 0.2
 
-_MAX_DOUBT_S = 2 * MAX_UNSURE_NS / NS_PER_S
-"""What samples get to be placed by the clock, which looks at them for half of that at a time."""
+_MAX_DOUBT_S = 2 * MAX_UNSURE_S
+"""Time in which the clock has to place samples; it observes them for half of that at a time."""
 
 _MIN_STALE_INSTANTS = 3
-"""So many sample instants make the least silence that means something."""
+"""A silence shorter than this many sample instants is normal."""
 
 
 class CanSource:
-    """Samples of one unit from CAN frames; remembers where it stood when connected again.
+    """Samples of one unit from CAN frames; keeps its place across connections.
 
-    It only listens. A CAN device keeps nothing: what passes while nobody is connected is a gap.
+    It only listens. A CAN device keeps nothing: what passes while the bus is not open is a gap.
 
     Parameters
     ----------
@@ -64,8 +63,8 @@ class CanSource:
         self._plan = compile_plan(settings, calibration)
         instant_s = self._plan.samples_per_frame / calibration.rate_hz
         self._stale_after_s = max(settings.stale_after_s, _MIN_STALE_INSTANTS * instant_s)
-        self._delivery = Delivery(calibration, stamped=SECONDS in self._plan.quantities)
-        self._assembler = Assembler(
+        self._delivery = BlockAssembler(calibration, stamped=SECONDS in self._plan.quantities)
+        self._assembler = FrameAssembler(
             self._plan,
             n_channels=len(calibration.channels),
             n_slow=len(calibration.slow),

@@ -31,8 +31,8 @@ class JoinedSource:
     """Puts the current slow values onto each block of another source.
 
     A slow device that is lost, or faulty, is no reason to lose waveforms: its values are then
-    missing, with the reason. It is asked only while waveforms come, lest it be connected to at
-    each attempt to reach the other device.
+    missing, with the reason. It is read only while waveforms come, so that attempts to
+    reach the other device do not connect to it each time.
     """
 
     def __init__(self, source: SampleSource, slow: SlowValues) -> None:

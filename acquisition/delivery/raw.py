@@ -13,8 +13,8 @@ class RawBlock:
     Parameters
     ----------
     counts
-        (n_channels, n_samples) int16 counts of the converter; or, from a device that has no such
-        thing, float32 engineering units, not a number where the device has none.
+        (n_channels, n_samples) int16 counts of the converter; or, from a device that has none,
+        float32 engineering units, not a number where the device has no sample.
     start_ns
         Time of the first sample, by the device's stamps or by the host's clock.
     ok

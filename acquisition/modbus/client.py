@@ -8,9 +8,8 @@ from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from itertools import count
 
-from acquisition.delivery.names import KnownAddresses
-from acquisition.delivery.stopping import let_stop_through
-from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
+from acquisition.delivery.network import KnownAddresses, let_stop_through
+from acquisition.delivery.polling import wrong_replies_drop_the_link
 from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
 from acquisition.modbus.connection import (
     CLOSED,

@@ -1,20 +1,129 @@
-"""From readings of queues to samples of all channels with their places."""
+"""From readings of queues to samples of all channels on one sample axis."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from acquisition.delivery.arrival import LeastDelay
 from acquisition.errors import FrameError
-from acquisition.modbus.counted_samples import WRAP, CountedSamples, Place
 from acquisition.modbus.fifo_layout import FifoPiece
-from acquisition.modbus.uncounted_samples import UncountedSamples
 from core.arrays import CountArray
+from core.samples.axis import ClockTolerance, Epochs, SampleAxis, signed_distance
+from core.units import ns_from_s
 
-_MOST_EPOCHS = 2
+WRAP = 1 << 16
+"""Samples after which the counter of a queue begins again."""
 
-_MOST_APART = 1024
+_TOLERANCE = ClockTolerance(step_s=0.5)
+"""Half a second: how far a device may be ahead of the host's clock, or hold samples back."""
+
+_MAX_REPEATED = 31
+"""Samples that a queue shows again if reading does not remove them."""
+
+_MAX_DRIFT = 1e-3
+"""Share by which a device that does not count may sample too slowly."""
+
+_MAX_EPOCHS = 2
+
+_MAX_APART = 1024
 """Samples by which the queues of two channels may differ, since they are read one by one."""
+
+
+@dataclass(frozen=True)
+class SamplePlace:
+    """Epoch and index of one sample."""
+
+    epoch: int
+    index: int
+
+
+class CountedSamples:
+    """Unwraps a 16-bit counter with the help of the host's clock, across connections.
+
+    A jump that the time since the last sample explains is a gap, exact however often the counter
+    has wrapped. One that it does not explain means that the device counts anew, or that it stopped
+    and its counter with it: a new epoch.
+
+    Parameters
+    ----------
+    removes
+        If reading removes nothing, samples come again; their counter identifies them.
+    """
+
+    def __init__(self, rate_hz: float, epochs: Epochs, *, removes: bool) -> None:
+        self._axis = SampleAxis(rate_hz, epochs)
+        self._removes = removes
+        self._drained_ns = 0
+
+    def note_drained(self, now_s: float) -> None:
+        """Note that the device has no more samples: those that come next are taken from now on."""
+        self._drained_ns = ns_from_s(now_s)
+
+    def is_ambiguous(self, now_s: float) -> bool:
+        """Whether so much time has passed that old samples could pass for new ones.
+
+        What is in the queue must then be thrown away first; what comes after it is fresh.
+        """
+        now_ns = ns_from_s(now_s)
+        return self._axis.index is not None and not self._is_within_half_a_wrap(now_ns)
+
+    def place(self, counter: int, now_s: float) -> SamplePlace | None:
+        """Return where the next sample belongs; None if it came before."""
+        axis, now_ns = self._axis, ns_from_s(now_s)
+        if axis.index is None:
+            return self._put(counter, now_ns)
+        if not self._removes and axis.forward(counter, WRAP) >= WRAP - _MAX_REPEATED:
+            return None
+        jump, allowance = axis.jump(counter, WRAP, now_ns), axis.allowance(now_ns, _TOLERANCE)
+        expected = axis.elapsed(now_ns)
+        least = axis.elapsed(self._drained_ns) - allowance
+        is_fresh = expected < WRAP / 2 or jump >= expected - allowance
+        if not least <= jump <= expected + allowance or not is_fresh:
+            axis.epochs.begin()
+            return self._put(counter, now_ns)
+        return self._put(axis.index + jump, now_ns)
+
+    def _is_within_half_a_wrap(self, now_ns: int) -> bool:
+        return self._axis.elapsed(now_ns) < WRAP / 2 - self._axis.allowance(now_ns, _TOLERANCE)
+
+    def _put(self, index: int, now_ns: int) -> SamplePlace:
+        self._axis.stand_at(index + 1, now_ns)
+        return SamplePlace(self._axis.epoch, index)
+
+
+class UncountedSamples:
+    """Counts for a device that does not, and begins a new epoch when samples were lost.
+
+    A loss shows by the host's clock alone: how many samples are missing is not known, and nothing
+    is joined across it. A loss shorter than the tolerance cannot be seen.
+
+    Parameters
+    ----------
+    tolerance_s
+        Above the jitter of polls and replies.
+    """
+
+    def __init__(self, rate_hz: float, epochs: Epochs, *, tolerance_s: float) -> None:
+        self._rate_hz, self._tolerance_s = rate_hz, tolerance_s
+        self._epochs = epochs
+        self._next = 0
+        self._delay = LeastDelay(_MAX_DRIFT)
+
+    def begin(self) -> None:
+        """Begin a new epoch: on a new connection, or when samples were lost."""
+        self._epochs.begin()
+        self._next = 0
+        self._delay = LeastDelay(_MAX_DRIFT)
+
+    def place(self, n_samples: int) -> SamplePlace:
+        """Return where the first of the next samples belongs."""
+        first, self._next = self._next, self._next + n_samples
+        return SamplePlace(self._epochs.number, first)
+
+    def has_lost(self, now_s: float) -> bool:
+        """Whether samples are missing, now that the device has no more to give."""
+        return self._delay.late_s(now_s - self._next / self._rate_hz, now_s) > self._tolerance_s
 
 
 @dataclass(frozen=True)
@@ -39,27 +148,23 @@ def place_records(
     Raises
     ------
     FrameError
-        If what should be a counter counts nothing: no device restarts twice within a reading.
+        If the counter does not count: no device restarts twice within a reading.
     """
-    places = list(_places(piece, samples, now_s))
-    if len({place.epoch for place in places if place is not None}) > _MOST_EPOCHS:
+    if isinstance(samples, UncountedSamples):
+        place = samples.place(piece.n_samples)
+        found = [PlacedSamples(place.epoch, place.index, piece.counts)]
+        return found if piece.n_samples else []
+    counters = () if piece.counters is None else piece.counters
+    places = [samples.place(int(counter), now_s) for counter in counters]
+    if len({place.epoch for place in places if place is not None}) > _MAX_EPOCHS:
         raise FrameError("FIFO: what should be its counter does not count")
     return list(_joined(places, piece.counts))
 
 
-def _places(
-    piece: FifoPiece, samples: CountedSamples | UncountedSamples, now_s: float
-) -> Iterator[Place | None]:
-    if isinstance(samples, UncountedSamples):
-        yield from (samples.place() for _ in range(piece.n_samples))
-    elif piece.counters is not None:
-        yield from (samples.place(int(counter), now_s) for counter in piece.counters)
-
-
-def _joined(places: Iterable[Place | None], counts: CountArray) -> Iterator[PlacedSamples]:
+def _joined(places: Iterable[SamplePlace | None], counts: CountArray) -> Iterator[PlacedSamples]:
     start, first = 0, None
     for n, place in enumerate([*places, None]):
-        if first is not None and place == Place(first.epoch, first.index + n - start):
+        if first is not None and place == SamplePlace(first.epoch, first.index + n - start):
             continue
         if first is not None:
             yield PlacedSamples(first.epoch, first.index, counts[:, start:n])
@@ -105,8 +210,8 @@ class ChannelAssembly:
     def _add_other(self, channel: int, piece: FifoPiece) -> None:
         if piece.counters is None or not piece.n_samples or self._epoch < 0:
             return
-        apart = (int(piece.counters[0]) - self._newest + WRAP // 2) % WRAP - WRAP // 2
-        if abs(apart) > _MOST_APART:
+        apart = signed_distance(int(piece.counters[0]), self._newest, WRAP)
+        if abs(apart) > _MAX_APART:
             raise FrameError(f"FIFO: channel {channel} counts {apart} samples apart from channel 0")
         start = self._newest + apart
         self._add(channel, range(start, start + piece.n_samples), piece.counts[0])
@@ -127,13 +232,13 @@ class ChannelAssembly:
         )
         self._next = int(index[-1]) + 1
         self._drop_old()
-        places = (Place(self._epoch, i) for i in index.tolist())
+        places = (SamplePlace(self._epoch, i) for i in index.tolist())
         return list(_joined(places, counts))
 
     def _limit(self) -> None:
         """Bound what waits for a channel that gives nothing."""
         newest = max((max(waiting) for waiting in self._waiting if waiting), default=0)
-        self._next = max(self._next, newest - _MOST_APART)
+        self._next = max(self._next, newest - _MAX_APART)
         self._drop_old()
 
     def _drop_old(self) -> None:

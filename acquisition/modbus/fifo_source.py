@@ -5,22 +5,24 @@ from contextlib import aclosing, asynccontextmanager
 from dataclasses import dataclass
 
 from acquisition.clock import Clock
-from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.arrival import Arrival, HostStamps
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.freshness import Freshness
-from acquisition.delivery.host_stamps import HostStamps
+from acquisition.delivery.polling import Freshness, wrong_replies_drop_the_link
 from acquisition.delivery.raw import RawBlock
-from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.client import ModbusClient
-from acquisition.modbus.counted_samples import CountedSamples
-from acquisition.modbus.fifo_assembly import ChannelAssembly, PlacedSamples, place_records
+from acquisition.modbus.fifo_assembly import (
+    ChannelAssembly,
+    CountedSamples,
+    PlacedSamples,
+    UncountedSamples,
+    place_records,
+)
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout, FifoPiece
 from acquisition.modbus.transport import LinkSettings, require_above_zero
-from acquisition.modbus.uncounted_samples import UncountedSamples
+from core.samples.axis import Epochs
 from core.samples.blocks import SampleBlock
-from core.units import NS_PER_S
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,16 +69,16 @@ class FifoSource:
         self._settings, self._layout = settings, layout
         self._calibration, self._clock = calibration, clock
         self._client = ModbusClient(settings)
-        self._delivery = Delivery(calibration, stamped=False)
+        self._delivery = BlockAssembler(calibration, stamped=False)
         self._stamps = HostStamps(calibration.rate_hz)
         self._freshness = Freshness("the newest sample", settings.stale_after_s)
         self._newest = (0, 0)
         self._connections = 0
-        epoch = clock.now_ns() // NS_PER_S
+        epochs = Epochs(clock.now_ns(), trusts_device=False)
         self._uncounted = UncountedSamples(
-            calibration.rate_hz, tolerance_s=settings.loss_tolerance_s, epoch=epoch
+            calibration.rate_hz, epochs, tolerance_s=settings.loss_tolerance_s
         )
-        self._counted = CountedSamples(calibration.rate_hz, removes=layout.removes, epoch=epoch)
+        self._counted = CountedSamples(calibration.rate_hz, epochs, removes=layout.removes)
         self._channels = ChannelAssembly(layout.n_channels, self._counted)
 
     @asynccontextmanager
@@ -132,7 +134,7 @@ class FifoSource:
                 raise
             if not drained:
                 continue
-            self._counted.note_seen_all(arrived.steady_s)
+            self._counted.note_drained(arrived.steady_s)
             if not self._layout.has_counter and self._uncounted.has_lost(arrived.steady_s):
                 waiting.clear()  # where among these the loss is remains unknown
                 self._uncounted.begin()

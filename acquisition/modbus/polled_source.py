@@ -10,14 +10,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from acquisition.clock import Clock
-from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.arrival import Arrival, HostStamps
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import ChannelCalibration, UnitCalibration
-from acquisition.delivery.freshness import Freshness
-from acquisition.delivery.host_stamps import HostStamps
+from acquisition.delivery.polling import Freshness, PollClock, wrong_replies_drop_the_link
 from acquisition.delivery.raw import RawBlock
-from acquisition.delivery.ticks import Ticks
-from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
 from acquisition.errors import ConfigError
 from acquisition.modbus.cells import reads_as
 from acquisition.modbus.client import ModbusClient
@@ -183,14 +180,14 @@ class PolledSource:
             for channel in calibration.channels
         ]
         self._reader = MapReader(settings, MapDecoder(registers))
-        self._ticks = Ticks(clock, settings.poll_period_s)
+        self._ticks = PollClock(clock, settings.poll_period_s)
         self._freshness = Freshness("the content of its registers", settings.stale_after_s)
         self._stamps = HostStamps(self._rate_hz)
         time = registers.time
         self._stamped = (
             time is not None and settings.poll_period_s >= _MIN_STAMP_STEPS * time.resolution_s
         )
-        self._delivery = Delivery(calibration, stamped=self._stamped, samples_when_asked=True)
+        self._delivery = BlockAssembler(calibration, stamped=self._stamped, samples_when_asked=True)
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:

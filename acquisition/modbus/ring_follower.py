@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.epochs import Epochs
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.client import ModbusClient
@@ -20,6 +19,7 @@ from acquisition.modbus.ring_profile import (
     decode_slots,
 )
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
+from core.samples.axis import Epochs
 from core.samples.blocks import Rejection
 
 _N_TRIES = 4
@@ -113,7 +113,6 @@ class RingFollower:
         }
         self._header: RingHeader | None = None
         self._timeline: Timeline
-        self._n_resets = 0
         self._epochs = Epochs(begun_ns, trusts_device=True)
         self._handled = 0
         self._rejected: Counter[Refusal] = Counter()
@@ -169,14 +168,13 @@ class RingFollower:
         """Set the position to read from where it is not simply the slot after the last."""
         before = self._header
         if before is None:
-            self._timeline = Timeline(header.layout)
-            self._epochs.tell(header.epoch)
+            self._timeline = Timeline(header.layout, self._epochs)
+            self._epochs.begin_first(header.epoch)
             self._handled = header.newest - 1
         elif (before.epoch, before.layout) != (header.epoch, header.layout):
             await self._require_again(reader, header)
             slot = await self._newest_slot(reader, header)
-            self._timeline = Timeline(header.layout, self._timeline.n_resets)
-            self._n_resets = self._timeline.n_resets
+            self._timeline = Timeline(header.layout, self._epochs)
             self._epochs.begin(header.epoch if before.epoch != header.epoch else None)
             if slot is not None:
                 self._timeline.anchor(slot)
@@ -260,9 +258,6 @@ class RingFollower:
     def _raw_block(self, slot: Slot, index: int, header: RingHeader) -> RawBlock:
         rejected = tuple(Rejection(str(r), n) for r, n in self._rejected.items())
         self._rejected.clear()
-        if self._timeline.n_resets != self._n_resets:  # the counters went back in the same epoch
-            self._n_resets = self._timeline.n_resets
-            self._epochs.begin()
         return RawBlock(
             epoch=self._epochs.number,
             first_index=index,

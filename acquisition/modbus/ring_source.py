@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.ring_pace import out_of_step_s
-from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
+from acquisition.delivery.polling import incommensurate_period_s, wrong_replies_drop_the_link
 from acquisition.errors import LinkError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.requests import ADDRESS_SPACE, READ_HOLDING_REGISTERS, REGISTER_FUNCTIONS
@@ -57,7 +56,7 @@ class RingSource:
         self._settings = settings
         self._client = ModbusClient(settings)
         self._reader = RingReader(self._client, settings.base_address, settings.function)
-        self._delivery = Delivery(calibration)
+        self._delivery = BlockAssembler(calibration)
         self._clock = clock
         self._follower = RingFollower(calibration, begun_ns=clock.now_ns())
         self._fresh_at_s = 0.0
@@ -91,7 +90,7 @@ class RingSource:
             self._fresh_at_s = self._clock.monotonic_s()
 
     async def _blocks(self) -> AsyncGenerator[SampleBlock, None]:
-        period_s = out_of_step_s(self._settings.poll_period_s, self._slot_s)
+        period_s = incommensurate_period_s(self._settings.poll_period_s, self._slot_s)
         due_s = self._clock.monotonic_s()
         while True:
             begun_s = self._clock.monotonic_s()

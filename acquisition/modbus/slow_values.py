@@ -7,7 +7,7 @@ from contextlib import asynccontextmanager
 
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import SlowCalibration, slow_reading
-from acquisition.delivery.freshness import Freshness
+from acquisition.delivery.polling import Freshness
 from acquisition.errors import AcquisitionError, ConfigError
 from acquisition.modbus.decoding import MapDecoder, MapReading
 from acquisition.modbus.polled_source import (

@@ -1,15 +1,13 @@
-"""From 32-bit counters to one unbroken sample axis, and what does not fit it."""
+"""Sample axis of a block ring: slots placed by two 32-bit counters, and those that are refused."""
 
 from enum import StrEnum
 
 from acquisition.modbus.ring_profile import U32, RingLayout, Slot
+from core.samples.axis import ClockTolerance, Epochs, signed_distance
 from core.units import NS_PER_S
 
 _US_PER_S = 1_000_000
-_TOLERANCE_NS = NS_PER_S
-_DRIFT = 1e-3
-"""A device's clock may be corrected by a second and run a permille wrong; the index is exact."""
-
+_TOLERANCE = ClockTolerance()
 
 _MAX_MISCOUNTED = 8
 """Slots in a row of which only the sequence number may be wrong; a device that counts otherwise for
@@ -28,7 +26,7 @@ class Refusal(StrEnum):
 
 def ahead(sequence: int, of: int) -> int:
     """Signed distance between two 32-bit counters, the short way round."""
-    return (sequence - of + U32 // 2) % U32 - U32 // 2
+    return signed_distance(sequence, of, U32)
 
 
 class Timeline:
@@ -39,21 +37,16 @@ class Timeline:
     show that the counters were reset: a new epoch, since the old axis has ended. A few whose index
     and time go on as before, or back together, were written twice or counted wrongly: these are no
     reset. Else stamps decide nothing here; they are judged where all adapters' stamps are.
-
-    Attributes
-    ----------
-    n_resets
-        How often the counters were reset.
     """
 
-    def __init__(self, layout: RingLayout, n_resets: int = 0) -> None:
+    def __init__(self, layout: RingLayout, epochs: Epochs) -> None:
         self._layout = layout
-        self._slot_ns = layout.samples_per_slot * 1000 * NS_PER_S // layout.rate_mhz
+        self._miscounted = ClockTolerance(step_s=layout.slot_duration_s / 2.0)
         self._accepted: Slot | None = None
         self._accepted_index = 0
         self._refused: Slot | None = None
         self._n_miscounted = 0
-        self.n_resets = n_resets
+        self.epochs = epochs
 
     def anchor(self, slot: Slot) -> None:
         """Start the axis at a slot, at the index it names itself."""
@@ -61,7 +54,7 @@ class Timeline:
 
     def restart(self, slot: Slot) -> None:
         """End the axis, since the device's counters went back, and start a new one."""
-        self.n_resets += 1
+        self.epochs.begin()
         self.anchor(slot)
 
     def place(self, slot: Slot) -> int | Refusal:
@@ -98,20 +91,24 @@ class Timeline:
         self._refused, self._n_miscounted = None, 0
 
     def _is_miscounted(self, reference: Slot, slot: Slot) -> bool:
-        """Whether index and time agree about where a slot belongs, whatever its number says.
+        """Whether index and time agree about where a slot belongs, whatever its sequence number.
 
         A device that was reset lately counts low numbers at a later time, by two slots at least.
         """
         n_samples = ahead(slot.first_index, reference.first_index)
-        return self._is_then(reference, slot, n_samples, self._slot_ns // 2)
+        return self._is_then(reference, slot, n_samples, self._miscounted)
 
     def _is_then(
-        self, reference: Slot, slot: Slot, n_samples: int, tolerance_ns: int = _TOLERANCE_NS
+        self,
+        reference: Slot,
+        slot: Slot,
+        n_samples: int,
+        tolerance: ClockTolerance = _TOLERANCE,
     ) -> bool:
         """Whether a slot was taken so many samples after another one, by the device's clock."""
         expected_ns = n_samples * 1000 * NS_PER_S // self._layout.rate_mhz
         deviation_ns = slot.start_ns - reference.start_ns - expected_ns
-        return abs(deviation_ns) <= tolerance_ns + _DRIFT * abs(expected_ns)
+        return abs(deviation_ns) <= tolerance.over(expected_ns)
 
     def _on_one_axis(self, reference: Slot, slot: Slot) -> bool:
         n_samples = self._n_samples(reference, slot)

@@ -16,23 +16,14 @@ import pyarrow.parquet as pq
 
 from acquisition.delivery.calibration import calibrate, slow_reading
 from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.units import UNIT_OF
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import Manifest
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.tables import foreign_errors_of
 from core.arrays import SampleArray
-from core.machine.channel import Measurand
 from core.quality import Level
 from core.units import NS_PER_S
-
-UNITS = {
-    Measurand.GAP_UM: "um",
-    Measurand.DISPLACEMENT_UM: "um",
-    Measurand.VELOCITY_MM_S: "mm/s",
-    Measurand.ACCELERATION_M_S2: "m/s2",
-    Measurand.KEY_PHASE_V: "V",
-}
-"""ASCII units of waveform channels."""
 
 _BLOCKS_AT_ONCE = 512
 _OWN = ("time_utc", "epoch", "index")
@@ -157,7 +148,7 @@ _FORMATS: dict[ExportFormat, tuple[Callable[[Manifest], Any], Callable[[Path, An
 
 
 def _columns(manifest: Manifest) -> list[tuple[str, str]]:
-    waveforms = [(c.id, UNITS[c.measurand]) for c in manifest.channels]
+    waveforms = [(c.id, UNIT_OF[c.measurand]) for c in manifest.channels]
     return waveforms + [(c.id, c.unit) for c in manifest.slow_channels]
 
 

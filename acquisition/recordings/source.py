@@ -5,7 +5,7 @@ from contextlib import aclosing, asynccontextmanager, closing
 from dataclasses import dataclass, replace
 
 from acquisition.clock import Clock
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
@@ -137,7 +137,7 @@ class RecordingSource:
         self._recording = recording
         self._clock = clock
         self._selection = selection or all_of(recording.manifest)
-        self._delivery = Delivery(self._selection.calibration)
+        self._delivery = BlockAssembler(self._selection.calibration)
         self._speed = speed
         self._start_s: float | None = None
         self._next_block = 0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from acquisition.recordings.messages import BlockHead
 from acquisition.recordings.reader import Recording
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from core.units import ns_from_s
 
 MAX_GAPS_LISTED = 1000

@@ -3,7 +3,7 @@
 from collections import Counter
 from typing import Protocol
 
-from acquisition.delivery.block_grid import BlockGrid
+from acquisition.delivery.blocks import BlockGrid
 from acquisition.delivery.raw import RawBlock
 
 

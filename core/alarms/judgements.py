@@ -9,7 +9,7 @@ from core.checks.sensor_checks import MAX_CLIPPED_SHARE
 from core.condition.operating_state import OperatingState
 from core.limits import WITHIN, AlarmLevel, Judgement, Limits, judge, unknown
 from core.quality import NOT_MEASURED, Level, Quality, Reading, Reason, missing, worst
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, StampFault
 
 COVERAGE = 1.96
 """Standard uncertainties on each side of a value that hold the truth with 95 %."""

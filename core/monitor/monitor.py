@@ -14,10 +14,8 @@ from core.monitor.bearing_readings import bearing_readings
 from core.monitor.overall_readings import polled_readings, recent_readings
 from core.monitor.settings import AnalysisSettings
 from core.quality import worst
-from core.samples.account import Gap, SampleAccount
-from core.samples.blocks import SampleBlock
-from core.samples.misfit import BlockMisfitError
-from core.samples.outage import Reach, outage, restart
+from core.samples.blocks import BlockMisfitError, SampleBlock
+from core.samples.gaps import Gap, Reach, SampleAccount, outage, restart
 from core.samples.ring import Ring
 from core.spectra.polls import PollTransform
 from core.spectra.segments import Segment, SegmentTransform

@@ -2,14 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 
 from core.arrays import SampleArray
 from core.quality import Quality, Reading
-from core.samples.device_clock import DeviceClock, StampFault
 from core.units import ns_from_s
 
 UNCOUNTED_LOSS = "uncounted_loss"
-"""Reason of the loss of samples that nobody has counted: their number follows from the time."""
+"""Reason of the loss of samples that were not counted: their number follows from the time."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,42 @@ class Rejection:
     def is_estimated(self) -> bool:
         """Whether the number of samples follows from the time, not from a counter."""
         return self.reason == UNCOUNTED_LOSS
+
+
+class StampFault(StrEnum):
+    """What is wrong with a device's time stamp; the names become counters."""
+
+    REGRESSED = "stamp_regressed"
+    REPEATED = "stamp_repeated"
+    JUMPED = "stamp_jumped"
+
+
+@dataclass(frozen=True)
+class DeviceClock:
+    """A device's clocks, as seen from the host's.
+
+    Parameters
+    ----------
+    offset_s
+        How far the device's stamps are ahead of the host's clock, at the least delay seen on the
+        way; None if the device does not stamp.
+    drift_ppm
+        How much faster than nominal the device samples by the host's clock, in parts per million;
+        None until there are enough arrivals, and where the device samples when polled.
+    u_drift_ppm
+        Its standard uncertainty.
+    n_faults
+        Blocks since the start whose own stamp was not used.
+    """
+
+    offset_s: float | None
+    drift_ppm: float | None
+    u_drift_ppm: float | None
+    n_faults: int = 0
+
+
+class BlockMisfitError(ValueError):
+    """A block does not fit the unit: it has another rate or other channels, or is another's."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +100,7 @@ class SampleBlock:
         Why the device's own time stamp was not used: ``start_ns`` then follows from the index.
     sampled_s
         When the device had its last sample, by the steady clock of the host that has read it, as
-        far as that can be told; None if it comes from no device. Ages are counted from here: what
+        far as that is known; None if it comes from no device. Ages are counted from here: what
         a device, a link or a queue has held back is not new when it comes.
     """
 

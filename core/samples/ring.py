@@ -1,4 +1,4 @@
-"""The ring of the newest samples of one unit, which knows what it does not hold."""
+"""Ring of the newest samples of one unit, with an account of those that it does not hold."""
 
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
@@ -7,10 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from core.quality import NOT_MEASURED, Level, Quality, Reading, mean_reading, worst
-from core.samples.account import Gap, SampleAccount
-from core.samples.blocks import Rejection, SampleBlock
-from core.samples.misfit import BlockMisfitError
-from core.samples.outage import n_missed
+from core.samples.blocks import BlockMisfitError, Rejection, SampleBlock
+from core.samples.gaps import Gap, SampleAccount, n_missed
 from core.units import ns_from_s
 
 
@@ -88,7 +86,7 @@ class Ring:
             )
 
     def n_missing_before(self, block: SampleBlock) -> int:
-        """Samples between those that have been taken and a block, whoever has them."""
+        """Number of samples missing before this block, lost or rejected."""
         if self.epoch is None:
             return 0
         if block.epoch != self.epoch:

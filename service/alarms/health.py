@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 from core.limits import WITHIN, AlarmLevel, Judgement
-from core.samples.account import SampleAccount
+from core.samples.gaps import SampleAccount
 from service.bus import Bus
 from service.capture.captures import Captures
 from service.continuous.tape import Tape

@@ -12,7 +12,7 @@ from core.alarms.operation import Action
 from core.condition.cells import NOWHERE_KNOWN
 from core.limits import WITHIN, AlarmLevel, Judgement
 from core.quality import Reading
-from core.samples.account import SampleAccount
+from core.samples.gaps import SampleAccount
 from core.units import NS_PER_S
 from service.alarms.health import LookAtHealth, ServiceHealth
 from service.alarms.service_rules import LOSS_MINUTES, ServiceRules, loss_key, service_watches

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Response
 from pydantic import BeforeValidator
 
 from core.monitor.catalogue import BY_NAME
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from core.stiffness.estimators import ESTIMATORS
 from core.units import ns_from_s
 from service.api.access.declared import needs

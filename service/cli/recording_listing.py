@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from acquisition.recordings.export import UNITS
+from acquisition.delivery.units import UNIT_OF
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.summary import RecordingSummary
 from service.api.times import rfc3339
@@ -41,7 +41,7 @@ def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
         "epochs": list(summary.epochs),
         "not_ok": dict(summary.n_not_ok),
         "channels": [
-            channel.model_dump(mode="json") | {"unit": UNITS[channel.measurand]}
+            channel.model_dump(mode="json") | {"unit": UNIT_OF[channel.measurand]}
             for channel in manifest.channels
         ],
         "slow_channels": [channel.model_dump(mode="json") for channel in manifest.slow_channels],
@@ -60,7 +60,7 @@ def lines_of(recording: Recording, summary: RecordingSummary) -> Iterator[str]:
     yield f"  samples      {summary.n_samples} of {summary.n_passed} per channel"
     yield from _losses(summary)
     for channel in manifest.channels:
-        yield f"  channel      {channel.id:<32} {UNITS[channel.measurand]}"
+        yield f"  channel      {channel.id:<32} {UNIT_OF[channel.measurand]}"
     for slow in manifest.slow_channels:
         yield f"  slow channel {slow.id:<32} {slow.unit}"
     for name, file in manifest.files.items():

@@ -11,7 +11,7 @@ from typing import Any
 
 import httpcore2
 
-from acquisition.delivery.names import NameLookUp
+from acquisition.delivery.network import NameLookUp
 
 PIECE_BYTES = 1024
 """Most that is parsed without giving the event loop to others."""

@@ -10,7 +10,7 @@ from email.policy import SMTP as SMTP_POLICY
 
 import aiosmtplib
 
-from acquisition.delivery.names import NameLookUp
+from acquisition.delivery.network import NameLookUp
 from service.delivery.mail_text import subject, text
 from service.delivery.message import Message
 from service.delivery.network import PATIENT, Timeouts, Trust, connected_socket, printable, words

@@ -6,7 +6,7 @@ import ssl
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition.delivery.names import NameLookUp
+from acquisition.delivery.network import NameLookUp
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 import httpcore2
 
 from acquisition.clock import Clock
-from acquisition.delivery.names import NameLookUp
+from acquisition.delivery.network import NameLookUp
 from core.units import NS_PER_S
 from service.delivery.bounded import BoundedNetwork
 from service.delivery.message import Message

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 
 from prometheus_client.metrics_core import Metric
 
-from core.samples.account import SampleAccount
+from core.samples.gaps import SampleAccount
 from core.units import NS_PER_S
 from service.live import LinkState
 from service.metrics.families import counter, gauge, histogram

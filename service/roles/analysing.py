@@ -4,9 +4,8 @@ import asyncio
 from collections.abc import Mapping
 
 from core.monitor.monitor import MonitorState, UnitMonitor
-from core.samples.account import SampleAccount
 from core.samples.blocks import SampleBlock
-from core.samples.counts import Counts
+from core.samples.gaps import Counts, SampleAccount
 from service.alarms.engine import AlarmEngine
 from service.films.keeper import FilmKeeper
 from service.live import LiveView
@@ -84,7 +83,7 @@ class Analyser:
             Of the unit's samples, as it was stored: the monitor counts these a second time.
         """
         monitor = self._monitors[block.unit]
-        block = self._counts[block.unit].again(block)
+        block = self._counts[block.unit].replayed(block)
         for _ in monitor.steps(block):
             await _others()
         monitor.drain_gaps()
@@ -107,7 +106,7 @@ class Analyser:
         """Let the monitor of a unit expect its newest samples once more, none of them missing."""
         self._monitors[unit].go_on(None)
         self._monitors[unit].rewind(memory.monitor)
-        self._counts[unit].go_on(memory.count)
+        self._counts[unit].restore(memory.count)
 
     def settle(self, unit: str, memory: UnitMemory) -> None:
         """Let the monitor of a unit, after these samples, be as it was."""

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from core.alarms.board import AlarmMemory
 from core.change.film_judge import FilmMemory
 from core.monitor.monitor import MonitorState
-from core.samples.counts import Count
+from core.samples.gaps import Count
 
 VERSION = 1
 

@@ -10,8 +10,7 @@ from core.change.film_judge import FilmNews
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import Level, Reading
-from core.samples.account import Gap
-from core.samples.outage import Reach
+from core.samples.gaps import Gap, Reach
 from service.store.access_port import AccessStore
 from service.store.audit_port import AuditStore
 from service.store.commands_port import Commands

@@ -1,7 +1,6 @@
 """How far the stored results of a unit reach, to know after a stop what is missing."""
 
-from core.samples.account import Gap
-from core.samples.outage import Reach
+from core.samples.gaps import Gap, Reach
 from service.store.database import Connection
 
 SELECT_SERIES = "SELECT id FROM series WHERE unit = ?"

@@ -8,8 +8,7 @@ from core.alarms.alarm import Alarm, AlarmNews
 from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
-from core.samples.account import Gap
-from core.samples.outage import Reach
+from core.samples.gaps import Gap, Reach
 from service.store.access import SqlAccess
 from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.audit import SqlAudit

@@ -13,7 +13,7 @@ from nats.js.client import JetStreamContext
 from nats.js.errors import NotFoundError
 
 from acquisition.clock import Clock
-from acquisition.delivery.stopping import let_stop_through
+from acquisition.delivery.network import let_stop_through
 from service.heartbeats import UNHEARD, Pulse
 from service.recorder import Findings, Recorder
 from service.settings.plant import PlantFile

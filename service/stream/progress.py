@@ -6,9 +6,8 @@ from dataclasses import replace
 import structlog
 
 from acquisition.clock import Clock
-from core.samples.blocks import SampleBlock
-from core.samples.misfit import BlockMisfitError
-from core.samples.outage import Reach
+from core.samples.blocks import BlockMisfitError, SampleBlock
+from core.samples.gaps import Reach
 from core.units import s_from_ns
 from service.live import LinkState, LiveView
 from service.recorder import Findings, Recorder
@@ -190,7 +189,7 @@ class UnitProgress:
         memory = self._memory
         if memory is None or self._is_rewound:
             return
-        if block.epoch == (memory.count.told if memory.count else memory.monitor.epoch):
+        if block.epoch == (memory.count.reported if memory.count else memory.monitor.epoch):
             self._analyser.rewind(self.unit, memory)
             self._is_rewound = True
 

@@ -11,7 +11,7 @@ from nats.js.client import JetStreamContext
 from nats.js.errors import APIError, NoStreamResponseError
 
 from acquisition.clock import Clock
-from acquisition.delivery.stopping import let_stop_through
+from acquisition.delivery.network import let_stop_through
 from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 from service.heartbeats import UNHEARD, Pulse

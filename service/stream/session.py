@@ -14,7 +14,7 @@ from nats.aio.client import Client
 from nats.errors import AuthorizationError, Error, NoServersError
 from nats.js.client import JetStreamContext
 
-from acquisition.delivery.stopping import let_stop_through, n_stops
+from acquisition.delivery.network import let_stop_through, n_stops
 from service.settings.stream import StreamSettings
 from service.stream.errors import StreamError, StreamMisfitError
 

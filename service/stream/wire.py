@@ -7,8 +7,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 from core.quality import Quality, Reading
-from core.samples.blocks import Rejection, SampleBlock
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, Rejection, SampleBlock, StampFault
 from service.live import LinkState
 from service.roles.link_news import LinkNews
 from service.stream.frame import Frame, Kind, framed, unframed

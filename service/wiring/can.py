@@ -7,24 +7,16 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import COUNTS_FULL_SCALE
+from acquisition.delivery.units import UNIT_OF
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_server import CanBusServer
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_settings
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.server import DaqServer
 from acquisition.simulated.feed import SampleFeed
-from core.machine.channel import Measurand
 from service.conversion import calibration_of
 from service.settings import can as settings
 from service.settings.units import UnitSettings
-
-UNITS = {
-    Measurand.GAP_UM: "um",
-    Measurand.DISPLACEMENT_UM: "um",
-    Measurand.VELOCITY_MM_S: "mm/s",
-    Measurand.ACCELERATION_M_S2: "m/s2",
-    Measurand.KEY_PHASE_V: "V",
-}
 
 
 def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSettings:
@@ -37,7 +29,7 @@ def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSett
         "when_full": source.when_full,
         "stamps": source.stamps,
     }
-    units = tuple(UNITS[channel.measurand] for channel in unit.channel)
+    units = tuple(UNIT_OF[channel.measurand] for channel in unit.channel)
     if source.profile is not None:
         return daq_settings(can_shape_of(unit, source), link, units, **others)
     return CanSettings(
@@ -90,7 +82,7 @@ def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
         channels=tuple(
             DaqSignal(
                 c.id,
-                UNITS[c.measurand] if floats else "V",
+                UNIT_OF[c.measurand] if floats else "V",
                 1.0 if floats else c.scale["full_scale_v"] / COUNTS_FULL_SCALE,
             )
             for c in unit.channel

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import can
 
-from acquisition.can.assembly import Assembler
+from acquisition.can.assembly import FrameAssembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanSettings
@@ -31,7 +31,7 @@ class CanLogDecoder:
 
     def __init__(self, settings: CanSettings, calibration: UnitCalibration) -> None:
         plan = compile_plan(settings, calibration)
-        self._assembler = Assembler(
+        self._assembler = FrameAssembler(
             plan,
             n_channels=len(calibration.channels),
             n_slow=len(calibration.slow),

@@ -8,8 +8,9 @@ from datetime import UTC, datetime, timedelta
 from itertools import chain
 from pathlib import Path
 
-from acquisition.delivery.block_grid import BlockGrid
+from acquisition.delivery.blocks import BlockGrid
 from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.units import slow_conversion, waveform_factor
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import (
     ChannelColumn,
@@ -19,7 +20,6 @@ from acquisition.recordings.imports.job import (
     SlowColumn,
     TimeAxis,
 )
-from acquisition.recordings.imports.units import slow_conversion, waveform_factor
 from acquisition.recordings.manifest import Manifest, read_manifest
 from acquisition.recordings.reading import imported_blocks, imported_frames
 from acquisition.recordings.writer import RecordingWriter

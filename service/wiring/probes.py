@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from acquisition.delivery.wrong_replies import wrong_replies_drop_the_link
+from acquisition.delivery.polling import wrong_replies_drop_the_link
 from acquisition.errors import AcquisitionError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import MapDecoder

@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.raw import RawBlock
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
@@ -74,7 +74,7 @@ def record(unit: UnitSettings) -> Path:
     name, run = RUNS[unit.id]
     folder = HERE / name
     shutil.rmtree(folder, ignore_errors=True)
-    delivery = Delivery(calibration_of(unit))
+    delivery = BlockAssembler(calibration_of(unit))
     with recording_writer(unit, folder, "tests/recordings/make.py") as writer:
         for raw in run(unit):
             for block in delivery.take(raw):

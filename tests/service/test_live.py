@@ -8,8 +8,8 @@ import pytest
 from acquisition.clock import Clock
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reason
-from core.samples.account import SampleAccount
 from core.samples.blocks import SampleBlock
+from core.samples.gaps import SampleAccount
 from service.live import LinkState, LiveView
 
 STALE_AFTER_S = 30.0

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import calibrate
 from acquisition.delivery.raw import RawBlock
 from core.monitor.assessment import Assessment
@@ -63,7 +63,7 @@ async def test_a_recording_analysed_equals_what_was_seen_live_to_the_last_bit(
     machine, calibration = machine_of(unit), calibration_of(unit)
     live_monitor, live = UnitMonitor(machine, ANALYSIS), []
     with recording_writer(unit, tmp_path / "run", "a test") as writer:
-        delivery = Delivery(calibration)
+        delivery = BlockAssembler(calibration)
         blocks = [b for raw in rough_ride(unit, stepped_clock) for b in delivery.take(raw)]
         for block in blocks + delivery.flush():
             live += live_monitor.ingest(block)

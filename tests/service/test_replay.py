@@ -9,8 +9,7 @@ import pytest
 
 from acquisition.errors import LinkError
 from core.quality import GOOD
-from core.samples.blocks import SampleBlock
-from core.samples.device_clock import DeviceClock
+from core.samples.blocks import DeviceClock, SampleBlock
 from service.replay import PlayedOut, replay_folder, replayed_plant
 from service.settings.loading import load_plant_file
 

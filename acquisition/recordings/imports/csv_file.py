@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from acquisition.delivery.units import require_unit, unit_in
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ColumnName, ImportJob
 from acquisition.recordings.imports.rows import Rows, SlowValues
 from acquisition.recordings.imports.series import counts_are_kept, engineering_units
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns, text_to_ns
-from acquisition.recordings.imports.units import require_unit, unit_in
 from core.arrays import FloatArray, RawArray
 
 CUT_OFF = "the file ends within it; if it is whole, put an end to its last line"

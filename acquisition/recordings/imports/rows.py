@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
-from acquisition.delivery.block_grid import BlockGrid
+from acquisition.delivery.blocks import BlockGrid
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob

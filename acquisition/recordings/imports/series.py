@@ -8,11 +8,11 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from acquisition.delivery.units import require_unit
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ChannelColumn, ColumnName, ImportJob, SlowColumn
 from acquisition.recordings.imports.rows import Rows, SlowValues
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns
-from acquisition.recordings.imports.units import require_unit
 from core.arrays import RawArray, SampleArray
 
 MAX_SAMPLES = 2**29

@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from acquisition.delivery.block_grid import BlockGrid
+from acquisition.delivery.blocks import BlockGrid
 from acquisition.delivery.raw import RawBlock
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.source import Selection, all_of

@@ -4,7 +4,7 @@ from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager
 
 from acquisition.clock import Clock
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.simulated.feed import SampleFeed
 from core.samples.blocks import SampleBlock
@@ -31,7 +31,7 @@ class SimulatedSource:
         self._feed = feed
         self._rate_hz = calibration.rate_hz
         self._block_samples = calibration.block_samples
-        self._delivery = Delivery(calibration)
+        self._delivery = BlockAssembler(calibration)
         self._clock = clock
         self._paced = paced
         self._start_s: float | None = None

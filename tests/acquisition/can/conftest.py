@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rigs.fake_bus import VIRTUAL, FakeBus
 
-from acquisition.can.assembly import Assembler
+from acquisition.can.assembly import FrameAssembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from acquisition.can.source import CanSource
@@ -114,14 +114,14 @@ def settings_of(tmp_path) -> Callable[..., CanSettings]:
 
 
 @pytest.fixture
-def assembler_by(counts_calibration) -> Callable[..., Assembler]:
+def assembler_by(counts_calibration) -> Callable[..., FrameAssembler]:
     """Builds the assembler of settings; the rate and the time of its beginning as arguments."""
 
-    def build(settings: CanSettings, rate_hz: float = 600.0, begun_ns: int = 0) -> Assembler:
+    def build(settings: CanSettings, rate_hz: float = 600.0, begun_ns: int = 0) -> FrameAssembler:
         n_channels, n_slow = len(settings.channels), len(settings.slow)
         calibration = counts_calibration(n_channels=n_channels, n_slow=n_slow, rate_hz=rate_hz)
         plan = compile_plan(settings, calibration)
-        return Assembler(plan, n_channels, n_slow, rate_hz, settings.hold_s, begun_ns)
+        return FrameAssembler(plan, n_channels, n_slow, rate_hz, settings.hold_s, begun_ns)
 
     return build
 

@@ -85,7 +85,7 @@ MISFITS = [
     ((X, channel("y", "WAVE.y WAVE.z")), {}, r"signals.y: has 2 samples in a frame, x has 1"),
     ((channel("x", "WAVE.x OTHER.u"),), {}, r"signals.x: its signals must all be in one message"),
     ((channel("w", "OTHER.w"),), {}, r'OTHER.w has unit "mils" in the DBC; needed is "um", "µm"'),
-    ((channel("u", "OTHER.u", "mm/s"),), {}, r'OTHER.u has unit "um" .* needed is "mm/s", or V'),
+    ((channel("u", "OTHER.u", "mm/s"),), {}, r'OTHER.u has unit "um" .* needed is "mm/s", .*or V'),
     ((X,), {"counters": ("WAVE.nix",)}, r"counters = \"WAVE.nix\": .*no signal nix"),
     ((X,), {"counters": ("WAVE.x",)}, r"counters = \"WAVE.x\": must be an unsigned integer"),
     ((X,), {"counters": ("WAVE.count", "WAVE.count")}, r"second of message WAVE"),

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from rigs.tiers import covering, fast_and_long
 
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.errors import LinkError
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_server import CanBusServer
@@ -274,7 +274,7 @@ def fingerprint(blocks) -> list[str]:
 
 
 def straight(feed, calibration, n_samples: int = 50) -> list:
-    delivery = Delivery(calibration)
+    delivery = BlockAssembler(calibration)
     blocks = []
     try:
         while True:

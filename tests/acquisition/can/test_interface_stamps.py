@@ -10,8 +10,7 @@ import pytest
 from rigs.standing_clock import StandingClock
 
 from acquisition.can.source import CanSource
-from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.interface_clock import InterfaceClock
+from acquisition.delivery.arrival import Arrival, InterfaceClock
 
 RATE_HZ = 600.0
 BLOCK = 50

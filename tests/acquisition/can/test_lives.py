@@ -6,7 +6,7 @@ import can
 import pytest
 from rigs.tiers import covering
 
-from acquisition.can.assembly import Assembler
+from acquisition.can.assembly import FrameAssembler
 from acquisition.can.source import CanSource
 
 RATE_HZ = 600.0
@@ -25,7 +25,7 @@ BO_ 256 M: 8 N
 def life(settings_of, assembler_by):
     """Begins to read a device: a counter of some width or none, and whether an epoch is read."""
 
-    def build(begun_s: float, n_bits: int | None, tells: bool) -> Assembler:
+    def build(begun_s: float, n_bits: int | None, tells: bool) -> FrameAssembler:
         counters, epoch = ("M.c",) if n_bits else (), "M.e" if tells else None
         text = DBC.format(n_bits=n_bits or 32)
         settings = settings_of(text, {"x": "M.x"}, counters=counters, epoch=epoch)
@@ -34,7 +34,7 @@ def life(settings_of, assembler_by):
     return build
 
 
-def read(assembler: Assembler, first: int, stop: int, n_bits: int | None, begun_at: int = 0):
+def read(assembler: FrameAssembler, first: int, stop: int, n_bits: int | None, begun_at: int = 0):
     """Epochs and first index of samples of a device whose count began at one of its samples."""
     blocks = []
     for start in range(first, stop, 6):

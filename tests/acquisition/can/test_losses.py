@@ -11,7 +11,7 @@ import pytest
 from rigs.tiers import covering, fast_and_long
 
 import acquisition.can
-from acquisition.can.assembly import Assembler
+from acquisition.can.assembly import FrameAssembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanLinkSettings
@@ -91,7 +91,7 @@ def assembler_of(counts_calibration):
             daq_settings(shape, link, ("um",) * n_channels, **settings),
             counts_calibration(n_channels=n_channels, n_slow=n_slow),
         )
-        assembler = Assembler(plan, n_channels, n_slow, 600.0, 5.0)
+        assembler = FrameAssembler(plan, n_channels, n_slow, 600.0, 5.0)
         gate = FrameGate(plan, assembler.refused)
 
         def take(frames, arrived_ns):
@@ -191,7 +191,7 @@ async def test_memory_stays_bounded_when_one_node_falls_silent(
     for n in range(1, 101):
         frames = [f for f in encoder.frames(feed.advance(BLOCK)) if f.frame_id != silent]
         blocks += assembler.take_wire(frames, START_NS + n * 83_333_333)
-    assert len(assembler._counted._pending) <= 65
+    assert len(assembler._sets.pending) <= 65
     blocks += assembler.take_wire(encoder.frames(feed.advance(BLOCK)), START_NS + 9 * 10**9)
     assert len(blocks) == 2
     assert blocks[1].rejected == (Rejection("incomplete_frames", 100 * BLOCK),)
@@ -216,8 +216,8 @@ def test_random_frames_of_a_mad_device_never_break_the_account(
         arrived_ns += int(random.integers(0, 200_000_000))
         for block in assembler.take(frames, arrived_ns):
             ring.write(calibrate(block, calibration))
-        assert len(assembler._counted._pending) <= 65
-    assert sum(len(t.starts) for t in assembler._builder.tracks._tracks.values()) < 40_000
+        assert len(assembler._sets.pending) <= 65
+    assert sum(map(len, assembler._builder.side._entries.values())) < 40_000
 
 
 N_EACH = 200

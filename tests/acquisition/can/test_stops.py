@@ -9,7 +9,7 @@ from acquisition.can.source import CanSource
 from acquisition.delivery.arrival import Arrival
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
-from core.samples.outage import Reach, restart
+from core.samples.gaps import Reach, restart
 
 RATE_HZ = 60.0
 STOPS_AT_S = 10.0

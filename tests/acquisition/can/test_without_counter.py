@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rigs.tiers import covering
 
-from acquisition.can.assembly import Assembler
+from acquisition.can.assembly import FrameAssembler
 from acquisition.can.settings import CanSettings, CanSlowChannel
 from acquisition.errors import ConfigError
 
@@ -43,7 +43,7 @@ def settings(settings_of) -> CanSettings:
 
 
 @pytest.fixture
-def assembler(settings, assembler_by) -> Assembler:
+def assembler(settings, assembler_by) -> FrameAssembler:
     return assembler_by(settings)
 
 

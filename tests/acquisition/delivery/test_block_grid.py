@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.block_grid import BlockGrid
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler, BlockGrid
 from acquisition.delivery.raw import RawBlock
 from core.samples.blocks import Rejection
 
@@ -94,8 +93,8 @@ ARRIVED = Arrival(1_767_225_600_000_000_000, 5000.0)
 
 
 @pytest.fixture
-def delivery(counts_calibration) -> Delivery:
-    return Delivery(counts_calibration(2))
+def delivery(counts_calibration) -> BlockAssembler:
+    return BlockAssembler(counts_calibration(2))
 
 
 def test_what_has_waited_in_the_device_is_older_than_the_newest(delivery, counting_feed):

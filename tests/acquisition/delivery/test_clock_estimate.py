@@ -7,8 +7,7 @@ import pytest
 from rigs.tiers import fast_and_long
 
 from acquisition.clock import FastClock
-from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.clock_estimate import ClockEstimate
+from acquisition.delivery.arrival import Arrival, ArrivalModel
 
 NS = 1_000_000_000
 HOST_NS = 1_767_225_600 * NS
@@ -27,19 +26,19 @@ def watched(
     offset_s: float,
     seed: int,
     wrong_s: Callable[[float], float] = lambda after_s: 0.0,  # noqa: ARG005
-) -> ClockEstimate:
+) -> ArrivalModel:
     """Polls four times a second, each up to 80 ms late, of a device that samples too fast.
 
     How wrong the host's clock is may change with time.
     """
-    estimate, random = ClockEstimate(), np.random.default_rng(seed)
+    estimate, random = ArrivalModel(RATE_HZ), np.random.default_rng(seed)
     sample_s = 1.0 / (RATE_HZ * (1.0 + drift_ppm * 1e-6))
     for n in range(1, int(duration_s * RATE_HZ / POLL_SAMPLES)):
         true_s = n * POLL_SAMPLES * sample_s
         arrived_s = true_s + 0.002 + random.uniform(0.0, 0.08)
         stamp_ns = HOST_NS + round((true_s + offset_s) * NS)
         arrived = arrival(arrived_s, wrong_s(arrived_s))
-        estimate.add(1, n * POLL_SAMPLES, RATE_HZ, stamp_ns, arrived)
+        estimate.add(1, n * POLL_SAMPLES, stamp_ns, arrived)
     return estimate
 
 
@@ -47,7 +46,7 @@ def watched(
 @pytest.mark.parametrize("drift_ppm", [-150.0, 0.0, 35.0, 400.0])
 def test_drift_is_found_within_three_of_its_stated_uncertainty(drift_ppm, n_seeds) -> None:
     for seed in range(n_seeds):
-        clock = watched(1800.0, drift_ppm, 0.0, seed).reading()
+        clock = watched(1800.0, drift_ppm, 0.0, seed).device_clock()
         assert clock.u_drift_ppm < 3.0
         assert abs(clock.drift_ppm - drift_ppm) < 3.0 * clock.u_drift_ppm + 0.1
 
@@ -60,29 +59,29 @@ def test_offset_is_read_at_the_least_delay_by_the_hosts_clock_as_it_stands_now(
     offset_s, step_s, within_s
 ) -> None:
     estimate = watched(600.5, 0.0, offset_s + 0.002, 5, lambda s: step_s if s > 600.0 else 0.0)
-    assert estimate.reading().offset_s == pytest.approx(offset_s - step_s, abs=within_s)
+    assert estimate.device_clock().offset_s == pytest.approx(offset_s - step_s, abs=within_s)
 
 
 def test_a_device_without_stamps_has_a_drift_but_no_offset() -> None:
-    estimate = ClockEstimate()
+    estimate = ArrivalModel(RATE_HZ)
     for n in range(600):
-        estimate.add(1, 600 * n, RATE_HZ, None, arrival(n))
-    clock = estimate.reading()
+        estimate.add(1, 600 * n, None, arrival(n))
+    clock = estimate.device_clock()
     assert clock.offset_s is None
     assert clock.drift_ppm == pytest.approx(0.0, abs=0.01)
 
 
 def test_drift_is_not_told_before_there_is_enough_to_tell_also_after_a_restart() -> None:
-    assert watched(30.0, 0.0, 0.0, seed=1).reading().drift_ppm is None
+    assert watched(30.0, 0.0, 0.0, seed=1).device_clock().drift_ppm is None
     estimate = watched(600.0, 100.0, 0.0, seed=3)
-    estimate.add(2, 0, RATE_HZ, HOST_NS, arrival(600.0))
-    assert estimate.reading().drift_ppm is None
+    estimate.add(2, 0, HOST_NS, arrival(600.0))
+    assert estimate.device_clock().drift_ppm is None
 
 
 def test_memory_is_bounded() -> None:
-    estimate = ClockEstimate()
+    estimate = ArrivalModel(RATE_HZ)
     for n in range(5000):
-        estimate.add(1, 6000 * n, RATE_HZ, None, arrival(10.0 * n))
+        estimate.add(1, 6000 * n, None, arrival(10.0 * n))
     assert len(estimate._bins) == 360
 
 
@@ -90,25 +89,25 @@ def test_memory_is_bounded() -> None:
 def test_a_step_of_the_hosts_clock_is_no_drift_of_the_device(step_s) -> None:
     for after_s in (601.0, 690.0, 1200.0):
         estimate = watched(after_s, 20.0, 0.0, 5, lambda s: step_s if s > 600.0 else 0.0)
-        clock = estimate.reading()
+        clock = estimate.device_clock()
         if after_s > 680.0 or clock.drift_ppm is not None:
             assert abs(clock.drift_ppm - 20.0) < 5.0 * clock.u_drift_ppm + 0.1
 
 
 def test_a_device_that_drifts_is_still_found_to_where_the_clock_is_set_again_and_again() -> None:
     estimate = watched(1290.0, 400.0, 0.0, 5, lambda s: 3600.0 * (s // 100.0))
-    clock = estimate.reading()
+    clock = estimate.device_clock()
     assert clock.drift_ppm == pytest.approx(400.0, abs=3.0 * clock.u_drift_ppm)
 
 
 def test_a_host_that_was_suspended_takes_that_for_no_drift() -> None:
     """Its steady clock stood still meanwhile, and the device went on."""
-    estimate, asleep_s = ClockEstimate(), 300.0
+    estimate, asleep_s = ArrivalModel(RATE_HZ), 300.0
     for n in range(900):
         slept_s = asleep_s if n > 300 else 0.0
         awake = Arrival(HOST_NS + round((n + slept_s) * NS), float(n))
-        estimate.add(1, round(RATE_HZ * (n + slept_s)), RATE_HZ, None, awake)
-    assert estimate.reading().drift_ppm == pytest.approx(0.0, abs=0.01)
+        estimate.add(1, round(RATE_HZ * (n + slept_s)), None, awake)
+    assert estimate.device_clock().drift_ppm == pytest.approx(0.0, abs=0.01)
 
 
 async def test_a_fast_clock_passes_a_day_in_a_fiftieth_of_it(stepped_clock) -> None:

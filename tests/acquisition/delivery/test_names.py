@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from acquisition.delivery.names import KnownAddresses
+from acquisition.delivery.network import KnownAddresses
 from acquisition.errors import LinkError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.transport import LinkSettings, TcpTransport
@@ -34,7 +34,7 @@ class NameServer:
 @pytest.fixture
 def names(monkeypatch: pytest.MonkeyPatch) -> Iterator[NameServer]:
     server = NameServer()
-    monkeypatch.setattr("acquisition.delivery.names.socket.getaddrinfo", server.getaddrinfo)
+    monkeypatch.setattr("acquisition.delivery.network.socket.getaddrinfo", server.getaddrinfo)
     yield server
     server.answers.set()
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from acquisition.delivery.host_stamps import HostStamps
+from acquisition.delivery.arrival import HostStamps
+from acquisition.delivery.blocks import StampCheck
 from acquisition.delivery.raw import RawBlock
-from acquisition.delivery.stamps import StampCheck
-from core.samples.device_clock import StampFault
+from core.samples.blocks import StampFault
 
 NS = 1_000_000_000
 START_NS = 1_767_225_600 * NS

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from rigs.polled import map_of, take
 
-from acquisition.delivery.ticks import Ticks
+from acquisition.delivery.polling import PollClock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.cells import Cell, NumberType
 from acquisition.modbus.device_time import EpochTime
@@ -138,7 +138,7 @@ async def test_what_cannot_work_is_refused_before_anything_is_sent(
 
 
 async def test_the_first_poll_does_not_wait_and_the_others_come_at_multiples(stepped_clock) -> None:
-    ticks = Ticks(stepped_clock, 60.0)
+    ticks = PollClock(stepped_clock, 60.0)
     stepped_clock.step(7.0)
     started_s = stepped_clock.now_ns() // 10**9
 
@@ -152,7 +152,7 @@ async def test_the_first_poll_does_not_wait_and_the_others_come_at_multiples(ste
 
 
 async def test_a_machine_that_was_suspended_while_waiting_says_the_true_tick(stepped_clock) -> None:
-    ticks = Ticks(stepped_clock, 1.0)
+    ticks = PollClock(stepped_clock, 1.0)
     await ticks.next()
     asleep = stepped_clock.sleep
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from acquisition.delivery.arrival import Arrival
-from acquisition.delivery.clock_estimate import ClockEstimate
-from acquisition.delivery.ring_pace import out_of_step_s
+from acquisition.delivery.arrival import Arrival, ArrivalModel
+from acquisition.delivery.polling import incommensurate_period_s
 from acquisition.errors import ConfigError, LinkError
 from acquisition.simulated.devices import ring_faults as faults
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
@@ -94,7 +93,7 @@ async def test_a_source_waits_a_poll_period_and_never_piles_polls_up(
         device.memory.before_read = note
         for _ in range(6):
             await anext(stream)
-    pace_s = out_of_step_s(1.0, device.layout.slot_duration_s)
+    pace_s = incommensurate_period_s(1.0, device.layout.slot_duration_s)
     assert np.diff(polled_at_s) == pytest.approx([pace_s, pace_s, pace_s, 7.3, pace_s])
 
 
@@ -130,10 +129,10 @@ LIMIT_PPM = 200.0
 
 def readings(drift_ppm: float, period_s: float, slot_samples: int, seed: int):
     """Clock estimate every ten seconds for a ring whose link takes 3 ms, at times more."""
-    random, estimate = np.random.default_rng(seed), ClockEstimate()
+    random, estimate = np.random.default_rng(seed), ArrivalModel(RATE_HZ)
     slot_s = slot_samples / RATE_HZ
     begun_s = random.uniform(0.0, slot_s)
-    told_s, seen, pace_s = 0.0, 0, out_of_step_s(period_s, slot_s)
+    told_s, seen, pace_s = 0.0, 0, incommensurate_period_s(period_s, slot_s)
     for polled_s in np.arange(pace_s, DURATION_S, pace_s).tolist():
         n_slots = int((begun_s + polled_s) * (1.0 + drift_ppm * 1e-6) / slot_s)
         if n_slots == seen:
@@ -141,10 +140,10 @@ def readings(drift_ppm: float, period_s: float, slot_samples: int, seed: int):
         seen = n_slots
         arrived_s = polled_s + 0.003 + random.exponential(0.002)
         arrived = Arrival(1_767_225_600 * 10**9 + round(arrived_s * 1e9), arrived_s)
-        estimate.add(1, n_slots * slot_samples, RATE_HZ, None, arrived)
+        estimate.add(1, n_slots * slot_samples, None, arrived)
         if polled_s - told_s >= 10.0:
             told_s = polled_s
-            yield estimate.reading()
+            yield estimate.device_clock()
 
 
 @pytest.mark.parametrize(("period_s", "slot_samples"), [(0.25, 50), (0.25, 600), (1.0, 60)])
@@ -163,7 +162,7 @@ def test_a_ring_that_is_polled_in_step_with_its_slots_tells_its_drift(
 
 @pytest.mark.parametrize("slot_s", [0.01, 0.0833, 0.1, 0.24, 0.25, 0.26, 0.5, 1.0, 7.0])
 def test_polls_come_no_later_than_asked_for_and_not_much_sooner(slot_s) -> None:
-    period_s = out_of_step_s(0.25, slot_s)
+    period_s = incommensurate_period_s(0.25, slot_s)
     assert 0.5 * 0.25 < period_s <= 0.25
     if slot_s > 1.0 or slot_s < 0.05:
         assert period_s > 0.8 * 0.25

@@ -10,8 +10,7 @@ from acquisition.simulated.devices import ring_faults as faults
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from core.quality import Reason
-from core.samples.blocks import Rejection
-from core.samples.device_clock import StampFault
+from core.samples.blocks import Rejection, StampFault
 
 U32 = 2**32
 

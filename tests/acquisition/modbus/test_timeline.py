@@ -8,12 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition.errors import FrameError
-from acquisition.modbus.counted_samples import WRAP, CountedSamples, Place
-from acquisition.modbus.fifo_assembly import ChannelAssembly, place_records
+from acquisition.modbus.fifo_assembly import (
+    WRAP,
+    ChannelAssembly,
+    CountedSamples,
+    SamplePlace,
+    UncountedSamples,
+    place_records,
+)
 from acquisition.modbus.fifo_layout import FifoPiece
 from acquisition.modbus.ring_profile import U32, RingLayout, Slot
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
-from acquisition.modbus.uncounted_samples import UncountedSamples
+from core.samples.axis import Epochs
 
 LAYOUT = RingLayout(1, 50, 8, 600_000, 0, 16, 65)
 NS_PER_SLOT = 50 * 10**9 // 600
@@ -36,6 +42,10 @@ def slot(n: int, sequence: int = 0, index: int = 0, shift_s: float = 0.0, shift_
     )
 
 
+def epochs(first: int) -> Epochs:
+    return Epochs(first * 10**9, trusts_device=False)
+
+
 @given(a=st.integers(0, U32 - 1), distance=st.integers(-(2**31), 2**31 - 1))
 def test_the_distance_of_two_counters_survives_the_wrap(a, distance):
     assert ahead((a + distance) % U32, a) == distance
@@ -47,26 +57,26 @@ def test_the_distance_of_two_counters_survives_the_wrap(a, distance):
     steps=st.lists(st.integers(1, 10**6), max_size=20),
 )
 def test_the_index_never_wraps_wherever_the_device_started(sequence, index, steps):
-    timeline = Timeline(LAYOUT)
+    timeline = Timeline(LAYOUT, epochs(0))
     assert timeline.place(slot(0, sequence, index)) == index
     n = 0
     for step in steps:
         n += step
         assert timeline.place(slot(n, sequence, index)) == index + 50 * n
-    assert timeline.n_resets == 0
+    assert timeline.epochs.number == 0
 
 
 @pytest.mark.parametrize("shift_s", [3600, -3600, -0.1, 4e9])
 def test_the_index_decides_where_a_slot_belongs_and_not_its_stamp(shift_s):
-    timeline = Timeline(LAYOUT)
+    timeline = Timeline(LAYOUT, epochs(0))
     timeline.place(slot(0))
     assert timeline.place(slot(1, shift_s=shift_s)) == 50
     assert timeline.place(slot(2)) == 100
-    assert timeline.n_resets == 0
+    assert timeline.epochs.number == 0
 
 
 def test_a_microsecond_field_of_a_million_is_no_time_and_spoils_nothing():
-    timeline = Timeline(LAYOUT)
+    timeline = Timeline(LAYOUT, epochs(0))
     assert timeline.place(slot(0)) == 0
     wrong = Slot(1, 50, 1_767_225_600, 1_000_000, 1, NOTHING, 1, epoch=1)
     assert timeline.place(wrong) is Refusal.IMPOSSIBLE_TIME
@@ -74,15 +84,15 @@ def test_a_microsecond_field_of_a_million_is_no_time_and_spoils_nothing():
 
 
 def test_an_index_that_starts_anew_is_a_reset_and_not_four_thousand_million_samples():
-    timeline = Timeline(LAYOUT)
+    timeline = Timeline(LAYOUT, epochs(0))
     timeline.place(slot(0, index=4_000_000_000))
     assert timeline.place(slot(1, index=0)) is Refusal.INCONSISTENT_INDEX
     assert timeline.place(slot(2, index=0)) == 100
-    assert timeline.n_resets == 1
+    assert timeline.epochs.number == 1
 
 
 def test_an_older_slot_of_the_same_axis_is_a_repetition_and_one_of_another_time_is_not():
-    timeline = Timeline(LAYOUT)
+    timeline = Timeline(LAYOUT, epochs(0))
     timeline.place(slot(5))
     assert timeline.repeats(slot(3))
     assert not timeline.repeats(slot(3, shift_s=60))
@@ -100,28 +110,28 @@ def counted_one_less(n: int) -> Slot:
     [counted_one_less, lambda n: slot(n, shift_index=1), lambda n: slot(n, shift_index=-50 * n)],
 )
 def test_slots_that_only_their_number_or_index_misplaces_are_no_reset(n_wrong, wrong):
-    timeline = Timeline(LAYOUT)
+    timeline = Timeline(LAYOUT, epochs(0))
     timeline.place(slot(0))
     for n in range(1, n_wrong + 1):
         assert timeline.place(wrong(n)) is Refusal.INCONSISTENT_INDEX
     assert timeline.place(slot(n_wrong + 1)) == 50 * (n_wrong + 1)
-    assert timeline.n_resets == 0
+    assert timeline.epochs.number == 0
 
 
 def test_a_device_that_goes_on_to_count_otherwise_has_been_reset():
-    timeline = Timeline(LAYOUT)
+    timeline = Timeline(LAYOUT, epochs(0))
     timeline.place(slot(0))
     placed = [timeline.place(slot(n, shift_index=1)) for n in range(1, 12)]
     assert placed[:9] == [Refusal.INCONSISTENT_INDEX] * 9
     assert placed[9:] == [501, 551]
-    assert timeline.n_resets == 1
+    assert timeline.epochs.number == 1
 
 
 RATE_HZ = 600.0
 
 
 def counted(removes: bool = True) -> CountedSamples:
-    return CountedSamples(RATE_HZ, removes=removes, epoch=7)
+    return CountedSamples(RATE_HZ, epochs(7), removes=removes)
 
 
 @given(
@@ -135,7 +145,7 @@ def test_gaps_are_exact_however_often_the_counter_has_wrapped(first: int, steps)
     for gap, late_s in steps:
         index += 1 + gap
         now_s = (index - first) / RATE_HZ + late_s
-        assert samples.place(index % WRAP, now_s) == Place(7, index)
+        assert samples.place(index % WRAP, now_s) == SamplePlace(7, index)
 
 
 @pytest.mark.parametrize(
@@ -146,8 +156,8 @@ def test_a_counter_that_time_does_not_explain_begins_an_epoch(first, passed_s, t
     samples = counted()
     samples.place(first, 0.0)
 
-    assert samples.place(then, passed_s) == Place(8, then)
-    assert samples.place(then + 1, passed_s) == Place(8, then + 1)
+    assert samples.place(then, passed_s) == SamplePlace(8, then)
+    assert samples.place(then + 1, passed_s) == SamplePlace(8, then + 1)
 
 
 @pytest.mark.parametrize(("has_asked", "epoch"), [(True, 8), (False, 7)])
@@ -156,10 +166,10 @@ def test_a_counter_that_stops_with_its_device_begins_an_epoch_if_nothing_had_wai
 ) -> None:
     samples = counted()
     samples.place(100, 0.0)
-    samples.note_seen_all(5.0 if has_asked else 0.0)
+    samples.note_drained(5.0 if has_asked else 0.0)
 
-    assert samples.place(101, 5.0) == Place(epoch, 101)
-    assert samples.place(102, 5.0) == Place(epoch, 102)
+    assert samples.place(101, 5.0) == SamplePlace(epoch, 101)
+    assert samples.place(102, 5.0) == SamplePlace(epoch, 102)
 
 
 @pytest.mark.parametrize(("passed_s", "is_ambiguous"), [(1.0, False), (55.0, True), (1e6, True)])
@@ -177,31 +187,28 @@ def test_samples_that_a_queue_shows_again_are_not_taken_twice() -> None:
 
     shown_again = [samples.place(n, 0.01) for n in range(110, 123)]
 
-    assert shown_again == [None] * 10 + [Place(7, n) for n in (120, 121, 122)]
+    assert shown_again == [None] * 10 + [SamplePlace(7, n) for n in (120, 121, 122)]
 
 
 def uncounted() -> UncountedSamples:
-    return UncountedSamples(RATE_HZ, tolerance_s=0.1, epoch=7)
-
-
-def deliver(samples: UncountedSamples, n: int) -> list[Place]:
-    return [samples.place() for _ in range(n)]
+    return UncountedSamples(RATE_HZ, epochs(7), tolerance_s=0.1)
 
 
 def test_without_a_counter_samples_are_counted_here() -> None:
-    assert deliver(uncounted(), 3) == [Place(7, 0), Place(7, 1), Place(7, 2)]
+    samples = uncounted()
+    assert [samples.place(n) for n in (3, 2)] == [SamplePlace(7, 0), SamplePlace(7, 3)]
 
 
 def test_a_loss_shows_by_the_clock_and_nothing_is_joined_across_it() -> None:
     samples = uncounted()
     for second in range(1, 30):
-        deliver(samples, 600)
+        samples.place(600)
         assert not samples.has_lost(second + 0.02 * (second % 3))
-    deliver(samples, 600 - 72)
+    samples.place(600 - 72)
 
     assert samples.has_lost(30.0)
     samples.begin()
-    assert samples.place() == Place(8, 0)
+    assert samples.place(1) == SamplePlace(8, 0)
     assert not samples.has_lost(31.0)
 
 
@@ -209,19 +216,19 @@ def test_a_loss_shows_by_the_clock_and_nothing_is_joined_across_it() -> None:
 def test_a_poor_crystal_is_no_loss(drift: float) -> None:
     samples = uncounted()
     for second in range(1, 3600):
-        deliver(samples, 600)
+        samples.place(600)
         assert not samples.has_lost(second * (1.0 + drift))
 
 
 def test_a_counter_that_counts_nothing_is_refused() -> None:
-    samples = CountedSamples(600.0, removes=True, epoch=1)
+    samples = CountedSamples(600.0, epochs(1), removes=True)
     counters = np.array([5000, 40_000, 12, 33_333])
     with pytest.raises(FrameError, match="does not count"):
         place_records(FifoPiece(counters, np.zeros((2, 4), dtype=np.int16)), samples, 0.0)
 
 
 def test_channels_that_count_differently_are_not_put_side_by_side() -> None:
-    assembly = ChannelAssembly(2, CountedSamples(600.0, removes=True, epoch=1))
+    assembly = ChannelAssembly(2, CountedSamples(600.0, epochs(1), removes=True))
     pieces = [
         FifoPiece(first + np.arange(4), np.zeros((1, 4), dtype=np.int16)) for first in (5000, 0)
     ]
@@ -230,7 +237,7 @@ def test_channels_that_count_differently_are_not_put_side_by_side() -> None:
 
 
 def test_a_channel_that_gives_nothing_holds_the_others_back_in_bounded_memory() -> None:
-    assembly = ChannelAssembly(2, CountedSamples(600.0, removes=True, epoch=1))
+    assembly = ChannelAssembly(2, CountedSamples(600.0, epochs(1), removes=True))
     nothing = FifoPiece(np.arange(0), np.zeros((1, 0), dtype=np.int16))
     for n in range(1000):
         piece = FifoPiece(30 * n + np.arange(30), np.zeros((1, 30), dtype=np.int16))

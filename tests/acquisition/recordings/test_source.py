@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import UnitCalibration, calibrate
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
@@ -200,7 +200,7 @@ def test_what_a_daq_makes_of_it_is_the_recording_to_the_last_bit(
 
 
 def through_delivery(raws: list[RawBlock], calibration: UnitCalibration) -> list[str]:
-    delivery = Delivery(calibration)
+    delivery = BlockAssembler(calibration)
     blocks = [block for raw in raws for block in delivery.take(raw)] + delivery.flush()
     return [f"{block!r} {block.samples.tobytes().hex()}" for block in blocks]
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 from core.monitor.assessment import Assessment
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from service.store.port import TrendQuery, UnitGap
 
 Build = Callable[..., Assessment]

@@ -18,7 +18,7 @@ from core.condition.cells import OperatingPoint
 from core.condition.operating_state import STEADY, OperatingState
 from core.limits import AlarmLevel, Limits, ZoneLimits, judge
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, StampFault
 
 ALERT, DANGER = AlarmLevel
 LIMITS = Limits(150.0, 200.0, 10.0)

@@ -13,7 +13,7 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel, Limits
 from core.machine.unit import Unit
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
-from core.samples.device_clock import StampFault
+from core.samples.blocks import StampFault
 
 SECOND = 1_000_000_000
 IDS = ("sx", "sy", "bx", "by", "spare")

@@ -12,8 +12,8 @@ from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
 from core.quality import Level, Reason, bad, missing, uncertain
-from core.samples.account import Gap
 from core.samples.blocks import UNCOUNTED_LOSS, Rejection, SampleBlock
+from core.samples.gaps import Gap
 from core.spectra.speed import SpeedSource
 
 RATE_HZ = 600.0

@@ -8,9 +8,9 @@ import pytest
 from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD
-from core.samples.account import Gap
+from core.samples.axis import RECOUNTED_EPOCHS
 from core.samples.blocks import SampleBlock
-from core.samples.counts import ANEW, Counts
+from core.samples.gaps import Counts, Gap
 
 RATE_HZ = 600.0
 T0 = 1_767_225_600_000_000_000
@@ -40,7 +40,7 @@ def counts() -> Counts:
 def test_a_count_that_falls_back_while_time_goes_on_is_another_one(counts: Counts) -> None:
     placed = [counts.placed(at(60 * n, late_s=1700.0)) for n in range(20)]
     [epoch] = {block.epoch for block in placed}
-    assert epoch >= ANEW
+    assert epoch >= RECOUNTED_EPOCHS
     assert [block.first_index for block in placed] == list(range(0, 1200, 60))
 
 
@@ -72,16 +72,16 @@ def test_an_epoch_that_the_device_tells_is_taken_as_it_is(counts: Counts) -> Non
 def test_another_process_goes_on_in_the_same_count_whatever_its_clock_says(counts: Counts) -> None:
     anew = counts.placed(at(0, late_s=1700.0))
     other = Counts()
-    other.go_on(counts.count)
-    assert place(other.again(at(0, late_s=1700.0))) == place(anew)
+    other.restore(counts.count)
+    assert place(other.replayed(at(0, late_s=1700.0))) == place(anew)
     following = at(60, late_s=1700.0)
     assert place(other.placed(following)) == place(counts.placed(following))
     counts = Counts()
     counts.placed(at(MILLION))
     counts.placed(at(MILLION + 60, late_s=-3600.0))
     other = Counts()
-    other.go_on(counts.count)
-    assert other.again(at(MILLION)).epoch == 7
+    other.restore(counts.count)
+    assert other.replayed(at(MILLION)).epoch == 7
 
 
 def test_samples_after_an_untold_restart_are_analysed_and_a_repetition_is_not(unit) -> None:

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from core.quality import GOOD
-from core.samples.account import Gap
 from core.samples.blocks import SampleBlock
-from core.samples.outage import Reach, outage, restart
+from core.samples.gaps import Gap, Reach, outage, restart
 
 RATE_HZ = 100.0
 T0 = 1_767_225_600_000_000_000

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core.quality import GOOD, Reading, Reason, bad, missing
-from core.samples.account import Gap
 from core.samples.blocks import Rejection, SampleBlock
+from core.samples.gaps import Gap
 from core.samples.ring import Ring
 
 CAPACITY = 40

@@ -13,7 +13,7 @@ from core.alarms.operation import Acknowledge
 from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel
-from core.samples.account import SampleAccount
+from core.samples.gaps import SampleAccount
 from service.alarms.engine import AlarmEngine
 from service.alarms.health import ServiceHealth
 from service.alarms.service_alarms import ServiceAlarms

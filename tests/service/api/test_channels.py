@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from core.quality import GOOD, Reading, Reason, bad, missing
-from core.samples.account import SampleAccount
 from core.samples.blocks import SampleBlock
+from core.samples.gaps import SampleAccount
 from service.live import HELD_S, LinkState
 from service.settings.plant import PlantFile
 

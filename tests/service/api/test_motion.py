@@ -12,8 +12,8 @@ import pytest
 from acquisition.delivery.calibration import calibrate
 from acquisition.delivery.raw import RawBlock
 from core.quality import Reason, bad, missing
-from core.samples.account import SampleAccount
 from core.samples.blocks import SampleBlock
+from core.samples.gaps import SampleAccount
 from service.conversion import calibration_of
 from service.settings.plant import PlantFile
 from service.wiring.recordings import recording_writer

@@ -7,9 +7,8 @@ import numpy as np
 
 from core.monitor.catalogue import CATALOGUE
 from core.quality import GOOD
-from core.samples.account import Gap, SampleAccount
-from core.samples.blocks import SampleBlock
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, SampleBlock, StampFault
+from core.samples.gaps import Gap, SampleAccount
 from service.evidence.configuration import Configuration
 from service.live import LinkState
 from service.settings.schema import plant_file_schema

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from service.audit.entry import MAX_DOCUMENT, MAX_NAME, AuditEntry, Deed
 from service.audit.head import AuditHead, head_path, read_head
 from service.audit.walk import HEAD_DIFFERED

@@ -11,7 +11,7 @@ from threading import Event, Thread
 import pytest
 from rigs.memory_folder import path_in_memory  # noqa: F401 - a fixture
 
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from service.backup.backing_up import back_up
 from service.backup.check import BackupError, checked
 from service.backup.restoring import restore

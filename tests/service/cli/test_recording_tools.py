@@ -166,7 +166,7 @@ def test_what_is_exported_can_be_imported_again(
 @pytest.mark.parametrize(
     ("old", "new", "code", "words"),
     [
-        ('unit = "um"', 'unit = "mm/s"', 1, "channel ujb_shaft_x: unit 'mm/s' is none for gap_um"),
+        ('unit = "um"', 'unit = "mm/s"', 1, "channel ujb_shaft_x: unit 'mm/s' does not fit gap_um"),
         (
             "ujb_shaft_x",
             "ujb_shaft_z",
@@ -184,7 +184,7 @@ def test_what_is_exported_can_be_imported_again(
             'unit = "r/min"',
             'unit = "degF"',
             1,
-            "unit 'degF' is none for r/min; known are r/min, Hz",
+            "unit 'degF' does not fit r/min; use one of r/min, Hz",
         ),
     ],
 )

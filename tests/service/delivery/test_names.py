@@ -19,7 +19,7 @@ def _name_server(monkeypatch: pytest.MonkeyPatch) -> None:
             return [(socket.AF_INET, socket.SOCK_STREAM, 6, "", ("127.0.0.1", port))] * 2
         raise socket.gaierror(-2, "Name or service not known")
 
-    monkeypatch.setattr("acquisition.delivery.names.socket.getaddrinfo", getaddrinfo)
+    monkeypatch.setattr("acquisition.delivery.network.socket.getaddrinfo", getaddrinfo)
 
 
 @pytest.mark.usefixtures("_name_server")

@@ -17,9 +17,8 @@ from acquisition.delivery.calibration import calibrate
 from acquisition.errors import LinkError
 from acquisition.source import SampleSource
 from core.quality import Reason, bad
-from core.samples.account import SampleAccount
-from core.samples.blocks import Rejection, SampleBlock
-from core.samples.device_clock import DeviceClock
+from core.samples.blocks import DeviceClock, Rejection, SampleBlock
+from core.samples.gaps import SampleAccount
 from service.conversion import calibration_of
 from service.http.listening import listen
 from service.metrics.polls import TimedSource

@@ -6,7 +6,7 @@ from typing import Any
 
 from prometheus_client.openmetrics.parser import text_string_to_metric_families
 
-from core.samples.account import SampleAccount
+from core.samples.gaps import SampleAccount
 
 LABELS = {
     *("volume", "about", "kind"),

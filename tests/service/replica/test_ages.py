@@ -10,8 +10,8 @@ import pytest
 
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reason
-from core.samples.account import SampleAccount
 from core.samples.blocks import SampleBlock
+from core.samples.gaps import SampleAccount
 from service.live import LinkState, LiveView, UnitStatus
 from service.replica.describing import bearing_state, unit_signs
 from service.replica.live import SILENT_AFTER_S, ReplicaLive

@@ -20,7 +20,7 @@ from core.monitor.monitor import UnitMonitor
 from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD
 from core.samples.blocks import SampleBlock
-from core.samples.outage import Reach
+from core.samples.gaps import Reach
 from service.alarms.engine import AlarmEngine
 from service.capture.captures import Captures
 from service.capture.file import MakeWriter

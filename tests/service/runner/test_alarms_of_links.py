@@ -8,7 +8,7 @@ from rigs.alarm_runs import LINK, PROBE, T0, Make, changes, events, lost, play
 from acquisition.errors import LinkError
 from core.alarms.alarm import AlarmState
 from core.alarms.operation import Acknowledge, Shelve
-from core.samples.device_clock import DeviceClock
+from core.samples.blocks import DeviceClock
 
 
 async def test_after_a_restart_alarms_are_what_they_were_and_their_conditions_unknown(

@@ -22,7 +22,7 @@ from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from service import recorder as recording
 from service.api.app import create_app
 from service.api.context import Context

@@ -7,8 +7,7 @@ import pytest
 from rigs.assessments import assessment
 from rigs.store_fixtures import at
 
-from core.samples.account import Gap
-from core.samples.outage import Reach
+from core.samples.gaps import Gap, Reach
 from service.store.port import Store, StoreError, UnitGap
 from service.store.positions_port import StreamPosition
 from service.store.sqlite import SqliteStore

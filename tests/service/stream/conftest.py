@@ -12,8 +12,7 @@ from nats import connect
 from rigs.memory_folder import memory_folder, path_in_memory  # noqa: F401 - a fixture
 
 from core.quality import GOOD, Reading, Reason, missing, uncertain
-from core.samples.blocks import Rejection, SampleBlock
-from core.samples.device_clock import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock, Rejection, SampleBlock, StampFault
 from service.stream.identity import UnitIdentity, fingerprint
 
 SHORT = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)

@@ -19,8 +19,8 @@ from rigs.tiers import fast_and_long
 
 from core.arrays import FloatArray, SampleArray
 from core.quality import GOOD, Quality, Reading, Reason, bad, uncertain
+from core.samples.axis import RECOUNTED_EPOCHS
 from core.samples.blocks import Rejection, SampleBlock
-from core.samples.counts import ANEW
 from core.units import NS_PER_S
 from service.live import LinkState
 from service.roles.link_news import LinkNews
@@ -264,7 +264,7 @@ async def test_samples_of_a_device_that_counts_anew_without_telling_are_analysed
     await whole.live(sent, None, rng)
     found = windows(whole)
     assert {first >= 10**6 for epoch, first in found if epoch == 3} == {True}
-    assert {first < 30 * N_SAMPLES for epoch, first in found if epoch >= ANEW} == {True}
+    assert {first < 30 * N_SAMPLES for epoch, first in found if epoch >= RECOUNTED_EPOCHS} == {True}
     for _ in range(6):
         await moved.live(sent, 18, rng)
     await moved.live(sent, None, rng)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition.can.settings import CanLinkSettings, CanSettings
-from acquisition.delivery.block_grid import BlockGrid
+from acquisition.delivery.blocks import BlockGrid
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.modbus.transport import ConnectionUse
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
@@ -72,7 +72,7 @@ async def served(device) -> AsyncIterator[dict[str, Any]]:
 
 
 def by_waveforms(settings: UnitSettings, unit: Unit, clock) -> Iterator[Assessment]:
-    feed, delivery = simulated_feed(settings, clock), Delivery(calibration_of(settings))
+    feed, delivery = simulated_feed(settings, clock), BlockAssembler(calibration_of(settings))
     monitor = UnitMonitor(unit, AnalysisSettings())
     for _ in range(8192 * N_SEGMENTS // 600):
         for block in delivery.take(feed.advance(600)):
@@ -119,7 +119,8 @@ async def test_queues_bring_the_very_counts(settings, unit, stepped_clock) -> No
             while not blocks or blocks[-1].stop_index < 600:
                 blocks.append(await anext(stream))
 
-    twin, delivery = simulated_feed(settings, stepped_clock), Delivery(calibration_of(settings))
+    twin = simulated_feed(settings, stepped_clock)
+    delivery = BlockAssembler(calibration_of(settings))
     expected = [b for _ in range(14) for b in delivery.take(twin.advance(50))]
     for block, other in zip(blocks, expected, strict=False):
         np.testing.assert_array_equal(block.samples, other.samples)

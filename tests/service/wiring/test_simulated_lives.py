@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.delivery.blocks import Delivery
+from acquisition.delivery.blocks import BlockAssembler
 from acquisition.errors import ConfigError
 from core.change.film_reading import film_reading
 from core.condition.cells import BearingCondition
@@ -61,7 +61,7 @@ def test_the_films_of_a_living_unit_are_read_as_its_past_says(
     plant = plant_with(LIFE.replace("after_s = 120.0", f"at = {onset}"), tmp_path)
     unit = plant.unit[0]
     feed, calibration = simulated_feed(unit, stepped_clock), calibration_of(unit)
-    delivery = Delivery(calibration)
+    delivery = BlockAssembler(calibration)
     monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
     newest: list[Assessment] = []
     for _ in range(300):

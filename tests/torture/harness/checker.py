@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from harness.alarm_ledger import alarm_faults
 from harness.ledger_daq import Offered
 from harness.ledger_plant import LedgerPlant

@@ -21,7 +21,7 @@ from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.quality import Reason, missing
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from core.spectra.cross_spectrum import average
 from service.store.audit_port import AuditQuery
 from service.store.film_port import FilmQuery

@@ -13,7 +13,7 @@ from acquisition.delivery.raw import RawBlock
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.monitor.monitor import UnitMonitor
-from core.samples.account import Gap
+from core.samples.gaps import Gap
 from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.truth import BEARINGS
 from service.conversion import analysis_of, calibration_of, machine_of

@@ -16,8 +16,7 @@ from acquisition.simulated.devices.modbus_device import RegisterMemory
 from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from acquisition.simulated.feed import Ledger
-from core.samples.blocks import Rejection
-from core.samples.device_clock import StampFault
+from core.samples.blocks import Rejection, StampFault
 
 
 class Turnstile:

@@ -1,7 +1,7 @@
-"""Addresses of others, looked up where a name server that does not answer holds up nobody.
+"""Host names and cancellation where a name server or a library would block a task.
 
-The event loop's own look-up takes a thread that the store needs, too, and keeps it for as long as
-the name servers take to fail, whoever has stopped waiting meanwhile.
+The event loop's own look-up takes a thread of the pool that the store uses too, and keeps it until
+the name servers fail, even if its caller has given up.
 """
 
 import asyncio
@@ -14,7 +14,7 @@ MAX_ADDRESSES = 4
 
 
 class NameLookUp:
-    """Looks up one name; at most one look-up is under way, however often it is asked for."""
+    """Looks up one name; at most one look-up is under way, however often it is called for."""
 
     def __init__(self, host: str, port: int) -> None:
         self._host, self._port = host, port
@@ -31,11 +31,12 @@ class NameLookUp:
         if _is_address(self._host):
             return [self._host]
         if self._asking is None or self._asking.done():
-            self._asking = asyncio.get_running_loop().create_future()
-            self._asking.add_done_callback(_retrieved)
+            loop = asyncio.get_running_loop()
+            self._asking = loop.create_future()
+            self._asking.add_done_callback(_retrieve)
             threading.Thread(
                 target=_look_up,
-                args=(self._host, self._port, asyncio.get_running_loop(), self._asking),
+                args=(self._host, self._port, loop, self._asking),
                 name=f"look up {self._host}",
                 daemon=True,  # it must not hold up the end of the program either
             ).start()
@@ -43,7 +44,7 @@ class NameLookUp:
 
 
 class KnownAddresses:
-    """Addresses of a name as they were found last, for as long as no newer ones are found."""
+    """Addresses of a name as they were found last, until newer ones are found."""
 
     def __init__(self, host: str, port: int) -> None:
         self._look_up = NameLookUp(host, port)
@@ -93,8 +94,8 @@ def _answer(answer: "asyncio.Future[list[str]]", found: list[str] | OSError) -> 
         answer.set_result(found)
 
 
-def _retrieved(answer: "asyncio.Future[list[str]]") -> None:
-    """Look at an error that nobody waits for any more, lest it be reported as forgotten."""
+def _retrieve(answer: "asyncio.Future[list[str]]") -> None:
+    """Retrieve an error whose caller has given up, or asyncio logs it as never retrieved."""
     if not answer.cancelled():
         answer.exception()
 
@@ -105,3 +106,28 @@ def _is_address(host: str) -> bool:
     except ValueError:
         return False
     return True
+
+
+def n_stops() -> int:
+    """Number of times that the current task was cancelled.
+
+    Before Python 3.13 a task group that fails while its task waits for it leaves its count behind.
+    """
+    task = asyncio.current_task()
+    return 0 if task is None else task.cancelling()
+
+
+def let_stop_through(n_before: int = 0) -> None:
+    """Raise the cancellation that a library has swallowed.
+
+    Before Python 3.12 `asyncio.wait_for` loses a cancellation if what it waits for comes at the
+    same moment (CPython issue 86296); the task would then never end. To be called after every wait
+    of a library that uses it.
+
+    Parameters
+    ----------
+    n_before
+        `n_stops` before the wait, where the task has waited for task groups of its own.
+    """
+    if n_stops() > n_before:
+        raise asyncio.CancelledError

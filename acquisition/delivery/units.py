@@ -1,4 +1,4 @@
-"""Spellings of units in files, and their factors to the units of channels; no guesses."""
+"""Units as files and DBCs write them, and their factors to those of channels; none is guessed."""
 
 import re
 from collections.abc import Iterable
@@ -23,10 +23,19 @@ _SAME = {
     "Hz": ("Hz",),
     "MW": ("MW",),
     "kW": ("kW",),
-    "degC": ("degC", "\u00b0C", "\u2103"),
+    "degC": ("degC", "\u00b0C", "\u2103", "deg C"),
     "K": ("K",),
 }
 _CANONICAL = {spelling: unit for unit, spellings in _SAME.items() for spelling in spellings}
+
+UNIT_OF = {
+    Measurand.GAP_UM: "um",
+    Measurand.DISPLACEMENT_UM: "um",
+    Measurand.VELOCITY_MM_S: "mm/s",
+    Measurand.ACCELERATION_M_S2: "m/s2",
+    Measurand.KEY_PHASE_V: "V",
+}
+"""Engineering units of waveform channels, spelt so that every tool can print them."""
 
 _LENGTH_UM = {"um": 1.0, "mm": 1e3, "m": 1e6, "mil": 25.4}
 _WAVEFORMS = {
@@ -47,8 +56,18 @@ _SLOW: dict[str, dict[str, tuple[float, float]]] = {
 
 
 def canonical(unit: str) -> str:
-    """Canonical spelling of a unit; an unknown text is unchanged."""
+    """The one spelling that padwatch uses for a unit; an unknown unit stays as it is."""
     return _CANONICAL.get(unit.strip(), unit.strip())
+
+
+def known_unit(spelling: str) -> str | None:
+    """The unit that a spelling stands for; None if it is unknown."""
+    return _CANONICAL.get(spelling)
+
+
+def spellings(unit: str) -> str:
+    """All spellings of a unit, for a message."""
+    return ", ".join(f'"{spelling}"' for spelling in _SAME[unit])
 
 
 def waveform_factor(measurand: Measurand, unit: str, unit_per_v: float) -> float:
@@ -85,7 +104,7 @@ def slow_conversion(channel_unit: str, unit: str) -> tuple[float, float]:
 
 
 def unit_in(heading: str) -> str | None:
-    """The unit that a heading states behind its name, as in ``shaft x [um]``; else None."""
+    """The unit that a heading states after its name, as in ``shaft x [um]``; else None."""
     found = re.search(r"\[([^\[\]]{1,16})\]\s*$", heading)
     return found[1] if found and found[1].strip() in _CANONICAL else None
 
@@ -105,4 +124,4 @@ def require_unit(place: object, found: str | None, mapped: str) -> None:
 
 
 def _misfit(unit: str, wanted: str, known: Iterable[str]) -> ConfigError:
-    return ConfigError(f"unit {unit[:40]!r} is none for {wanted}; known are {', '.join(known)}")
+    return ConfigError(f"unit {unit[:40]!r} does not fit {wanted}; use one of {', '.join(known)}")

@@ -3,19 +3,19 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.delivery.epochs import TOLD, Epochs
 from acquisition.recordings.manifest import MAX_INDEX
+from core.samples.axis import DEVICE_EPOCHS, Epochs
 
 NS_PER_S = 1_000_000_000
 BEGUN_NS = 1_767_225_600 * NS_PER_S
 
-told = st.one_of(st.none(), st.integers(0, TOLD - 1))
+told = st.one_of(st.none(), st.integers(0, DEVICE_EPOCHS - 1))
 
 
 def counts(begun_s: int, restarts: list[int | None], trusts_device: bool) -> list[int]:
     """Numbers of the counts of one life, whose device tells 7 at first."""
     epochs = Epochs(BEGUN_NS + begun_s * NS_PER_S, trusts_device=trusts_device)
-    epochs.tell(7)
+    epochs.begin_first(7)
     found = [epochs.number]
     for restart in restarts:
         epochs.begin(restart)
@@ -41,12 +41,12 @@ def test_what_a_trusted_device_tells_is_its_number_and_what_it_hides_has_one_of_
     assert all(number == restart for restart, number in shown if restart is not None)
     hidden = [number for restart, number in shown if restart is None]
     assert len({*hidden}) == len(hidden)
-    assert all(TOLD <= number < MAX_INDEX for number in hidden)
+    assert all(DEVICE_EPOCHS <= number < MAX_INDEX for number in hidden)
 
 
 def test_an_epoch_that_is_wider_than_the_wire_still_changes_with_it():
     epochs = Epochs(BEGUN_NS, trusts_device=True)
-    epochs.tell(-1)
-    assert epochs.number == TOLD - 1
+    epochs.begin_first(-1)
+    assert epochs.number == DEVICE_EPOCHS - 1
     epochs.begin(2**63 + 5)
     assert epochs.number == 5

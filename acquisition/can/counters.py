@@ -1,0 +1,184 @@
+"""Counted frames on the sample axis; a frame that does not fit needs a second one that agrees."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from acquisition.can.frame_sets import DuplicateSenderDetector, PlacedFrame
+from acquisition.can.plan import Part, Plan, Refusal, RefusalCounts
+from core.samples.axis import ClockTolerance, SampleAxis, signed_distance
+from core.units import NS_PER_S
+
+_NEAR_FRAMES = 64
+"""A frame that is further ahead or behind needs a second one that agrees before it is believed."""
+
+_SILENCE_S = 1.0
+"""So does the first frame after a silence, in which the device may have begun anew."""
+
+JUMP_TOLERANCE = ClockTolerance(step_s=0.5, drift=0.05)
+"""How far the host's clock and a counter may disagree about a jump over a wrap, or about a device
+that has stopped: one that samples ever later, by less than this share, has a wrong rate."""
+
+
+@dataclass(frozen=True)
+class _CountedFrame:
+    """A frame and its counter in samples, from 0 to ``modulus``."""
+
+    part: Part
+    data: bytes
+    counter: int
+    modulus: int
+    epoch: int | None
+    arrived_ns: int
+
+
+class CounterFollower:
+    """Follows counters of any width on one sample axis.
+
+    A frame close to the newest one is placed at once. Another one waits for a second frame that
+    agrees with it; both then show a gap, if the counter went up, if the clock explains that it has
+    wrapped, or if the device would have reported a restart; else the device counts anew.
+
+    Parameters
+    ----------
+    axis
+        Where the newest frame's first sample stands.
+    refused
+        Where refused frames are counted.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        axis: SampleAxis,
+        rate_hz: float,
+        refused: RefusalCounts,
+        senders: DuplicateSenderDetector,
+    ) -> None:
+        self._plan, self._axis, self._rate_hz = plan, axis, rate_hz
+        self._near_samples = _NEAR_FRAMES * plan.samples_per_frame
+        self._refused, self._senders = refused, senders
+        self._epoch: int | None = None
+        self._doubted: list[_CountedFrame] = []
+        self._left: tuple[int, int, int, int | None] | None = None
+
+    def place(self, part: Part, data: bytes, arrived_ns: int) -> list[PlacedFrame]:
+        """Place a frame; a doubted one is placed with the one that confirms it.
+
+        Parameters
+        ----------
+        arrived_ns
+            By a clock of the host that is never set.
+        """
+        if part.counter is None:
+            return []
+        counter, modulus = int(part.counter.read(data)) * part.counter.step, part.counter.modulus
+        epoch = int(part.epoch(data)) if part.epoch else None
+        fits = epoch is None or epoch == self._epoch
+        if fits and not self._doubted:
+            index = self._near_index(counter, modulus, arrived_ns)
+            if index is not None:
+                return [PlacedFrame(part, data, index)]
+        frame = _CountedFrame(part, data, counter, modulus, epoch, arrived_ns)
+        if self._axis.index is None:
+            return self._first(frame)
+        if self._doubted and self._confirms(frame):
+            return self._jump([*self._doubted, frame])
+        for _ in self._doubted:
+            self._refused[Refusal.IMPOSSIBLE_COUNTER] += 1
+            self._senders.note_contradiction()
+        self._doubted.clear()
+        index = self._near_index(counter, modulus, arrived_ns) if fits else None
+        if index is None:
+            self._doubted.append(frame)
+            return []
+        return [PlacedFrame(part, data, index)]
+
+    def _first(self, frame: _CountedFrame) -> list[PlacedFrame]:
+        if frame.modulus < self._plan.widest_modulus:
+            self._refused[Refusal.BEFORE_START] += 1
+            return []
+        if frame.epoch is not None:
+            self._epoch = frame.epoch
+            self._axis.epochs.begin_first(frame.epoch)
+        self._axis.stand_at(frame.counter, frame.arrived_ns)
+        return [PlacedFrame(frame.part, frame.data, frame.counter)]
+
+    def _near_index(self, counter: int, modulus: int, arrived_ns: int) -> int | None:
+        """Index of a frame that is close to the newest one; None if it is not."""
+        axis, half = self._axis, modulus // 2
+        if axis.index is None:
+            return None
+        if arrived_ns != axis.at_ns:
+            silence = axis.elapsed(arrived_ns)
+            if silence > min(_SILENCE_S * self._rate_hz, half):
+                return None
+        ahead = (counter - axis.index) % modulus
+        if ahead <= min(self._near_samples, half):
+            index = axis.index + ahead
+            axis.stand_at(index, arrived_ns)
+            return index
+        behind = modulus - ahead
+        return axis.index - behind if behind <= min(self._near_samples, half // 2) else None
+
+    def _confirms(self, frame: _CountedFrame) -> bool:
+        """Whether a frame follows a doubted one closely."""
+        last = self._doubted[-1]
+        repeats = last.part is frame.part and last.counter == frame.counter
+        if repeats or (frame.epoch is not None and frame.epoch != self._epoch_of(self._doubted)):
+            return False
+        modulus = min(last.modulus, frame.modulus)
+        ahead = (frame.counter - last.counter) % modulus
+        return ahead <= min(self._near_samples, modulus // 2)
+
+    def _epoch_of(self, frames: Sequence[_CountedFrame]) -> int | None:
+        reported = [frame.epoch for frame in frames if frame.epoch is not None]
+        return reported[-1] if reported else self._epoch
+
+    def _jump(self, frames: Sequence[_CountedFrame]) -> list[PlacedFrame]:
+        """Go on at the place where frames agree that the device is."""
+        self._doubted = []
+        axis, epoch = self._axis, self._epoch_of(frames)
+        widest = max(frames, key=lambda frame: frame.modulus)
+        left = (axis.index or 0, widest.modulus, axis.at_ns, self._epoch)
+        if epoch == self._epoch and self._is_gap(frames, widest):
+            index = (axis.index or 0) + axis.jump(widest.counter, widest.modulus, widest.arrived_ns)
+        else:
+            axis.epochs.begin(epoch if epoch != self._epoch else None)
+            index = widest.counter
+            if self._resumes(widest, epoch):
+                self._senders.note_return()
+        self._left, self._epoch = left, epoch
+        axis.stand_at(index, widest.arrived_ns)
+        return [PlacedFrame(f.part, f.data, self._nearest(f, index)) for f in frames]
+
+    def _is_gap(self, frames: Sequence[_CountedFrame], widest: _CountedFrame) -> bool:
+        """Whether the same count goes on: it went up, has wrapped, or reports its restarts."""
+        axis, reports = self._axis, self._plan.reports_epoch
+        if reports and all(frame.epoch is None for frame in frames):
+            return True
+        counter, modulus, at_ns = widest.counter, widest.modulus, widest.arrived_ns
+        if counter >= (axis.index or 0) % modulus:
+            return True
+        if reports and axis.forward(counter, modulus) <= modulus // 2:
+            return True
+        deviation = axis.jump(counter, modulus, at_ns) - axis.elapsed(at_ns)
+        return abs(deviation) <= axis.allowance(at_ns, JUMP_TOLERANCE)
+
+    def _resumes(self, frame: _CountedFrame, epoch: int | None) -> bool:
+        """Whether a count goes on that was left for another one within the last second."""
+        if self._left is None:
+            return False
+        index, modulus, left_ns, left_epoch = self._left
+        silent_s = (frame.arrived_ns - left_ns) / NS_PER_S
+        ahead = (frame.counter - index) % modulus
+        is_same = left_epoch == epoch and modulus == frame.modulus
+        return (
+            is_same
+            and silent_s <= _SILENCE_S
+            and 0 < ahead <= self._near_samples + silent_s * self._rate_hz
+        )
+
+    def _nearest(self, frame: _CountedFrame, index: int) -> int:
+        place = index + signed_distance(frame.counter, index, frame.modulus)
+        self._axis.stand_at(max(self._axis.index or 0, place), frame.arrived_ns)
+        return place
