@@ -31,7 +31,7 @@ from core.arrays import FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.response import Response
 from core.machine.unit import Bearing, BracketDynamics, Unit
-from core.monitor.settings import AnalysisSettings
+from core.monitor.assessment import AnalysisSettings
 from core.samples.blocks import SampleBlock
 from core.samples.ring import Ring
 from core.spectra.cross_spectrum import CrossSpectrum, average

@@ -22,7 +22,7 @@ from benchmarks.accuracy_plant import RATE_HZ, machine
 from core.arrays import FloatArray
 from core.machine.channel import Measurand
 from core.machine.unit import BearingAccuracy, BracketDynamics, Unit
-from core.monitor.settings import AnalysisSettings
+from core.monitor.assessment import AnalysisSettings
 from core.quality import GOOD, Reading
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import (

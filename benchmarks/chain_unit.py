@@ -20,9 +20,8 @@ from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Estimator, Unit
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.units import ns_from_s
 
 RATE_HZ = 600.0

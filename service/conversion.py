@@ -4,7 +4,7 @@ from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration
 from core.checks.sensor_checks import SensorLimits
 from core.machine.channel import Channel
 from core.machine.unit import Bearing, BearingAccuracy, GapAccuracy, Unit
-from core.monitor.settings import AnalysisSettings
+from core.monitor.assessment import AnalysisSettings
 from core.stiffness.dynamic_lines import DynamicSettings, LineSelection
 from service.settings.bearings import BearingSettings
 from service.settings.channels import ChannelSettings

@@ -27,8 +27,12 @@ from hypothesis import settings as hypothesis_settings
 from rigs.assessments import assessment as build_assessment
 from scipy.signal import lfilter
 
-from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import (
+    ChannelCalibration,
+    RawBlock,
+    SlowCalibration,
+    UnitCalibration,
+)
 from acquisition.simulated.feed import FeedEndedError
 from core.arrays import FloatArray
 from core.baseline.history import StiffnessHistory

@@ -15,7 +15,7 @@ from acquisition.can.gate import Frame
 from acquisition.can.plan import Part, Plan, Refusal, RefusalCounts
 from acquisition.can.side_values import RawBlockBuilder
 from acquisition.delivery.arrival import LeastDelay
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.errors import FrameError
 from core.samples.axis import Epochs, SampleAxis
 from core.units import NS_PER_S

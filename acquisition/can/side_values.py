@@ -20,7 +20,7 @@ from acquisition.can.plan import (
     RefusalCounts,
 )
 from acquisition.delivery.arrival import HostStamps
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from core.arrays import RawArray
 from core.samples.blocks import Rejection
 from core.units import NS_PER_S

@@ -16,8 +16,7 @@ from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import InterfaceClock
 from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
 from core.units import ns_from_s

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from acquisition.delivery.arrival import Arrival, ArrivalModel
-from acquisition.delivery.calibration import UnitCalibration, calibrate
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration, calibrate
 from core.samples.axis import ClockTolerance
 from core.samples.blocks import DeviceClock, SampleBlock, StampFault
 from core.units import NS_PER_S, ns_from_s

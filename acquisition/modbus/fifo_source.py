@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival, HostStamps
 from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import UnitCalibration
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
 from acquisition.delivery.polling import Freshness, wrong_replies_drop_the_link
-from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.fifo_assembly import (

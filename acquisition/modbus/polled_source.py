@@ -12,9 +12,8 @@ import numpy as np
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival, HostStamps
 from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import ChannelCalibration, UnitCalibration
+from acquisition.delivery.calibration import ChannelCalibration, RawBlock, UnitCalibration
 from acquisition.delivery.polling import Freshness, PollClock, wrong_replies_drop_the_link
-from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.cells import reads_as
 from acquisition.modbus.client import ModbusClient

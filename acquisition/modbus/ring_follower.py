@@ -4,8 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import lru_cache
 
-from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
 from acquisition.errors import ConfigError, FrameError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.requests import Span

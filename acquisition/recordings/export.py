@@ -14,8 +14,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
-from acquisition.delivery.calibration import calibrate, slow_reading
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, calibrate, slow_reading
 from acquisition.delivery.units import UNIT_OF
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import Manifest

@@ -7,11 +7,11 @@ import numpy.typing as npt
 
 from acquisition.delivery.calibration import (
     COUNTS_FULL_SCALE,
+    RawBlock,
     SlowCalibration,
     UnitCalibration,
     calibrate,
 )
-from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from core.arrays import CountArray, RawArray, SampleArray
 from core.quality import Reading, Reason, bad

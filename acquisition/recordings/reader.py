@@ -6,7 +6,7 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import (
     BLOCKS,

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.confined import ConfinedProcess, printable
 from acquisition.recordings.imports.job import ImportJob

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 
 from acquisition.clock import Clock
 from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import Progress, RecordedUnit
 from acquisition.recordings.reader import Recording

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import MAX_REASON_LENGTH, RecordedUnit
 from acquisition.recordings.messages import HEAD_NUMBERS, Rejected, head_type

@@ -9,8 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
 from acquisition.errors import ConfigError
 from acquisition.recordings.inversion import raw_of
 from acquisition.recordings.manifest import (

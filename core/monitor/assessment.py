@@ -1,4 +1,4 @@
-"""`Assessment`: what is known of one bearing at one refresh."""
+"""What one evaluation of a bearing found, and the settings that it was made with."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,7 +12,16 @@ from core.spectra.overall import RecentReadings
 from core.spectra.runout import RunoutVerdict
 from core.spectra.segments import Evidence
 from core.spectra.speed import SpeedSource
+from core.stiffness.dynamic_lines import DynamicSettings
+from core.stiffness.evidence import EvidenceSettings
 from core.uncertainty import Budget
+
+
+@dataclass(frozen=True)
+class AnalysisSettings(EvidenceSettings):
+    """Segments, averaging, what counts as evidence, and how all eight coefficients are sought."""
+
+    dynamic: DynamicSettings = field(default_factory=DynamicSettings)
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from core.condition.probe_axes import Growth
 from core.condition.shaft_readings import position_results, slow_channels, slow_results
 from core.machine.channel import line_floor_um_pk
 from core.machine.unit import Bearing, Estimator, Unit
+from core.monitor.assessment import AnalysisSettings
 from core.monitor.overall_readings import overall_readings
-from core.monitor.settings import AnalysisSettings
 from core.quality import (
     NOT_MEASURED,
     Level,

@@ -9,10 +9,9 @@ import numpy as np
 from core.condition.probe_axes import Growth
 from core.condition.shaft_readings import measured_growth
 from core.machine.unit import Bearing, Unit, bearings_with_new_references, require_same_machine
-from core.monitor.assessment import Assessment, AveragingWindow, OrbitTrace
+from core.monitor.assessment import AnalysisSettings, Assessment, AveragingWindow, OrbitTrace
 from core.monitor.bearing_readings import bearing_readings
 from core.monitor.overall_readings import polled_readings, recent_readings
-from core.monitor.settings import AnalysisSettings
 from core.quality import worst
 from core.samples.blocks import BlockMisfitError, SampleBlock
 from core.samples.gaps import Gap, Reach, SampleAccount, outage, restart

@@ -8,8 +8,7 @@ from acquisition.can.assembly import FrameAssembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanSettings
-from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
 from acquisition.errors import ConfigError
 from acquisition.recordings.messages import MAX_DATA, Frames
 from service.conversion import calibration_of

@@ -9,7 +9,7 @@ from itertools import chain
 from pathlib import Path
 
 from acquisition.delivery.blocks import BlockGrid
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.delivery.units import slow_conversion, waveform_factor
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import (

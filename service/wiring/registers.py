@@ -10,8 +10,8 @@ from acquisition.modbus.polled_source import PolledSettings, PolledSource, vecto
 from acquisition.modbus.slow_values import PolledSlowValues
 from acquisition.source import SampleSource
 from core.machine.unit import Unit
+from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.spectra.polls import PollTransform
 from service.settings.modbus_sources import (
     MappedDeviceSettings,

@@ -7,7 +7,7 @@ from acquisition.can.source import CanSource
 from acquisition.clock import Clock
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.modbus.ring_source import RingSettings, RingSource
-from acquisition.simulated.plant.source import SimulatedSource
+from acquisition.simulated.feed import SimulatedSource
 from acquisition.source import SampleSource
 from core.monitor.monitor import UnitMonitor
 from service.conversion import analysis_of, calibration_of, machine_of

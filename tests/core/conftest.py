@@ -10,9 +10,8 @@ from rigs.shaken_shaft import shaken
 from core.arrays import ComplexArray, FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Reading, Reason, missing
 from core.samples.blocks import SampleBlock
 

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from acquisition.clock import SystemClock
 from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from service.conversion import analysis_of, calibration_of, machine_of

@@ -11,11 +11,9 @@ import numpy as np
 import pytest
 
 from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import calibrate
-from acquisition.delivery.raw import RawBlock
-from core.monitor.assessment import Assessment
+from acquisition.delivery.calibration import RawBlock, calibrate
+from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.samples.blocks import Rejection
 from service.conversion import calibration_of, machine_of
 from service.reanalysis import LastAverages, assessment_model, assessments, calibration_differences

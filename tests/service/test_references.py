@@ -11,8 +11,8 @@ from harness.waiting import at_work, until
 from acquisition.clock import Clock
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
+from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import Reading, Reason, missing, uncertain
 from service.reference_setting import ReferenceRefusedError, doubts, given_gaps, measured_gaps
 from service.references import LOOK_EVERY_S, ReferencesInForce, with_reference

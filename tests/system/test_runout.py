@@ -24,9 +24,8 @@ from acquisition.simulated.plant.scenario import (
 )
 from acquisition.simulated.plant.unit import SimulatedUnit
 from core.machine.unit import Unit
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import Reason, bad
 from core.samples.blocks import SampleBlock
 from core.spectra.runout import RunoutVerdict

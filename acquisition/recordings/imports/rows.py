@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from acquisition.delivery.blocks import BlockGrid
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob
 from acquisition.recordings.imports.times import TimeArray

@@ -5,7 +5,7 @@ from enum import Enum
 
 import numpy as np
 
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.simulated.devices.can_shape import FD_LENGTHS, CanShape, MessageShape
 
 _NS_PER_US = 1000

@@ -6,8 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
 from acquisition.errors import ConfigError
 from acquisition.modbus.read_plan import plan_reads
 from acquisition.modbus.register_map import MapValue, RegisterMap

@@ -3,7 +3,7 @@
 from collections import deque
 
 from acquisition.delivery.blocks import BlockGrid
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.source import Selection, all_of
 from acquisition.simulated.feed import FeedEndedError

@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.ring_profile import (
     HEADER_REGISTERS,

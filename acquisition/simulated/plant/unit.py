@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.conditions import Conditions, between
 from acquisition.simulated.plant.faults import FaultInjector, to_counts

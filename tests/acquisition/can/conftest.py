@@ -11,7 +11,7 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_settings
 from acquisition.simulated.feed import FeedEndedError

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from acquisition.delivery.arrival import Arrival
 from acquisition.delivery.blocks import BlockAssembler, BlockGrid
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from core.samples.blocks import Rejection
 
 LENGTH = 50

@@ -5,8 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import ChannelCalibration, UnitCalibration, calibrate
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import (
+    ChannelCalibration,
+    RawBlock,
+    UnitCalibration,
+    calibrate,
+)
 from core.quality import GOOD, Quality, Reason, bad, uncertain
 
 PROBE = ChannelCalibration(10.0, -250.0, -9.0, 9.0)

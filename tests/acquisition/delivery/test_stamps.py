@@ -5,7 +5,7 @@ import pytest
 
 from acquisition.delivery.arrival import HostStamps
 from acquisition.delivery.blocks import StampCheck
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from core.samples.blocks import StampFault
 
 NS = 1_000_000_000

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings import reader
 from acquisition.recordings.child import answer

@@ -12,7 +12,7 @@ from unittest.mock import Mock
 import pyarrow.parquet as pq
 import pytest
 
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings import reading
 from acquisition.recordings.child import answer

@@ -16,11 +16,11 @@ from hypothesis.extra.numpy import arrays
 
 from acquisition.delivery.calibration import (
     ChannelCalibration,
+    RawBlock,
     SlowCalibration,
     UnitCalibration,
     calibrate,
 )
-from acquisition.delivery.raw import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings import child, tables, writer
 from acquisition.recordings.inversion import raw_of

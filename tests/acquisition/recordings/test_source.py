@@ -12,8 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import UnitCalibration, calibrate
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration, calibrate
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import open_recording

@@ -2,8 +2,12 @@
 
 import numpy as np
 
-from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import (
+    ChannelCalibration,
+    RawBlock,
+    SlowCalibration,
+    UnitCalibration,
+)
 from acquisition.modbus.cells import Cell, NumberType
 from acquisition.modbus.polled_source import PolledSource
 from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap

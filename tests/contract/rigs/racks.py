@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from core.machine.unit import Unit
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Quality, Reading
 from core.samples.blocks import SampleBlock
 from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow

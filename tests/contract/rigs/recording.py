@@ -8,7 +8,7 @@ from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.source import RecordingSource
 from acquisition.recordings.writer import RecordingWriter
-from acquisition.simulated.plant.source import SimulatedSource
+from acquisition.simulated.feed import SimulatedSource
 from acquisition.source import SampleSource
 from core.machine.channel import Measurand
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from acquisition.clock import SystemClock
+from acquisition.delivery.calibration import RawBlock
 from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
-from acquisition.delivery.raw import RawBlock
 from acquisition.modbus.cells import ByteOrder, Cell, NumberType
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource

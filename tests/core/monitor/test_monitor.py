@@ -8,9 +8,8 @@ import pytest
 from rigs.tiers import fast_and_long
 
 from core.machine.unit import Unit
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import Level, Reason, bad, missing, uncertain
 from core.samples.blocks import UNCOUNTED_LOSS, Rejection, SampleBlock
 from core.samples.gaps import Gap

@@ -7,8 +7,8 @@ import pytest
 
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
+from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
 

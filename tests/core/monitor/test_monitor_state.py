@@ -8,9 +8,8 @@ import pytest
 
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import MonitorState, UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Reading, Reason, uncertain
 from core.samples.blocks import SampleBlock
 

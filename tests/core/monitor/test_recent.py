@@ -11,8 +11,8 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.arrays import FloatArray
 from core.limits import Limits
 from core.machine.unit import Unit
+from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.samples.blocks import SampleBlock
 from core.spectra.overall import MAX_PARTS, PART_TURNS, parts_of
 

@@ -9,9 +9,8 @@ import pytest
 import core.monitor.bearing_readings
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Unit
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Level, Reading, Reason, bad, uncertain
 from core.spectra.speed import SpeedSource
 from core.stiffness.dynamic_readings import dynamic_readings

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD
 from core.samples.axis import RECOUNTED_EPOCHS
 from core.samples.blocks import SampleBlock

@@ -8,7 +8,7 @@ import pytest
 
 from core.arrays import FloatArray
 from core.machine.unit import Unit
-from core.monitor.settings import AnalysisSettings
+from core.monitor.assessment import AnalysisSettings
 from core.quality import Level, Reading, Reason, bad, missing
 from core.spectra.speed import (
     KeyPhase,

@@ -9,7 +9,7 @@ from scipy import signal
 from core.arrays import FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
-from core.monitor.settings import AnalysisSettings
+from core.monitor.assessment import AnalysisSettings
 from core.quality import GOOD, Reading
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import CrossSpectrum, average

@@ -12,8 +12,8 @@ from core.arrays import FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.response import HighPass
 from core.machine.unit import Unit
+from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Reading, Reason, bad
 from core.samples.blocks import SampleBlock
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import calibrate
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, calibrate
 from core.quality import Reason, bad, missing
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount

@@ -8,8 +8,7 @@ import pytest
 from click.testing import Result
 from rigs.command_line import padwatch
 
-from acquisition.delivery.calibration import calibrate
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, calibrate
 from core.samples.blocks import Rejection
 from service.conversion import calibration_of
 from service.settings.loading import load_plant_file

@@ -16,8 +16,8 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
+from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import Reach

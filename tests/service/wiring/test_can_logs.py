@@ -10,8 +10,7 @@ import pytest
 
 from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.delivery.blocks import BlockGrid
-from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
 from acquisition.recordings.reading import imported_frames

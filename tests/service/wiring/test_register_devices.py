@@ -11,9 +11,8 @@ import pytest
 from acquisition.delivery.blocks import BlockAssembler
 from acquisition.modbus.transport import ConnectionUse
 from core.machine.unit import Unit
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.samples.blocks import SampleBlock
 from service.conversion import calibration_of, machine_of
 from service.settings.loading import load_plant_file

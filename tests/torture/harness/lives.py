@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from acquisition.delivery.calibration import UnitCalibration, calibrate
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration, calibrate
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.monitor.monitor import UnitMonitor

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import calibrate
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, calibrate
 from acquisition.recordings.export import ExportFormat, export_recording
 from acquisition.recordings.imports.job import (
     ChannelColumn,

@@ -9,8 +9,7 @@ import pytest
 from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import RingLayout
 from acquisition.modbus.ring_source import RingSettings, RingSource

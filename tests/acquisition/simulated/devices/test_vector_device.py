@@ -5,8 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
-from acquisition.delivery.raw import RawBlock
+from acquisition.delivery.calibration import (
+    ChannelCalibration,
+    RawBlock,
+    SlowCalibration,
+    UnitCalibration,
+)
 from acquisition.modbus.decoding import MapDecoder
 from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.transport import TcpTransport
@@ -14,8 +18,8 @@ from acquisition.simulated.devices.map_device import VectorDevice
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
+from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow
 from service.settings.map_file import load_map_file
 

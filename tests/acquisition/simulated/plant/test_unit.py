@@ -10,10 +10,10 @@ import scipy.signal
 
 from acquisition.delivery.calibration import UnitCalibration, calibrate
 from acquisition.errors import ConfigError
+from acquisition.simulated.feed import SimulatedSource
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES, SimulatedPlant
 from acquisition.simulated.plant.scenario import Scenario
-from acquisition.simulated.plant.source import SimulatedSource
 from acquisition.simulated.plant.unit import SimulatedUnit
 from acquisition.source import SampleSource
 from core.arrays import FloatArray

@@ -12,9 +12,9 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Unit
+from core.monitor.assessment import AnalysisSettings
 from core.monitor.catalogue import CATALOGUE
 from core.monitor.monitor import UnitMonitor
-from core.monitor.settings import AnalysisSettings
 from core.quality import GOOD, Level, Reading, Reason, bad, missing
 from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow
 from core.spectra.segments import Evidence
