@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import repeat
 from typing import Any
 
@@ -82,12 +82,12 @@ def operation_of_states(
 
 def last_operation(history: StiffnessHistory, rules: FilmRules) -> tuple[Operation, OilSettling]:
     """Operation of a unit and settling of a bearing's oil after the bearing's stored readings."""
-    time_ns = history.time_ns
-    if len(history):
+    time_ns = history.time_ns.tolist()
+    if time_ns:
         # readings keep their distances, though time may be made to pass faster from now on
-        time_ns = time_ns + (rules.lapsed_ns(int(time_ns[-1])) - int(time_ns[-1]))
-    columns = (time_ns, history.speed_rpm, history.power_mw)
-    rows = zip(*(column.tolist() for column in columns), strict=True)
+        shift_ns = rules.lapsed_ns(time_ns[-1]) - time_ns[-1]
+        time_ns = [reading_ns + shift_ns for reading_ns in time_ns]
+    rows = zip(time_ns, history.speed_rpm.tolist(), history.power_mw.tolist(), strict=True)
     steps = _folded(step_operation, rows, history.oil_temperature_c, rules.operating)
     found = deque(steps, maxlen=1)
     return found[0] if found else (UNKNOWN_OPERATION, NOT_AT_SPEED)
@@ -170,16 +170,18 @@ def last_decision(
     is_settled : (n,)
     """
     readings = WatchedReadings.of(history, is_settled, baseline.direction)
-    lapsed = [rules.lapsed_ns(time_ns) for time_ns in history.time_ns.tolist()]
-    readings = replace(readings, time_ns=np.array(lapsed, np.int64))
-    found = deque(_decisions(readings, baseline, rules.change), maxlen=1)
+    decisions = _decisions(readings, baseline, rules.change, rules.lapsed_ns)
+    found = deque(decisions, maxlen=1)
     return found[0] if found else INITIAL_DECISION
 
 
 def _decisions(
-    readings: WatchedReadings, baseline: QuantityBaseline | None, limits: ChangeLimits
+    readings: WatchedReadings,
+    baseline: QuantityBaseline | None,
+    limits: ChangeLimits,
+    lapsed_ns: Callable[[int], int] = int,
 ) -> Iterator[Decision]:
     decision = INITIAL_DECISION
     for time_ns, outcome in readings.compared(baseline):
-        decision = step(decision, time_ns, outcome, baseline, limits)
+        decision = step(decision, lapsed_ns(time_ns), outcome, baseline, limits)
         yield decision

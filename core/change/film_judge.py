@@ -258,7 +258,7 @@ class FilmJudge:
     def _decide(self, reading: FilmReading, direction: str) -> FilmFinding:
         film, value = (reading.bearing, direction), reading.values[DIRECTIONS.index(direction)]
         watched = WatchedReadings(
-            np.array([self._rules.lapsed_ns(reading.time_ns)]),
+            np.array([reading.time_ns]),
             np.array([reading.condition.is_settled]),
             _conditions(reading),
             np.array([value.ln_k]),
@@ -268,7 +268,8 @@ class FilmJudge:
         learned = self._learned(*film)
         decision = self._decisions.get(film, INITIAL_DECISION)
         for time_ns, outcome in watched.compared(learned):
-            decision = step(decision, time_ns, outcome, learned, self._rules.change)
+            now_ns = self._rules.lapsed_ns(time_ns)
+            decision = step(decision, now_ns, outcome, learned, self._rules.change)
         self._decisions[film] = decision
         is_compared = decision.last_counted_ns == decision.last_ns
         return film_finding(decision, is_compared, self._version(reading.bearing))
