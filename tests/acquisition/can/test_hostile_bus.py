@@ -292,9 +292,8 @@ def both_ways(eventful_feed, shape_of, source_of, counts_calibration, read_up_to
         shape = shape_of(**shape)
         device = CanDevice(eventful_feed(**feed), shape, block_samples=n_samples)
         async with SlcanTcpServer(device, on_demand=True) as server:
-            source = source_of(shape, server.endpoint, when_full="wait")
+            source = source_of(shape, server.endpoint, when_full="wait", stale_after_s=60.0)
             wired = await read_up_to(source, direct[-1].epoch, direct[-1].stop_index)
-            await server.run()
         return direct, wired, source.refused_frames
 
     return read
