@@ -1,0 +1,207 @@
+"""Mappings of imports and register maps are read, or refused with line, key and fix."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from acquisition.modbus.decoding import MapDecoder
+from core.spectra.polls import VectorPart, VectorRow
+from service.settings.import_mapping import ImportMapping
+from service.settings.map_file import load_map_file
+from service.settings.toml_file import TomlFileError, load_toml
+
+CSV = """\
+format = "csv"
+
+[time]
+source = "column"
+column = "time"
+form = "iso8601"
+zone = "-03:00"
+
+[[channel]]
+id = "ujb_shaft_x"
+column = "UJB X"
+unit = "um"
+"""
+
+MDF = CSV.replace("csv", "mdf4").replace(
+    'source = "column"\ncolumn = "time"\nform = "iso8601"', 'source = "file"'
+)
+CANDUMP = MDF.replace("mdf4", "candump")
+
+
+def mapping_of(path: Path) -> ImportMapping:
+    return load_toml(path, ImportMapping)
+
+
+def refusal(tmp_path: Path, text: str, load: Callable[[Path], object] = mapping_of) -> str:
+    """Everything that is said of a mapping or a map, without the name of its file."""
+    path = tmp_path / "map.toml"
+    path.write_text(text)
+    with pytest.raises(TomlFileError) as error:
+        load(path)
+    assert str(error.value).startswith(f"{path}:")
+    return str(error.value).replace(str(path), "")
+
+
+@pytest.mark.parametrize("text", [CSV, MDF])
+def test_a_right_mapping_is_read(tmp_path: Path, text: str) -> None:
+    (tmp_path / "map.toml").write_text(text)
+    mapping = mapping_of(tmp_path / "map.toml")
+    assert mapping.channel[0].column == "UJB X"
+    assert mapping.time.zone == "-03:00"
+
+
+def test_a_start_needs_no_time_zone_beside_its_own(tmp_path: Path) -> None:
+    old, start = MDF[MDF.index("source") : MDF.index("[[")], "2026-01-01T10:00:00-03:00"
+    text = MDF.replace(old, f'source = "start"\nstart = {start}\n')
+    (tmp_path / "map.toml").write_text(text)
+    assert mapping_of(tmp_path / "map.toml").time.start.isoformat() == start
+
+
+FORMAT, UNIT = 'format = "csv"', 'unit = "um"'
+WRONG_CSV = [
+    ('zone = "-03:00"\n', "", ":3: time.zone: is needed: "),
+    ('"-03:00"', '"CET"', ":7: time.zone = 'CET': String should match pattern"),
+    ('"-03:00"', '"-15:00"', "time.zone = '-15:00': String should match"),
+    (FORMAT, 'format = "wav"', ":1: format = 'wav': Input should be 'mdf4'"),
+    (FORMAT, 'format = "tdms"', ":6: time.form = 'iso8601': is only for csv, this is tdms"),
+    ('"column"\n', '"file"\n', ":4: time.source = 'file': csv has no time of its own; write"),
+    ('form = "iso8601"\n', "", 'time.form: is needed for source "column"'),
+    ("iso8601", "elapsed_s", "time.start: is needed: what time counts from"),
+    ("iso8601", "timestamp", "time.form = 'timestamp': is only for tdms, this is csv"),
+    ("zone = ", "start = 2026-01-01\nzone = ", "time.start"),
+    ("zone = ", "start = 2026-01-01T00:00:00\nzone = ", "time.start"),
+    ("zone = ", "start = 2026-01-01T00:00:00Z\nzone = ", "00:00+00:00': has no effect here"),
+    (UNIT, "", ":9: channel[1].unit: Field required"),
+    (UNIT, "unit = 3", ":12: channel[1].unit = 3: Input should be a valid string"),
+    (UNIT, f'{UNIT}\ngroup = "a"', ":13: channel[1].group: csv has no groups"),
+    (UNIT, f"{UNIT}\ngain = 2", ":13: channel[1].gain = 2: Extra inputs"),
+    ("[[channel]]", "[[chanel]]", "chanel"),
+    (CSV[CSV.index("[[channel]]") :], "", "channel: needs at least one for csv"),
+    ("[[channel]]", CSV[CSV.index("[[channel]]") :] + "[[channel]]", "is used twice"),
+    ("[time]", "[time", "not TOML"),
+]
+WRONG_MDF = [
+    ("[[channel]]", "[csv]\n[[channel]]", "csv: is for CSV files, this one is mdf4"),
+    ("[time]", 'bus = "can0"\n[time]', ":3: bus = 'can0': is for CAN logs, this one is mdf4"),
+    ("mdf4", "tdms", ":5: time.zone = '-03:00': tdms is in UTC; write"),
+    ("mdf4", "candump", "candump is in UTC"),
+    ('source = "file"', 'source = "start"', "time.start: is needed"),
+]
+
+
+@pytest.mark.parametrize(
+    ("text", "old", "new", "says"),
+    [
+        *((CSV, *wrong) for wrong in WRONG_CSV),
+        *((MDF, *wrong) for wrong in WRONG_MDF),
+        (CANDUMP, "-03:00", "UTC", "channel: are those of the DBC file for"),
+    ],
+)
+def test_a_wrong_mapping_is_refused_with_line_and_key(
+    tmp_path: Path, text: str, old: str, new: str, says: str
+) -> None:
+    assert old in text
+    assert says in refusal(tmp_path, text.replace(old, new, 1))
+
+
+def test_the_example_in_the_guide_is_a_right_mapping(tmp_path: Path) -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "how-to" / "recordings.md").read_text()
+    blocks = [block.split("```")[0] for block in guide.split("```toml\n")[1:]]
+    mapping = next(block for block in blocks if "slow_channel" in block)
+    (tmp_path / "map.toml").write_text(mapping)
+    assert mapping_of(tmp_path / "map.toml").slow_channel[0].unit == "degC"
+
+
+def test_a_mapping_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "map.toml"
+    for content, words in (
+        (b"\xff\xfe", "not UTF-8 text at byte 0"),
+        (b"#" * 1_000_001, "larger than 1000000 bytes"),
+        (b"a = " + b"[" * 100_000, "not TOML"),
+    ):
+        path.write_bytes(content)
+        with pytest.raises(TomlFileError, match=words):
+            mapping_of(path)
+    with pytest.raises(TomlFileError, match="No such file"):
+        mapping_of(tmp_path / "absent")
+
+
+MAPS = Path(__file__).parents[3] / "deploy" / "maps"
+
+
+@pytest.mark.parametrize("path", sorted(MAPS.glob("*.toml")), ids=lambda path: path.name)
+def test_every_example_can_be_read(path: Path) -> None:
+    decoder = MapDecoder(load_map_file(path).register_map())
+
+    assert decoder.plan.spans
+    assert all(request.count <= 125 for request in decoder.plan.spans)
+
+
+def test_an_skf_like_rack_is_read_as_its_manual_demands() -> None:
+    registers = load_map_file(MAPS / "vector-rack-skf-like.toml").register_map()
+    requests = [(r.address, r.count) for r in MapDecoder(registers).plan.spans]
+
+    assert (608, 14) in requests
+    amplitude = registers.values[0]
+    assert amplitude.id == VectorRow("ujb_shaft_x", VectorPart.ORDER1_AMPLITUDE).id
+    assert amplitude.scale == 0.5, "peak-to-peak becomes zero-to-peak"
+    assert registers.values[1].scale == -0.1, "lag becomes lead"
+
+
+MINIMAL = """
+base = 1
+[[value]]
+channel = "a"
+address = 10
+type = "float32"
+[[value]]
+channel = "b"
+address = 20
+"""
+END = "address = 20\n"
+FLAG = "[[value.flag]]\naddress = 30\n"
+FIELDS = '["day", "day", "year", "hour", "minute", "second"]'
+CALENDAR = f'[time]\nkind = "calendar"\nfirst = {{ address = 50 }}\nfields = {FIELDS}\n'
+BEHIND = [
+    ("scale = 0.0", "value[2].scale: must not be 0"),
+    ('detector = "pp"', "value[2].detector"),
+    ('quantity = "order1_amplitude"', 'value[2].detector: must be "pk", "pp" or "rms"'),
+    ('quantity = "order1_phase"', 'value[2].phase: must be "lag" or "lead"'),
+    ("bit = 3", "value[2].bit: is the number of a bit"),
+    ("invalid_values = [0.5]", "value[2].invalid_values: must each be a whole number of 16 b"),
+    ("scale_register = { address = 25 }", "scale_register: is read in another request"),
+    ("full_scale = { minimum = 0.0 }", "value[2].full_scale.maximum: give either"),
+    ("invalid_below = nan", "invalid_below"),
+    ("[[together]]\naddress = 11\ncount = 5", "together: the block from 11 cuts"),
+    ("[[together]]\naddress = 40\ncount = 126", "together[1].count = 126"),
+    ('[time]\nkind = "epoch"\nseconds = { address = 0 }', "time.address: must be 1"),
+    (CALENDAR, "time.fields: must name each of year, month"),
+    ('"\\n" = 1', "value[2].\\n = 1: Extra inputs"),
+    (FLAG + "mask = 0\nset_means = 'bad'", ":12: value[2].flag[1].mask = 0: Input"),
+    (FLAG, "value[2].flag[1].set_means: must be given"),
+    (FLAG + "type = 'float32'\nset_means = 'bad'", ":12: value[2].flag[1].type: mu"),
+    ("base = ", "not TOML"),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("address = 20", "address = 11", ":9: value[2].address: lies on a"),
+        ('"float32"', '"float16"', ":6: value[1].type = 'float16'"),
+        ("address = 10", "address = 0", "value[1].address: must be 1 to 65535"),
+        ("base = 1", "base = 2", ":2: base = 2: must be 0, 1, 10001"),
+        ("base = 1", "bass = 1", ":2: bass = 1: Extra inputs"),
+        *((END, f"{END}{text}\n", said) for text, said in BEHIND),
+    ],
+)
+def test_a_wrong_value_of_a_map_is_refused_with_line_key_and_fix(
+    tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    assert old in MINIMAL
+    assert said in refusal(tmp_path, MINIMAL.replace(old, new, 1), load_map_file)
+    assert "value: Field required" in refusal(tmp_path, "", load_map_file)
