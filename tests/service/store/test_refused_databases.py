@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from harness.places import Place
 from rigs.assessments import assessment
-from rigs.store_fixtures import Execute, at
+from rigs.store_fixtures import at
 
 from service.origin import Origin
 from service.store.port import StoreError
@@ -36,15 +36,20 @@ def test_a_database_of_another_program_is_refused_and_left_as_it_is(
     assert path.read_bytes() == before
 
 
-def test_a_database_of_a_newer_padwatch_is_refused_by_its_schema_number(
-    path: Path, execute: Execute
-) -> None:
-    SqliteStore(path).close()
-    execute(f"PRAGMA user_version = {len(MIGRATIONS) + 1}")
+NEWEST = len(MIGRATIONS)
+NEWER = {
+    "sqlite": f"PRAGMA user_version = {NEWEST + 1}",
+    "postgresql": f"UPDATE padwatch SET schema_number = {NEWEST + 1}",  # noqa: S608
+}
 
-    said = f"schema {len(MIGRATIONS) + 1}, this padwatch knows up to {len(MIGRATIONS)}"
+
+def test_a_database_of_a_newer_padwatch_is_refused_by_its_schema_number(store_place: Place) -> None:
+    store_place.open().close()
+    store_place.execute(NEWER[store_place.kind])
+
+    said = f"schema {NEWEST + 1}, this padwatch knows up to {NEWEST}; run the padwatch"
     with pytest.raises(StoreError, match=said):
-        SqliteStore(path)
+        store_place.open()
 
 
 def test_a_truncated_database_and_what_is_none_are_refused(path: Path) -> None:

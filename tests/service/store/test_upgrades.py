@@ -6,7 +6,7 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from harness.places import SqlitePlace
+from harness.places import Place
 from rigs.assessments import assessment
 from rigs.rolled_trends import gather_all, n_rows
 from rigs.store_fixtures import query
@@ -20,13 +20,6 @@ from service.store.port import StoreError
 from service.store.schema import MIGRATIONS
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.migrating import migrate
-
-
-@pytest.fixture
-def filled(path: Path) -> None:
-    """Make a database with one result."""
-    with closing(SqliteStore(path)) as store:
-        store.append([assessment(speed_rpm=92.3)], [])
 
 
 @pytest.mark.parametrize("n_before", [2, 3, len(MIGRATIONS) - 1])
@@ -60,30 +53,35 @@ def test_an_older_database_keeps_its_data_and_gets_room_for_what_is_new(
     assert newest.readings["speed_rpm"].value == 92.3
 
 
-@pytest.mark.usefixtures("filled")
+BROKEN = "CREATE TABLE more (x TEXT) STRICT; DROP TABLE gap; CREATE TABLE more (x TEXT) STRICT;"
+
+
 def test_a_migration_that_fails_leaves_the_database_as_it_was(
-    path: Path, monkeypatch: pytest.MonkeyPatch
+    store_place: Place, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    broken = "CREATE TABLE more (x); DROP TABLE assessment; CREATE TABLE more (x);"
+    with closing(store_place.open()) as store:
+        store.append([assessment(speed_rpm=92.3)], [])
     with monkeypatch.context() as next_release:
-        next_release.setattr(schema, "MIGRATIONS", (*MIGRATIONS, broken))
-        with pytest.raises(StoreError, match="table more already exists"):
-            SqliteStore(path)
+        next_release.setattr(schema, "MIGRATIONS", (*MIGRATIONS, BROKEN))
+        with pytest.raises(StoreError, match=r'(table |relation ")more"? already exists'):
+            store_place.open()
 
-    with closing(SqliteStore(path)) as store:
+    with closing(store_place.open()) as store:  # which has a table gap
         assert list(store.trend(query()).series["speed_rpm"].mean) == [92.3]
+        assert store.gaps("U1", 0, 10) == []
 
 
-@pytest.mark.usefixtures("filled")
 def test_a_migration_keeps_the_data_and_is_done_once(
-    path: Path, monkeypatch: pytest.MonkeyPatch
+    store_place: Place, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(schema, "MIGRATIONS", (*MIGRATIONS, "CREATE TABLE more (x);"))
+    with closing(store_place.open()) as store:
+        store.append([assessment(speed_rpm=92.3)], [])
+    monkeypatch.setattr(schema, "MIGRATIONS", (*MIGRATIONS, "CREATE TABLE more (x TEXT) STRICT;"))
 
     for _ in range(2):
-        with closing(SqliteStore(path)) as store:
+        with closing(store_place.open()) as store:
             assert list(store.trend(query()).series["speed_rpm"].mean) == [92.3]
-    assert SqlitePlace(path).execute("SELECT count(*) FROM more") == [(0,)]
+    assert store_place.execute("SELECT count(*) FROM more") == [(0,)]
 
 
 def test_two_commands_that_upgrade_at_the_same_moment_find_the_newest_schema(

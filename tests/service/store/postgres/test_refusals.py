@@ -8,7 +8,6 @@ from harness.postgres_server import PostgresServer
 from rigs.assessments import assessment
 from rigs.memory_folder import memory_folder
 
-from service.store import schema
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore, connection
 from service.store.postgres.address import PostgresAddress
@@ -69,29 +68,6 @@ def test_a_database_of_another_program_is_refused_and_left_as_it_is(
     assert "is not a padwatch database; create one for padwatch alone" in said
     tables = "SELECT table_name FROM information_schema.tables WHERE table_schema = 'public'"
     assert own_place.execute(tables) == [("precious",)]
-
-
-def test_a_database_of_a_newer_padwatch_is_refused(postgres_place: PostgresPlace) -> None:
-    newest = len(schema.MIGRATIONS)
-    postgres_place.execute("UPDATE padwatch SET schema_number = ?", (newest + 1,))
-
-    said = refused(postgres_place.address)
-
-    assert f"has schema {newest + 1}, this padwatch knows up to {newest}; run the padwatch" in said
-
-
-def test_a_migration_that_fails_leaves_the_database_as_it_was(
-    postgres_place: PostgresPlace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    newest = len(schema.MIGRATIONS)
-    more = (*schema.MIGRATIONS, "CREATE TABLE half (a TEXT) STRICT; CREATE TABLE half (a TEXT);")
-    with monkeypatch.context() as upgrade:
-        upgrade.setattr(schema, "MIGRATIONS", more)
-        assert 'relation "half" already exists' in refused(postgres_place.address)
-
-    assert postgres_place.execute("SELECT schema_number FROM padwatch") == [(newest,)]
-    assert postgres_place.execute("SELECT to_regclass('half')") == [(None,)]
-    postgres_place.open().close()
 
 
 def test_a_server_that_loses_results_at_a_power_cut_is_refused(
