@@ -4,6 +4,7 @@ import asyncio
 
 import can
 import pytest
+from rigs.standing_clock import SetClock
 from rigs.tiers import covering
 
 from acquisition.can.assembly import FrameAssembler
@@ -92,19 +93,6 @@ PATIENCE_S = 20.0
 """Longer than a machine under load takes; samples that are held back never come."""
 
 
-class SetClock:
-    """Host clock that a test may set; the monotonic clock does not change with it."""
-
-    def __init__(self) -> None:
-        self.steady_s, self.off_s = 1000.0, 0.0
-
-    def now_ns(self) -> int:
-        return START_NS + round((self.steady_s + self.off_s) * 1e9)
-
-    def monotonic_s(self) -> float:
-        return self.steady_s
-
-
 @pytest.fixture
 def plant(request, settings_of, counts_calibration, fake_bus):
     """A message with or without a counter, and a sample that is its own number."""
@@ -133,8 +121,8 @@ async def test_a_host_clock_that_is_set_makes_no_gap_and_no_restart(plant, fake_
     blocks, number = [], 0
     async with asyncio.timeout(PATIENCE_S), source.connect() as stream:
         for batch in range(40):
-            clock.off_s = step_s if batch >= 20 else 0.0
-            clock.steady_s += N_PER_BATCH / RATE_HZ
+            clock.ns += round(step_s * 1e9) if batch == 20 else 0
+            clock.step(round(N_PER_BATCH / RATE_HZ * 1e9))
             for _ in range(N_PER_BATCH):
                 fake_bus.messages.put(frame(number, n_bits))
                 number += 1

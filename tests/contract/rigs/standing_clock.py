@@ -1,4 +1,4 @@
-"""A clock that stands."""
+"""A clock that stands, and one that passes while somebody waits and may be set."""
 
 import asyncio
 
@@ -19,3 +19,23 @@ class StandingClock:
 
     async def sleep(self, duration_s: float) -> None:  # noqa: ARG002  time stands still
         await asyncio.sleep(0)
+
+
+class SetClock(StandingClock):
+    """Time passes when a test says so or somebody waits; ``ns`` sets the wall clock alone."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.ns = T0
+
+    def now_ns(self) -> int:
+        return self.ns
+
+    async def sleep(self, duration_s: float) -> None:
+        self.step(round(duration_s * 1e9))
+        await super().sleep(duration_s)
+
+    def step(self, duration_ns: int) -> None:
+        """Let time pass by both clocks of the host, as it does where nobody sets one."""
+        self.ns += duration_ns
+        self.s += duration_ns / 1e9

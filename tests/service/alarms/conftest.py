@@ -9,14 +9,12 @@ from typing import Any
 
 import pytest
 import structlog
+from rigs.standing_clock import SetClock
 
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
-
-SECOND = 1_000_000_000
-
 
 IDS = ("sx", "sy", "bx", "by")
 UNIT = Unit(
@@ -26,22 +24,6 @@ UNIT = Unit(
     tuple(Channel(id_, Measurand.DISPLACEMENT_UM) for id_ in IDS),
     (Bearing("UJB", 1e9, *IDS, 200.0, (2000.0, 2000.0)),),
 )
-
-
-class Host:
-    """Time that only steps forward when asked to, and a wall clock that may be set."""
-
-    def __init__(self) -> None:
-        self.ns, self.set_by_s = 1_000 * SECOND, 0.0
-
-    def now_ns(self) -> int:
-        return self.ns + round(self.set_by_s * SECOND)
-
-    def monotonic_s(self) -> float:
-        return self.ns / SECOND
-
-    async def sleep(self, duration_s: float) -> None:
-        self.ns += round(duration_s * SECOND)
 
 
 class UncertainStore:
@@ -64,8 +46,8 @@ class UncertainStore:
 
 
 @pytest.fixture
-def host() -> Host:
-    return Host()
+def host() -> SetClock:
+    return SetClock()
 
 
 @pytest.fixture

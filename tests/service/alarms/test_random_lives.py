@@ -164,7 +164,7 @@ class Life:
         assert kept(self.engine.alarms)[LINK][0] == int(not self.connected)
 
     def time_passes(self) -> None:
-        self.host.ns += self.random.randint(0, 10) * SECOND
+        self.host.step(self.random.randint(0, 10) * SECOND)
         shelves = {each.identity: each.shelf for each in self.engine.alarms if each.shelf}
         self.engine.tick()
         assert kept(self.engine.alarms)[LINK][0] == int(not self.connected)

@@ -39,7 +39,7 @@ class Watched:
 
     def after(self, seconds: float, **health: Any) -> list[str]:
         self.health = ServiceHealth(**health)
-        self.host.ns += round(seconds * SECOND)
+        self.host.step(round(seconds * SECOND))
         news = self.alarms.tick(self.host.ns)
         return [f"{e.identity.id} {e.change}" for told in news for e in told.events]
 
@@ -153,10 +153,10 @@ def test_a_lost_link_is_told_after_its_delay_whatever_the_clock_is_set_to(
     told: list[Any] = []
     for second in range(30):
         if second == 4:
-            host.set_by_s = set_by_s
+            host.ns += round(set_by_s * SECOND)
         engine.tick()
         told.append(engine.alarm(LINK).level)
-        host.ns += SECOND
+        host.step(SECOND)
 
     since = told.index(next(level for level in told if level is not None))
     assert since in (round(DELAY_S), round(DELAY_S) + 1)  # the second of the step may not count
@@ -195,7 +195,7 @@ async def test_an_alarm_about_the_store_stands_while_it_fails_and_is_stored_as_s
     recorder.put(_findings(other))  # something that waits
     for _ in range(15):
         await recorder.flush()
-        host.ns += SECOND
+        host.step(SECOND)
         engine.tick()
     alarm = engine.alarm(NOT_STORED)
     engine.operate(NOT_STORED, Acknowledge("A. Name", alarm.occurrence))
@@ -205,7 +205,7 @@ async def test_an_alarm_about_the_store_stands_while_it_fails_and_is_stored_as_s
 
     uncertain.fate = "writes"
     await recorder.flush()
-    host.ns += SECOND
+    host.step(SECOND)
     engine.tick()
     await recorder.flush()
 

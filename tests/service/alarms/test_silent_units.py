@@ -36,7 +36,7 @@ class Process:
     async def after(self, seconds: float, *reporting: str) -> list[str]:
         """Let seconds pass in which some units are reported on; returns the alarms that stand."""
         for _ in range(round(seconds)):
-            self.host.ns += SECOND
+            self.host.step(SECOND)
             reports = [replace(REPORT, unit=unit, n_beats=self.host.ns) for unit in reporting]
             self.store.unit_states.report("other", reports)
             await self.silent.look()

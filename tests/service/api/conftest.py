@@ -16,6 +16,7 @@ from rigs.capturing import ALERT, T0
 from rigs.database_copy import copy_database
 from rigs.described import described_app
 from rigs.probes import Probes
+from rigs.standing_clock import SetClock
 
 from acquisition.delivery.calibration import calibrate
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmRule
@@ -50,28 +51,6 @@ DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 
 N_RESULTS = 6
 STALE_AFTER_S = 30.0
-
-
-class SetClock:
-    """Time that tests set."""
-
-    def __init__(self) -> None:
-        self.ns = 1_767_225_600_000_000_000
-        self.s = 0.0
-
-    def now_ns(self) -> int:
-        return self.ns
-
-    def monotonic_s(self) -> float:
-        return self.s
-
-    async def sleep(self, duration_s: float) -> None:
-        self.s += duration_s
-
-    def step(self, duration_ns: int) -> None:
-        """Let time pass by both clocks of the host, as it does where nobody sets one."""
-        self.ns += duration_ns
-        self.s += duration_ns / 1e9
 
 
 @pytest.fixture(scope="session")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from harness.waiting import at_work
+from rigs.standing_clock import T0, SetClock
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
@@ -23,7 +24,6 @@ from service.delivery.webhook import Webhook, WebhookTarget
 from service.settings.delivery import TOLD
 from service.store.sqlite import SqliteStore
 
-T0 = 1_767_225_600_000_000_000
 PATIENCE_S = 30.0
 """Until a test gives up; none waits that long when all is well."""
 
@@ -32,27 +32,19 @@ DANGER = Judgement(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_li
 WELL = Judgement(value=3.0)
 
 
-class HandClock:
-    """Time that passes at once where somebody waits, unless a test holds it."""
+class HandClock(SetClock):
+    """Counts how long is waited, and waits for ever where a test holds it."""
 
     def __init__(self) -> None:
-        self.ns = T0
-        self.wrong_s = 0.0
+        super().__init__()
         self.slept_s: list[float] = []
         self.held_from_s = 30.0
-
-    def now_ns(self) -> int:
-        return self.ns + round(self.wrong_s * 1e9)
-
-    def monotonic_s(self) -> float:
-        return (self.ns - T0) / 1e9
 
     async def sleep(self, duration_s: float) -> None:
         self.slept_s.append(duration_s)
         if duration_s >= self.held_from_s:
             await asyncio.Event().wait()
-        self.ns += round(duration_s * 1e9)
-        await asyncio.sleep(0)
+        await super().sleep(duration_s)
 
 
 def news(number: int, *conditions: Judgement, unit: str = "U1") -> AlarmNews:

@@ -164,7 +164,7 @@ async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room:
     server = await room.web(room.answers("503 Away"), room.answers("200 OK"))
     store = room.open_store()
     store.append([], [], [room.news(n) for n in range(5)])
-    room.clock.ns += 3_610 * 10**9
+    room.clock.step(3_610 * 10**9)
     store.append([], [], [room.news(5)])
 
     await room.delivered(server, store, max_age_s=3600.0)
@@ -176,26 +176,27 @@ async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room:
     assert backlog.last_dead.answer == "too old after: 503"
 
 
-YEAR_S = 365.0 * 86_400.0
+YEAR_NS = 365 * 86_400 * 10**9
 
 
 @pytest.mark.parametrize(
-    ("queued_wrong_s", "sent_wrong_s"),
+    ("queued_wrong_ns", "sent_wrong_ns"),
     [
-        pytest.param(0.0, 20.0 * YEAR_S, id="set years ahead while it sends"),
-        pytest.param(-50.0 * YEAR_S, 0.0, id="set right before it was started again"),
+        pytest.param(0, 20 * YEAR_NS, id="set years ahead while it sends"),
+        pytest.param(-50 * YEAR_NS, 0, id="set right before it was started again"),
     ],
 )
 async def test_a_clock_that_is_set_gives_nothing_up(
-    room: Any, queued_wrong_s: float, sent_wrong_s: float
+    room: Any, queued_wrong_ns: int, sent_wrong_ns: int
 ) -> None:
     server = await room.web(room.answers("503 Away"), room.answers("200 OK"))
     store = room.open_store()
-    room.clock.wrong_s = queued_wrong_s
+    right_ns = room.clock.ns
+    room.clock.ns = right_ns + queued_wrong_ns
     store.append([], [], [room.news(n) for n in range(3)])
-    room.clock.wrong_s = 0.0
+    room.clock.ns = right_ns
     sender = room.sender(server, store, max_age_s=3600.0)
-    room.clock.wrong_s = sent_wrong_s
+    room.clock.ns = right_ns + sent_wrong_ns
 
     async with room.running(sender):
         await room.settled(sender, store)
