@@ -10,7 +10,7 @@ from core.machine.unit import BracketDynamics
 from core.quality import Reason
 from core.spectra.cross_spectrum import BEARING_X, SHAFT_X, CrossSpectrum, average
 from core.stiffness.evidence import LineLimits, line_excitation
-from core.stiffness.transfer import LineTransfer, line_transfer
+from core.stiffness.transfer import LineTransfer, effective_stiffness_n_per_m, line_transfer
 
 FREQUENCY_HZ = np.array([1.54])
 OMEGA = 2.0 * math.pi * 1.54
@@ -99,3 +99,16 @@ def test_a_line_is_believed_if_it_is_coherent_and_larger_than_runout() -> None:
     assert excitation(clear, runout_um_pk=2.4) is Reason.OK
     assert excitation(clear, runout_um_pk=2.6) is Reason.INSUFFICIENT_EXCITATION
     assert excitation(spectrum(motion(n_segments=1))) is Reason.FEW_SEGMENTS
+
+
+def test_equal_amplitudes_of_any_unit_mean_a_film_as_stiff_as_its_bracket() -> None:
+    assert effective_stiffness_n_per_m(12.0, 12.0, 1.18e9) == 1.18e9
+    assert effective_stiffness_n_per_m(0.02, 0.055, 1.18e9) == pytest.approx(
+        effective_stiffness_n_per_m(20.0, 55.0, 1.18e9)
+    )
+
+
+@pytest.mark.parametrize("shaft_um_pk", [0.0, -1.0, float("nan")])
+def test_a_shaft_that_does_not_move_gives_no_stiffness(shaft_um_pk: float) -> None:
+    with pytest.raises(ValueError, match="shaft amplitude"):
+        effective_stiffness_n_per_m(1.0, shaft_um_pk, 1.18e9)

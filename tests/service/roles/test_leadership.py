@@ -1,19 +1,24 @@
-"""The work that a plant shares is done by one process, and by the next when that is gone."""
+"""Units and shared work are done by one process each, and by the next when that is gone."""
 
 import asyncio
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import pytest
 from harness.waiting import at_work, until
 from rigs.standing_clock import StandingClock
 
+from acquisition.clock import SystemClock
 from service.delivery.deliveries import Deliveries
 from service.delivery.outcome import Delivered
 from service.delivery.sender import Receiver
 from service.heartbeats import UNHEARD, Heartbeats, Pulse
+from service.roles.holding import HoldLostError, Holds
 from service.roles.leadership import Leadership
+from service.roles.partition import Partition
+from service.settings.loading import load_plant_file
+from service.store.database import Hold
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
 
@@ -146,3 +151,98 @@ async def test_senders_of_a_process_that_lost_the_name_do_not_count_as_dead(
             name.holder, name.is_away = None, True
             await until(lambda: not leadership.is_leading)
             assert beats.look() == {}
+
+
+Begin = Callable[..., Holds]
+
+
+@pytest.fixture
+def begin(tmp_path: Path) -> Iterator[Begin]:
+    """Begins processes that want to hold units of one plant; they let go at the end."""
+    with ExitStack() as stack:
+
+        def process(*units: str) -> Holds:
+            store = stack.enter_context(closing(SqliteStore(tmp_path / "padwatch.sqlite3")))
+            holds = Holds(store, list(units), SystemClock())
+            stack.callback(holds.release)
+            return holds
+
+        yield process
+
+
+async def waiting(holds: Holds) -> "asyncio.Task[None]":
+    """Let a process wait for its units."""
+    taking = asyncio.create_task(holds.take())
+    while holds.waits_for in (None, "not begun"):
+        await asyncio.sleep(0.01)
+    return taking
+
+
+async def test_a_second_process_stands_by_until_the_first_one_ends(begin: Begin) -> None:
+    first, second = begin("U1", "U2"), begin("U1", "U2")
+    await first.take()
+    assert first.waits_for is None
+    first.require()
+    taking = await waiting(second)
+    assert "held by another padwatch" in (second.waits_for or "")
+    assert not taking.done()
+    first.release()
+    await asyncio.wait_for(taking, 30.0)
+    assert second.waits_for is None
+
+
+async def test_shares_that_overlap_take_all_their_units_or_none(begin: Begin) -> None:
+    first, second, third = begin("U2"), begin("U1", "U2"), begin("U1")
+    await first.take()
+    taking = await waiting(second)
+    await asyncio.wait_for(third.take(), 30.0)  # U1 is not kept by who waits for U2
+    taking.cancel()
+    await asyncio.wait([taking])
+
+
+class Lost:
+    """A name that is held no more."""
+
+    is_held = False
+
+
+async def test_who_has_lost_a_name_stops(begin: Begin) -> None:
+    holds = begin("U1")
+    await holds.take()
+    lost: Hold = Lost()
+    holds._holds = [lost]
+    with pytest.raises(HoldLostError, match="another process may have taken over"):
+        holds.require()
+
+
+PLANT = load_plant_file(Path(__file__).parents[3] / "deploy" / "demo.toml")
+UNITS = [f"U{number:02}" for number in range(1, 21)]
+
+
+@pytest.mark.parametrize("n_parts", [1, 2, 3, 7, 20])
+def test_every_unit_is_in_exactly_one_share_and_all_have_about_as_many(n_parts: int) -> None:
+    shares = [Partition(number, n_parts).units(UNITS[::-1]) for number in range(1, n_parts + 1)]
+    assert sorted(unit for share in shares for unit in share) == UNITS
+    assert max(map(len, shares)) - min(map(len, shares)) <= 1
+
+
+@pytest.mark.parametrize("text", ["", "1", "0/2", "3/2", "-1/2", "1/2/3", "a/b", "1/0", "99999/1"])
+def test_what_is_no_share_is_refused_with_what_to_write(text: str) -> None:
+    with pytest.raises(ValueError, match="such as 1/2"):
+        Partition.of(text)
+
+
+def test_a_share_without_units_is_refused() -> None:
+    with pytest.raises(ValueError, match="no more than 2 parts"):
+        Partition(3, 3).part_of(PLANT)
+
+
+def test_one_share_raises_the_alarms_that_are_of_no_unit() -> None:
+    first, second = (Partition(number, 2).share_of(PLANT) for number in (1, 2))
+    assert first.looks_after("U1")
+    assert not first.looks_after("U2")
+    assert first.looks_after("plant")
+    assert first.looks_after("a unit that is there no more")
+    assert second.looks_after("U2")
+    assert not second.looks_after("U1")
+    assert not second.looks_after("plant")

@@ -1,4 +1,4 @@
-"""Every operation × role × state of what is shown: let in is exactly who is declared here."""
+"""Every operation × role × state: let in is exactly who is declared here, and each declares."""
 
 import json
 from collections.abc import Awaitable, Callable
@@ -6,14 +6,19 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import pytest
+from fastapi import APIRouter, FastAPI
 from rigs.tiers import covering, fast_and_long
+from starlette.responses import PlainTextResponse
+from starlette.routing import Mount
 
+from service.api.access.application import GuardedApi
+from service.api.access.declared import OPEN, Reach, UndeclaredRouteError, declared, needs
 from service.dashboard.edition import edition
-from service.security.roles import Role
+from service.security.roles import Permission, Role
 from service.security.tokens import new_key, new_token
 
 ROLES = ("viewer", "operator", "engineer", "admin")
-OPEN = None
+NO_ROLE = None
 UNIT, PLANT, NO_UNIT = "unit", "plant", "no unit"
 
 
@@ -34,13 +39,13 @@ ALARM = "/api/v1/alarms/{alarm}"
 RECORDING = "/api/v1/recordings/{recording}"
 
 TABLE = {
-    "GET /livez": Row(OPEN),
-    "GET /readyz": Row(OPEN),
-    "GET /api/v1/session": Row(OPEN),
-    "POST /api/v1/session": Row(OPEN),
-    "DELETE /api/v1/session": Row(OPEN),
+    "GET /livez": Row(NO_ROLE),
+    "GET /readyz": Row(NO_ROLE),
+    "GET /api/v1/session": Row(NO_ROLE),
+    "POST /api/v1/session": Row(NO_ROLE),
+    "DELETE /api/v1/session": Row(NO_ROLE),
     "POST /api/v1/session/password": Row("viewer", NO_UNIT),
-    "POST /api/v1/set-up": Row(OPEN),
+    "POST /api/v1/set-up": Row(NO_ROLE),
     "GET /api/v1/overview": Row("viewer", PLANT),
     "GET /api/v1/units": Row("viewer", PLANT),
     "GET /api/v1/units/{unit}": Row("viewer"),
@@ -196,7 +201,7 @@ async def test_what_is_no_longer_or_never_was_good_opens_nothing(
 ) -> None:
     headers = await show(way, state)
     for operation, status in (await answers(access, headers)).items():
-        expected = TABLE[operation].role is OPEN
+        expected = TABLE[operation].role is NO_ROLE
         assert let_in(status) == expected, f"{operation}: {status}"
         assert expected or status == 401, f"{operation}: {status}"
 
@@ -204,7 +209,7 @@ async def test_what_is_no_longer_or_never_was_good_opens_nothing(
 async def test_who_shows_nothing_sees_nothing(access: Any) -> None:
     for operation, status in (await answers(access, {})).items():
         assert status != 403, operation
-        assert let_in(status) == (TABLE[operation].role is OPEN), f"{operation}: {status}"
+        assert let_in(status) == (TABLE[operation].role is NO_ROLE), f"{operation}: {status}"
     async with access.client() as client:
         for path in sorted(ELSEWHERE):
             assert (await client.get(path)).status_code == 200, path
@@ -218,7 +223,7 @@ async def test_on_this_computer_all_may_see_the_plant_and_only_in_the_demonstrat
     access.desk.local_role = Role(local_role)
     for operation, status in (await answers(access, {"peer": "127.0.0.1"})).items():
         least = TABLE[operation].role
-        expected = least in (OPEN, "viewer") or local_role == "admin"
+        expected = least in (NO_ROLE, "viewer") or local_role == "admin"
         assert let_in(status) == expected, f"{operation}: {status}"
         assert expected or status == 401, f"{operation}: {status}"
 
@@ -230,7 +235,7 @@ async def test_each_role_may_what_is_declared_and_nothing_else(
     headers = await show(way, "good", role)
     for operation, status in (await answers(access, headers)).items():
         least = TABLE[operation].role
-        expected = least is OPEN or ROLES.index(role) >= ROLES.index(least)
+        expected = least is NO_ROLE or ROLES.index(role) >= ROLES.index(least)
         if (way, operation) == ("session", "POST /api/v1/session/password"):
             assert status == 422, status  # a wrong password would be a 401, too
         assert let_in(status) == expected, f"{operation}: {status}"
@@ -245,7 +250,7 @@ async def test_a_key_for_some_units_opens_those_and_what_belongs_to_none(
     for unit in ("U1", "U2"):
         for operation, status in (await answers(access, headers, unit)).items():
             row = TABLE[operation]
-            expected = row.role is OPEN or (
+            expected = row.role is NO_ROLE or (
                 ROLES.index(role) >= ROLES.index(row.role)
                 and (row.about == NO_UNIT or (row.about == UNIT and unit == "U1"))
             )
@@ -271,3 +276,40 @@ async def test_a_key_for_some_units_may_ask_for_the_history_of_those(
             assert answer.status_code == status, query
         assert (await client.get("/api/v1/alarms/rates?unit=U1")).status_code == 200
         assert (await client.get("/api/v1/alarms/rates?unit=plant")).status_code == 403
+
+
+def test_a_route_without_a_declaration_is_refused_by_its_name() -> None:
+    app = GuardedApi(openapi_url=None)
+    router = APIRouter(prefix="/things")
+    router.add_api_route("/{thing}", lambda thing: thing, methods=["PUT"])
+    app.include_router(router)
+
+    with pytest.raises(UndeclaredRouteError, match=r"^PUT /things/\{thing\}: "):
+        app.require_declarations()
+
+
+def test_what_is_no_operation_or_two_of_one_name_is_refused() -> None:
+    app = FastAPI(openapi_url=None, routes=[Mount("/files", PlainTextResponse("all of them"))])
+    two = FastAPI(openapi_url=None)
+    for _ in range(2):
+        two.add_api_route("/thing", lambda: None, dependencies=[OPEN])
+
+    with pytest.raises(UndeclaredRouteError, match="/files"):
+        declared(app)
+    with pytest.raises(UndeclaredRouteError, match="two"):
+        declared(two)
+
+
+def test_a_routes_own_declaration_counts_before_its_routers() -> None:
+    app = FastAPI(openapi_url=None)
+    router = APIRouter(dependencies=[needs(Permission.READ)])
+    router.add_api_route("/a", lambda: None)
+    router.add_api_route("/b", lambda: None, dependencies=[needs(Permission.CHANGE_ACCESS)])
+    router.add_api_route("/c", lambda: None, dependencies=[OPEN])
+    app.include_router(router)
+    found = declared(app)
+
+    assert found["GET /a"].needs.permission is Permission.READ
+    assert found["GET /a"].needs.reach is Reach.PLANT
+    assert found["GET /b"].needs.permission is Permission.CHANGE_ACCESS
+    assert [found[name].is_open for name in ("GET /a", "GET /b", "GET /c")] == [False, False, True]

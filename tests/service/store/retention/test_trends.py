@@ -1,18 +1,24 @@
-"""Trends over what has become coarser say the same as before, and how fine they are."""
+"""Trends over what has become coarser say the same, whatever comes late, in whatever order."""
 
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from harness.places import Place
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from rigs.assessments import assessment
+from rigs.memory_folder import memory_folder
 from rigs.old_results import (
     HOUR_NS,
+    HOURS,
     NOW_NS,
     SECOND_NS,
     T0,
     TIERS,
+    Build,
     asked,
     delete_all,
     life,
@@ -20,11 +26,138 @@ from rigs.old_results import (
     require_same_hours,
 )
 from rigs.rolled_trends import gather_all, n_rows
+from rigs.store_fixtures import Execute
+from rigs.tiers import fast_and_long
 
 from core.condition.operating_state import OperatingState
+from service.store.retention import deleting
 from service.store.retention.limits import RetentionLimits
+from service.store.rollups import rolling
 from service.store.sqlite import SqliteStore
 from service.store.value_range import ValueRange
+
+
+@pytest.mark.parametrize(("limits", "widths"), TIERS)
+def test_late_readings_are_added_to_what_is_left_of_their_hour(
+    rolled: SqliteStore,
+    plain: SqliteStore,
+    path: Path,
+    limits: RetentionLimits,
+    widths: tuple[int, ...],
+) -> None:
+    delete_all(rolled, limits)
+    random = np.random.default_rng(2)
+    late = [
+        reading(assessment, random, T0 + hour * HOUR_NS + second * SECOND_NS + 7)
+        for hour, second in ((1, 5), (1, 700), (1, 3599), (4, 1800), (4, 1801))
+    ]
+    for store in (rolled, plain):
+        store.append(late, [])
+
+    for _ in range(2):  # before they are merged, and after that
+        for minutes in widths:
+            require_same_hours(rolled.trend(asked(minutes)), plain.trend(asked(minutes)))
+        gather_all(rolled)
+    assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
+    assert n_rows(path, "rollup_redo") == 0
+
+
+STEPS = st.lists(
+    st.one_of(
+        st.tuples(st.just("late"), st.integers(0, HOURS * 3600 - 1)),
+        st.tuples(st.just("gather"), st.just(0)),
+        st.tuples(st.sampled_from(["single", "minutes", "ten"]), st.integers(0, HOURS)),
+    ),
+    min_size=3,
+    max_size=14,
+)
+
+
+@pytest.mark.parametrize("n_examples", fast_and_long(6, 60))
+def test_whatever_happens_in_whatever_order_hours_say_what_was_read(n_examples: int) -> None:
+    @settings(max_examples=n_examples, deadline=None)
+    @given(STEPS, st.integers(0, 2**31))
+    def check(steps: list[tuple[str, int]], seed: int) -> None:
+        with ExitStack() as stack:
+            folder = stack.enter_context(memory_folder())
+            kept = stack.enter_context(closing(SqliteStore(folder / "kept")))
+            whole = stack.enter_context(closing(SqliteStore(folder / "whole")))
+            require_same_through(steps, kept, whole, assessment, seed)
+
+    check()
+
+
+def require_same_through(
+    steps: list[tuple[str, int]], kept: SqliteStore, whole: SqliteStore, build: Build, seed: int
+) -> None:
+    """Do these steps with one store; the other one keeps everything."""
+    random, taken = np.random.default_rng(seed), set[int]()
+    for store in (kept, whole):
+        store.append(life(build, 80, seed), [])
+    for what, number in steps:
+        if what == "late" and number not in taken:
+            taken.add(number)
+            late = reading(build, random, T0 + number * SECOND_NS + 11)
+            for store in (kept, whole):
+                store.append([late], [])
+        elif what == "gather":
+            gather_all(kept)
+        elif what != "late":
+            _delete_until(kept, what, number)
+        require_same_hours(kept.trend(asked(60)), whole.trend(asked(60)))
+
+
+def _delete_until(store: SqliteStore, what: str, hour: int) -> None:
+    age_ns = (HOURS - hour) * HOUR_NS
+    limits = RetentionLimits(
+        readings_ns=age_ns,
+        minutes_ns=None if what == "single" else age_ns,
+        ten_minutes_ns=age_ns if what == "ten" else None,
+    )
+    delete_all(store, limits)
+
+
+def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
+    """What gathering anew does, done to an hour of which only late readings are left."""
+    rolling._gather_hour(writer, series, (hour_ns, hour_ns + HOUR_NS))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("module", "name", "bug"),
+    [
+        pytest.param(
+            *(rolling, "merge_late", overwritten),
+            marks=pytest.mark.planted("late readings overwrite what was rolled up"),
+        ),
+        pytest.param(
+            *(deleting, "_stands_in", lambda *_: True),
+            marks=pytest.mark.planted("readings deleted before they were rolled up"),
+        ),
+    ],
+)
+def test_planted_bugs_are_found(
+    rolled: SqliteStore,
+    plain: SqliteStore,
+    execute: Execute,
+    monkeypatch: pytest.MonkeyPatch,
+    module: object,
+    name: str,
+    bug: object,
+) -> None:
+    """Late readings that overwrite their hour, and deleting unseen what was not rolled up."""
+    monkeypatch.setattr(module, name, bug)
+    execute("DELETE FROM rollup_cell WHERE width_s = 3600 AND start_ns = ?", (T0 + 2 * HOUR_NS,))
+    delete_all(rolled)
+    gather_all(rolled)
+    delete_all(rolled)
+    late = reading(assessment, np.random.default_rng(2), T0 + HOUR_NS + 7)
+    for store in (rolled, plain):
+        store.append([late], [])
+    gather_all(rolled)
+
+    with pytest.raises(AssertionError):
+        require_same_hours(rolled.trend(asked(60)), plain.trend(asked(60)))
 
 
 @pytest.mark.parametrize(("limits", "widths"), TIERS)

@@ -1,4 +1,4 @@
-"""Modbus sources in the plant file are refused at load where they can never work."""
+"""Sources in the plant file: what can never work is refused at load."""
 
 from functools import partial
 from pathlib import Path
@@ -10,6 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters
 from core.spectra.polls import VectorPart, VectorRow
 from service.settings.base import MisfitError
+from service.settings.can import CanSettings
 from service.settings.modbus_identity import IdentitySettings
 from service.settings.modbus_sources import (
     ModbusFifoSettings,
@@ -176,3 +177,92 @@ def test_an_identity_reaches_the_adapter_as_it_was_written() -> None:
 def test_an_identity_that_cannot_be_is_refused(wrong: dict[str, object], complaint: str) -> None:
     with pytest.raises(ValidationError, match=complaint):
         IDENTITY.validate_python(wrong)
+
+
+CAN = {
+    "kind": "can",
+    "interface": "slcan",
+    "channel": "/dev/ttyACM0",
+    "bitrate": 500_000,
+    "dbc": "daq.dbc",
+    "signals": {"x": "WAVE.x", "y": ["WAVE.y0", "WAVE.y1"]},
+    "slow": {"oil": "STATUS.oil"},
+    "counters": ["WAVE.count", "STATUS.count"],
+    "options": {"tty_baudrate": 2_000_000},
+}
+CAN_PROFILE = {
+    "kind": "can",
+    "interface": "slcan",
+    "channel": "socket://127.0.0.1:0",
+    "profile": "padwatch_int16",
+}
+
+
+def test_a_can_source_is_read_by_its_dbc_or_by_a_profile(tmp_path):
+    source = CanSettings.model_validate(CAN, context={FOLDER: tmp_path})
+    assert source.dbc_path == tmp_path / "daq.dbc"
+    assert source.signals["y"] == ("WAVE.y0", "WAVE.y1")
+    source.check_channels(["x", "y"], ["oil"])
+    CanSettings.model_validate(CAN_PROFILE).check_channels(["any"], [])
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "words"),
+    [
+        ({"dbc": None}, "dbc", "dbc or profile must be given, found neither"),
+        ({"profile": "padwatch_int16"}, "dbc", "found both"),
+        ({"signals": {}}, "signals", "must name a signal for each waveform channel"),
+        ({"seconds": "T.s"}, "microseconds", "must be given together"),
+        ({"microseconds": "T.us"}, "seconds", "must be given together"),
+        ({"data_bitrate": 2_000_000}, "data_bitrate", "set fd = true"),
+        ({"stamps": "interface"}, "stamps", 'must be "host": slcan has no time stamps'),
+        ({"interface": "socketcan"}, "bitrate", "is set by the system here: ip link set"),
+        (
+            {"counter_counts": "frames", "frame_samples": ["W.n"]},
+            "counter_counts",
+            'needs "samples"',
+        ),
+    ],
+)
+def test_what_does_not_fit_a_can_source_is_refused_with_its_key(change, key, words):
+    with pytest.raises(ValidationError, match=words) as refusal:
+        CanSettings.model_validate(CAN | change)
+    assert refusal.value.errors()[0]["ctx"]["error"].at == (key,)
+
+
+CAN_OWN = ({"signals": {"x": "A.b"}}, {"counters": ["A.b"]}, {"epoch": "A.b"})
+
+
+@pytest.mark.parametrize(
+    ("source", "words"),
+    [
+        (CAN | {"signals": {"x": "no dot"}}, "pattern"),
+        (CAN | {"signals": {"x": "A.b c"}}, "pattern"),
+        (CAN | {"signals": {"x": []}}, "at least 1"),
+        (CAN | {"interface": "Slcan!"}, "pattern"),
+        (CAN | {"bitrate": 7}, "greater than or equal"),
+        (CAN | {"receive_buffer": 1}, "greater than or equal"),
+        (CAN | {"hold_samples": 0}, "greater than or equal"),
+        (CAN | {"when_full": "block"}, "drop"),
+        (CAN | {"options": {"a b": 1}}, "pattern"),
+        (CAN | {"stale_after": 3.0}, "Extra inputs"),
+        *((CAN_PROFILE | own, "the profile knows its own") for own in CAN_OWN),
+    ],
+)
+def test_a_wrong_value_of_a_can_source_is_refused(source, words):
+    with pytest.raises(ValidationError, match=words):
+        CanSettings.model_validate(source)
+
+
+@pytest.mark.parametrize(
+    ("channels", "slow", "words"),
+    [
+        (["x"], ["oil"], "no such channel; there are x"),
+        (["x", "y", "z"], ["oil"], "has no signal for z"),
+        (["x", "y"], [], "no such channel; there are none"),
+        (["x", "y"], ["oil", "speed"], "has no signal for speed"),
+    ],
+)
+def test_channels_and_signals_of_can_must_be_one_to_one(channels, slow, words):
+    with pytest.raises(ValueError, match=words):
+        CanSettings.model_validate(CAN).check_channels(channels, slow)
