@@ -165,7 +165,7 @@ class _Bearing:
             slow_results(segments, slow_channels(unit, self._bearing)),
             position_results(unit, self._bearing, segments, last_growth),
             self._order("order1_", ORDER1),
-            with_budgets(self._lines[ORDER1].phases(), "order1_"),
+            with_budgets(self._lines[ORDER1].phases(self._line_quality), "order1_"),
             overall_readings(
                 segments, self._rows, self._bearing, unit.bearings.index(self._bearing)
             ),
@@ -211,7 +211,7 @@ class _Bearing:
         has_phase = np.array([segment.has_phase[:, self._rows] for segment in self._segments])
         orders = average(self._order_hz, self._phasors, self._usable[:, ORDER1])
         lines = []
-        for line, quality in ((ORDER1, self._line_quality), (VORTEX, self._vortex_quality)):
+        for line in (ORDER1, VORTEX):
             of_line, at = orders, line
             if self.spectrum is None:
                 parts = self._phasors[:, :, line : line + 1], self._usable[:, line]
@@ -229,7 +229,6 @@ class _Bearing:
                     line=line,
                     bins=self.spectrum,
                     min_segments=self._min_segments,
-                    quality=quality,
                     phasors_um_pk=self._phasors[:, :, line],
                     usable=self._usable[:, line],
                     has_phase=has_phase[:, line],
@@ -259,7 +258,8 @@ class _Bearing:
         )
 
     def _order(self, prefix: str, line: int) -> Found:
-        found = self._lines[line].readings()
+        quality_of = self._line_quality if line == ORDER1 else self._vortex_quality
+        found = self._lines[line].readings(quality_of)
         return with_budgets({**found, "frequency_hz": self._frequency(line)}, prefix)
 
     def _dynamic(self) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:

@@ -59,6 +59,10 @@ AMPLITUDES = {
 }
 
 
+QualityOf = Callable[..., Quality | Reading]
+"""Quality of a reading from some channels at a line, or the reason why there is none."""
+
+
 @dataclass(frozen=True)
 class OrderLine:
     """An order line of one bearing over some segments or polls.
@@ -75,8 +79,6 @@ class OrderLine:
         Cross-spectrum at the bins, for the surroundings of the line; None of polls.
     min_segments
         Independent segments or polls below which there is no `transfer`.
-    quality
-        Quality of a reading from some channels at this line, or the reason why there is none.
     phasors_um_pk, usable, has_phase : (n, 4)
         Of each segment or poll: the line, whether the channel counts, whether its phase is known.
     at_mark_um_pk, has_mark : (n, 4)
@@ -94,7 +96,6 @@ class OrderLine:
     line: int
     bins: CrossSpectrum | None
     min_segments: int
-    quality: Callable[..., Quality | Reading]
     phasors_um_pk: ComplexArray
     usable: npt.NDArray[np.bool_]
     has_phase: npt.NDArray[np.bool_]
@@ -115,17 +116,23 @@ class OrderLine:
         both = self.usable[:, first] & self.usable[:, last]
         return n_changed(*np.abs(self.phasors_um_pk[both][:, [first, last]]).T)
 
-    def readings(self) -> dict[str, Budgeted]:
+    def readings(self, quality_of: QualityOf) -> dict[str, Budgeted]:
         """Amplitudes, roundness, coherence, equation (5) and transfer, by quantity."""
-        amplitudes = {f"{name}_um_pk": self._amplitude(p) for name, p in AMPLITUDES.items()}
-        found = {**amplitudes, "roundness": self._roundness()}
+        found = {
+            f"{name}_um_pk": self._amplitude(place, quality_of(place))
+            for name, place in AMPLITUDES.items()
+        }
+        found["roundness"] = self._roundness(quality_of(SHAFT_X, SHAFT_Y))
         for axes, (shaft, bearing) in DIRECTIONS.items():
-            found |= self._direction(axes, shaft, bearing)
+            found |= self._direction(axes, shaft, bearing, quality_of(shaft, bearing))
         return found
 
-    def phases(self) -> dict[str, Budgeted]:
+    def phases(self, quality_of: QualityOf) -> dict[str, Budgeted]:
         """Phases of the mean 1× vectors at the mark, deg, positive where a vector leads."""
-        return {f"{name}_phase_deg": self._phase(place) for name, place in AMPLITUDES.items()}
+        return {
+            f"{name}_phase_deg": self._phase(place, quality_of(place))
+            for name, place in AMPLITUDES.items()
+        }
 
     def axes_quality(self, rotation_sense: int) -> Quality:
         """Whether shaft and bearing whirl with the rotation, where their line stands out."""
@@ -159,8 +166,7 @@ class OrderLine:
             return None
         return average(self.orders.frequency_hz, self.phasors_um_pk[:, :, np.newaxis], known)
 
-    def _amplitude(self, place: int) -> Budgeted:
-        quality = self.quality(place)
+    def _amplitude(self, place: int, quality: Quality | Reading) -> Budgeted:
         if isinstance(quality, Reading):
             return quality, None
         amplitude = float(self.orders.amplitude_um_pk(place)[self.at])
@@ -168,8 +174,7 @@ class OrderLine:
         lines = amplitude_lines(self.bearing, place, amplitude, self._runout_um_pk(place))
         return Reading(amplitude, quality), amplitude_budget(amplitude, counted, lines)
 
-    def _phase(self, place: int) -> Budgeted:
-        quality = self.quality(place)
+    def _phase(self, place: int, quality: Quality | Reading) -> Budgeted:
         if isinstance(quality, Reading):
             return quality, None
         if not self.has_mark[-1, place]:
@@ -182,8 +187,8 @@ class OrderLine:
         lines = phase_lines(self._runout_um_pk(place), abs(mean))
         return Reading(phase_deg, quality), phase_budget(phase_deg, vectors, lines)
 
-    def _roundness(self) -> Budgeted:
-        quality, phased = self.quality(SHAFT_X, SHAFT_Y), self._phased(SHAFT_X, SHAFT_Y)
+    def _roundness(self, quality: Quality | Reading) -> Budgeted:
+        phased = self._phased(SHAFT_X, SHAFT_Y)
         if isinstance(quality, Reading) or phased is None:
             nothing = quality if isinstance(quality, Reading) else missing(Reason.NOT_MEASURED)
             return nothing, None
@@ -210,7 +215,9 @@ class OrderLine:
         power = phased.power[self.at]
         return bool(min(power[x, y], power[y, x]) > least_um_pk**2)
 
-    def _direction(self, axes: str, shaft: int, bearing: int) -> dict[str, Budgeted]:
+    def _direction(
+        self, axes: str, shaft: int, bearing: int, quality: Quality | Reading
+    ) -> dict[str, Budgeted]:
         """Coherence, equation (5) and transfer of one direction."""
         coherence, k_eff, k, c = (
             f"coherence_{axes}",
@@ -218,7 +225,6 @@ class OrderLine:
             f"transfer_k_{axes}_n_per_m",
             f"transfer_c_{axes}_n_s_per_m",
         )
-        quality = self.quality(shaft, bearing)
         if isinstance(quality, Reading):
             found = dict.fromkeys((coherence, k_eff, k, c), (quality, None))
             return found | ({} if self.bins is not None else {coherence: NOT_MEASURED})

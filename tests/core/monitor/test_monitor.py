@@ -1,5 +1,6 @@
 """The unit monitor: from sample blocks to assessments, and what it refuses to say."""
 
+import gc
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -72,6 +73,20 @@ def test_the_machine_reads_its_stiffness_its_position_and_its_orbit(
     turn = 2 * np.pi * 92.3 / 60 * np.arange(SEGMENT - n, SEGMENT) / RATE_HZ
     np.testing.assert_allclose(orbit.shaft_x_um, 60 * np.cos(turn), atol=1.5)
     np.testing.assert_allclose(orbit.shaft_y_um, 60 * np.sin(turn), atol=1.5)
+
+
+def test_what_a_result_was_made_of_goes_at_once_without_a_search_for_cycles(
+    monitor: UnitMonitor, blocks, signals
+) -> None:
+    """The arrays of one evaluation are a megabyte: twenty units fill 60 MiB between searches."""
+    stream = list(blocks(signals(40.0)))
+    gc.collect()
+    gc.disable()
+    try:
+        assert len(watch(monitor, stream)) == 3
+        assert gc.collect() == 0
+    finally:
+        gc.enable()
 
 
 def test_a_vortex_off_its_nominal_order_is_found_and_read_true(results: Results, signals) -> None:
