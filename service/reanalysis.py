@@ -16,7 +16,6 @@ from service.api.models import (
     Time,
     WindowModel,
 )
-from service.api.times import rfc3339
 from service.api.views import (
     estimator_names,
     quality_model,
@@ -24,6 +23,7 @@ from service.api.views import (
     runout_names,
     window_model,
 )
+from service.runtime.times import rfc3339
 
 
 class AssessmentModel(ApiModel):

@@ -3,8 +3,8 @@
 from core.machine.unit import Bearing
 from core.quality import Level
 from core.units import s_from_ns
-from service.api.times import rfc3339
 from service.references import opposite_axes
+from service.runtime.times import rfc3339
 from service.store.gap_reference import MicrometrePair
 from service.store.port import StoredReadings
 

@@ -12,8 +12,8 @@ from service.api.alarm_rate_models import AlarmRatesModel
 from service.api.alarm_rate_views import alarm_rates_model, counted
 from service.api.bearing_routes import Moment
 from service.api.context import Context
+from service.api.parameters import ns_from_datetime, require_order
 from service.api.problems import ProblemError, described_problems
-from service.api.times import ns_from_datetime, require_order
 from service.security.roles import Permission
 from service.store.port import AlarmQuery
 

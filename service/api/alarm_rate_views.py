@@ -9,7 +9,7 @@ from core.limits import AlarmLevel
 from service.api.alarm_rate_models import AlarmFiguresModel, AlarmRatesModel, FrequentModel
 from service.api.alarm_views import LEVEL_NAMES, alarm_model
 from service.api.ports import AlarmBoard, FilmBoard
-from service.api.times import rfc3339
+from service.runtime.times import rfc3339
 from service.store.port import AlarmQuery, Store
 
 MAX_RATED = 100_000

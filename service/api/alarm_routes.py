@@ -43,11 +43,11 @@ from service.api.bearing_routes import (
 from service.api.context import Context
 from service.api.film_conditions import states_named
 from service.api.film_routes import States
+from service.api.parameters import ns_from_datetime, require_order
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered, worked
 from service.api.shared import SharedAnswer
 from service.api.tables import Format, table_content, table_response
-from service.api.times import ns_from_datetime, require_order
 from service.load.allowance import Allowance
 from service.security.roles import Permission
 from service.settings.alarm_kinds import AlarmKindName

@@ -18,8 +18,8 @@ from service.api.alarm_names import AlarmLevelName
 from service.api.film_conditions import STATE_NAMES, cell_of, condition_model
 from service.api.film_models import FilmConditionModel
 from service.api.ports import AlarmBoard, FilmBoard
-from service.api.times import rfc3339
 from service.origin import Origin
+from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
 from service.store.port import StoredEvent
 

@@ -7,7 +7,7 @@ from pydantic import BeforeValidator, Field
 
 from service.api.alarm_requests import Actor, Words
 from service.api.models import ApiModel, EstimatorName, RequestModel, Time
-from service.api.times import written_as_date
+from service.api.parameters import written_as_date
 
 BaselineStatusName = Literal["in_force", "rejected", "superseded", "learned"]
 

@@ -23,9 +23,9 @@ from service.api.baseline_views import (
 )
 from service.api.context import BearingId, Context, UnitId
 from service.api.film_routes import watched_place
+from service.api.parameters import ns_from_datetime
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered, worked
-from service.api.times import ns_from_datetime, rfc3339
 from service.films.actions import (
     Accept,
     Action,
@@ -37,6 +37,7 @@ from service.films.actions import (
 )
 from service.films.progress import learning_progress
 from service.films.versions import versions_after
+from service.runtime.times import rfc3339
 from service.security.roles import Permission
 from service.store.documents import BASELINE, FORMAT_VERSION, to_json
 

@@ -17,10 +17,10 @@ from service.api.bearing_views import bearing_model
 from service.api.budget_models import BudgetModel
 from service.api.context import BearingId, Context, QuantityName, UnitId
 from service.api.models import LatestModel
+from service.api.parameters import ns_from_datetime, require_order, written_as_date
 from service.api.problems import ProblemError, problem_responses
 from service.api.rendering import Renderings, rendered
 from service.api.series_models import GapModel, OrbitModel, SpectrumModel
-from service.api.times import ns_from_datetime, require_order, rfc3339, written_as_date
 from service.api.views import (
     budget_model,
     latest_model,
@@ -28,6 +28,7 @@ from service.api.views import (
     spectrum_model,
 )
 from service.live import CurrentBearing
+from service.runtime.times import rfc3339
 from service.security.roles import Permission
 from service.store.value_range import ValueRange
 

@@ -2,7 +2,7 @@
 
 from core.machine.unit import Bearing
 from service.api.bearing_models import BearingModel, ReferenceModel, SetReferenceModel
-from service.api.times import rfc3339
+from service.runtime.times import rfc3339
 from service.store.gap_reference import GapReference
 
 

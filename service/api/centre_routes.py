@@ -14,11 +14,11 @@ from service.api.film_routes import States
 from service.api.problems import problem_responses
 from service.api.rendering import rendered, worked
 from service.api.tables import Column, Format, table_content, table_response
-from service.api.times import rfc3339
 from service.api.trend_routes import HOLE_HOPS, MAX_POINTS
 from service.api.trend_tables import trend_table
 from service.api.trend_views import bucket_s, simulated_until, times_s, trend_columns
 from service.api.views import LEVEL_NAMES
+from service.runtime.times import rfc3339
 from service.security.roles import Permission
 from service.store.codec import U_RANDOM, U_SYSTEMATIC
 from service.store.port import Trend, TrendQuery

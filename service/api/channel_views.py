@@ -15,8 +15,8 @@ from service.api.channel_models import (
     WaveformChannelModel,
 )
 from service.api.ports import LiveLook
-from service.api.times import rfc3339
 from service.api.views import quality_model
+from service.runtime.times import rfc3339
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
 from service.settings.channels import ChannelSettings, SlowChannelSettings
 from service.settings.modbus_sources import ModbusVectorSettings

@@ -7,9 +7,9 @@ from service.api.context import Context
 from service.api.delivery_models import DeadLetterModel, DeliveryModel, ReceiverModel
 from service.api.problems import problem_responses
 from service.api.rendering import rendered_now
-from service.api.times import rfc3339
 from service.delivery.deliveries import ReceiverView
 from service.delivery.sender import SenderStatus
+from service.runtime.times import rfc3339
 from service.security.roles import Permission
 from service.store.outbox_port import Backlog, LetterState, StoredLetter
 

@@ -16,12 +16,12 @@ from service.api.alarm_views import LEVEL_NAMES
 from service.api.context import Context
 from service.api.evidence_models import OccurrenceModel, OccurrencesModel
 from service.api.problems import ProblemError, described_problems
-from service.api.times import rfc3339
 from service.evidence.archive import DamagedEvidenceError, EvidenceState, Occurrence
 from service.evidence.desk import EvidenceDesk, Found, TooManyDownloadsError
 from service.evidence.document import Evidence
 from service.evidence.report.page import POLICY
 from service.evidence.tables import TableError
+from service.runtime.times import rfc3339
 from service.security.roles import Permission
 from service.settings.alarm_kinds import ALARM_KINDS
 

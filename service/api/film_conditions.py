@@ -6,7 +6,7 @@ from typing import cast
 from core.condition.cells import BearingCondition, Cell, CellGrid, FilmConditions, OperatingPoint
 from core.condition.operating_state import OperatingState
 from service.api.film_models import CellModel, FilmConditionModel, OperatingStateName
-from service.api.times import rfc3339
+from service.runtime.times import rfc3339
 
 STATE_NAMES = {state: cast("OperatingStateName", state.name.lower()) for state in OperatingState}
 

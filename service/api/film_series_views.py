@@ -13,7 +13,7 @@ from core.units import NS_PER_S
 from service.api.film_conditions import STATE_NAMES
 from service.api.film_series_models import EvidenceName, FilmReadingsModel, FilmSeriesModel
 from service.api.film_views import level_name, verdict_name
-from service.api.times import rfc3339
+from service.runtime.times import rfc3339
 from service.store.film_port import FilmHistory, FilmQuery
 
 Rows = npt.NDArray[np.int64]

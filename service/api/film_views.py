@@ -26,8 +26,8 @@ from service.api.film_models import (
     LevelHeldName,
     VerdictName,
 )
-from service.api.times import rfc3339
 from service.live import CurrentBearing
+from service.runtime.times import rfc3339
 
 CURRENT_PERIODS = 2.5
 """A reading older than so many periods, by the newest result, is no longer current."""

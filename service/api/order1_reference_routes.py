@@ -14,7 +14,7 @@ from service.api.order1_reference_models import (
     VectorModel,
 )
 from service.api.problems import ProblemError, described_problems, problem_responses
-from service.api.times import rfc3339
+from service.runtime.times import rfc3339
 from service.security.roles import Permission
 from service.store.vector_reference_port import SetVectorReference
 

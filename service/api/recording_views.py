@@ -10,8 +10,8 @@ from service.api.recording_models import (
     RecordingInfoModel,
     RecordingModel,
 )
-from service.api.times import rfc3339
 from service.recordings.shelf import Kept, Shelf
+from service.runtime.times import rfc3339
 
 
 def recording_model(kept: Kept) -> RecordingModel:

@@ -5,7 +5,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
 from service.api.entity_tags import digest_of, is_known, tag_of
-from service.api.times import rfc3339
+from service.runtime.times import rfc3339
 
 TIME_HEADER = "Padwatch-Time"
 """When an answer was given: by it, ages are counted on in a body that was kept."""

@@ -10,8 +10,8 @@ from service.api.film_conditions import STATE_NAMES
 from service.api.problems import ProblemError
 from service.api.series_models import PlaceName
 from service.api.spectra_models import PlaceSpectraModel, SpectraModel
-from service.api.times import rfc3339
 from service.api.views import LEVEL_NAMES, PLACES
+from service.runtime.times import rfc3339
 from service.store.spectra_port import Spectra, SpectraQuery, StoredSpectrum
 
 MAX_NUMBERS = 2_000_000

@@ -12,8 +12,8 @@ import pyarrow.parquet as pq
 from fastapi import Depends, Query, Request
 from fastapi.responses import StreamingResponse
 
-from service.api.times import rfc3339
 from service.audit.csv_file import harmless
+from service.runtime.times import rfc3339
 
 FormatName = Literal["json", "csv", "parquet"]
 ColumnKind = Literal["time", "number", "count", "text", "flag"]

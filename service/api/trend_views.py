@@ -5,9 +5,9 @@ from collections.abc import Iterable, Mapping
 from core.monitor.catalogue import BY_NAME
 from core.units import NS_PER_S
 from service.api.series_models import TrendGroupModel, TrendModel, TrendSeriesModel
-from service.api.times import rfc3339
 from service.api.trend_groups import TrendGroup
 from service.api.views import LEVEL_NAMES
+from service.runtime.times import rfc3339
 from service.store.codec import U_RANDOM, U_SYSTEMATIC, columns_of
 from service.store.port import Trend, TrendQuery, TrendSeries
 

@@ -25,8 +25,8 @@ from service.api.series_models import (
     SpectrumChannelModel,
     SpectrumModel,
 )
-from service.api.times import rfc3339
 from service.live import CurrentBearing, UnitStatus
+from service.runtime.times import rfc3339
 
 LEVEL_NAMES: dict[Level, LevelName] = {
     Level.GOOD: "good",

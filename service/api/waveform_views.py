@@ -12,8 +12,8 @@ from core.units import ns_from_s
 from service.api.channel_models import ChannelSamplesModel, WaveformModel
 from service.api.channel_views import UNITS
 from service.api.film_series_views import listed
-from service.api.times import rfc3339
 from service.api.views import quality_model
+from service.runtime.times import rfc3339
 from service.settings.units import UnitSettings
 
 

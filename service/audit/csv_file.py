@@ -5,8 +5,8 @@ from collections.abc import Iterable
 from dataclasses import astuple, fields
 from typing import TextIO
 
-from service.api.times import rfc3339
 from service.audit.entry import AuditEntry
+from service.runtime.times import rfc3339
 
 HEADER = ("time", *(field.name for field in fields(AuditEntry)))
 

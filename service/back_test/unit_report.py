@@ -12,7 +12,6 @@ from core.change.cause import Attribution
 from core.change.decision import JUDGED, Verdict
 from core.condition.operating_state import OperatingState
 from core.units import NS_PER_S
-from service.api.times import rfc3339
 from service.back_test.alarm_stretches import AlarmStretch, Change, alarm_stretches
 from service.back_test.bearing_run import BearingRun, PeriodRun
 from service.back_test.causes import UnitCauses
@@ -24,6 +23,7 @@ from service.back_test.report import (
     FilmReport,
     SupportReport,
 )
+from service.runtime.times import rfc3339
 
 LATER_NS = 24 * 3600 * NS_PER_S
 """After an alarm, when its cause is looked at again."""

@@ -13,8 +13,8 @@ from acquisition.recordings.manifest import checksum_of
 from acquisition.recordings.writer import RecordingWriter
 from core.alarms.alarm import AlarmEvent
 from core.samples.blocks import SampleBlock
-from service.api.times import rfc3339
 from service.capture.folders import ALARM, aside, capture_folder
+from service.runtime.times import rfc3339
 
 MakeWriter = Callable[[Path, str], RecordingWriter]
 """Opens a recording of the unit: folder and who made it."""

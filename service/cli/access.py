@@ -8,8 +8,8 @@ import typer
 
 from service.audit.acting import Acting, acting_as
 from service.audit.entry import Source
-from service.cli.made_by import made_by
 from service.cli.plant_file import fail
+from service.runtime.made_by import made_by
 from service.security.names import NameRefusedError
 from service.security.passwords import PasswordRefusedError
 from service.settings.plant import PlantFile

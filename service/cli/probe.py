@@ -13,10 +13,10 @@ from pydantic import ValidationError
 from acquisition.errors import AcquisitionError
 from acquisition.modbus.cells import ByteOrder
 from core.machine.channel import Measurand
-from service.api.times import rfc3339
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.units import UnitOption, one_unit
 from service.probing import RegisterLook, RingLook, ValueLook, looks, ring_look, value_looks
+from service.runtime.times import rfc3339
 from service.settings.map_file import load_map_file
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_map import RegisterMapSettings

@@ -15,7 +15,6 @@ from acquisition.errors import AcquisitionError
 from acquisition.source import SampleSource
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
-from service.api.times import rfc3339
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.units import UnitOption, one_unit
 from service.conversion import analysis_of, calibration_of, machine_of
@@ -26,6 +25,7 @@ from service.reanalysis import (
     calibration_differences,
     is_full,
 )
+from service.runtime.times import rfc3339
 from service.wiring.recordings import recording_of, recording_source, selection_of
 
 

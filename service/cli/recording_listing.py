@@ -6,7 +6,7 @@ from typing import Any
 from acquisition.delivery.units import UNIT_OF
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.summary import RecordingSummary
-from service.api.times import rfc3339
+from service.runtime.times import rfc3339
 
 GAPS_PRINTED = 20
 

@@ -11,7 +11,6 @@ from acquisition.clock import SystemClock
 from core.machine.unit import Bearing
 from service.audit.acting import Acting, acting_as
 from service.audit.entry import Source
-from service.cli.made_by import person
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.reference_listing import BearingReferences, bearing_references, text_lines
 from service.cli.units import UnitOption, one_unit
@@ -23,6 +22,7 @@ from service.reference_setting import (
     given_gaps,
     measured_gaps,
 )
+from service.runtime.made_by import person
 from service.settings.plant import PlantFile
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import Store, StoreError

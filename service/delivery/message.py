@@ -10,8 +10,8 @@ from uuid import uuid4
 from core.alarms.alarm import Alarm, AlarmEvent
 from core.alarms.kinds import FILM_KINDS
 from service.api.alarm_views import LEVEL_NAMES
-from service.api.times import rfc3339
 from service.delivery.facts import Fact, LookAround, Surroundings
+from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
 
 FORMAT = 1

@@ -14,11 +14,11 @@ from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import ANNOUNCED, AlarmEvent
 from service.capture.span import is_captured
 from service.evidence.capture_link import CapturePart, linked
-from service.evidence.clock_words import compact
 from service.evidence.configuration import canonical
 from service.evidence.document import Evidence
 from service.evidence.folders import DOCUMENT, Place, kept_since_ns, parsed, places, removed
 from service.evidence.keeper import EvidenceFolders
+from service.runtime.times import compact
 from service.store.film_port import FilmStore
 from service.store.port import AlarmQuery, Store
 

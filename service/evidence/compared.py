@@ -12,7 +12,6 @@ from core.change.decision import Decision
 from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
 from core.condition.cells import Cell, FilmConditions
-from service.api.times import rfc3339
 from service.evidence.bearing_part import AXES, Direction
 from service.evidence.comparison_part import (
     BaselinePart,
@@ -24,6 +23,7 @@ from service.evidence.comparison_part import (
 from service.evidence.described import cell_bounds
 from service.evidence.members import Members
 from service.evidence.part import finite, rounded
+from service.runtime.times import rfc3339
 
 N_EXPECTED = 60
 """Points of the line that shows what is expected."""

@@ -5,7 +5,6 @@ from typing import Any
 
 from core.change.settings import FilmRules
 from service.api.alarm_views import LEVEL_NAMES
-from service.api.times import rfc3339
 from service.evidence.bearing_part import Direction
 from service.evidence.configuration import canonical, without_secrets
 from service.evidence.described import bearing_part
@@ -13,6 +12,7 @@ from service.evidence.document import FORMAT, VERSION, AlarmPart, Evidence, Unit
 from service.evidence.maker import Maker
 from service.evidence.part import finite
 from service.evidence.snapshot import BearingSnapshot, Snapshot
+from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
 from service.settings.plant import PlantFile
 

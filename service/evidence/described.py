@@ -14,7 +14,6 @@ from core.quality import Level, Reading
 from core.stiffness.estimators import ESTIMATORS
 from core.uncertainty import Budget
 from service.api.alarm_views import LEVEL_NAMES
-from service.api.times import rfc3339
 from service.evidence.bearing_part import (
     AXES,
     BearingPart,
@@ -30,6 +29,7 @@ from service.evidence.bearing_part import (
     WindowPart,
 )
 from service.evidence.part import finite
+from service.runtime.times import rfc3339
 
 LEVEL_WORDS: dict[Level, QualityWord] = {
     Level.GOOD: "good",

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.alarms.alarm import AlarmEvent
-from service.evidence.clock_words import compact
 from service.evidence.files import write_whole
+from service.runtime.times import compact
 
 DOCUMENT, CAPTURE = "evidence.json", "capture.json"
 

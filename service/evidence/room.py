@@ -7,9 +7,9 @@ from pathlib import Path
 
 from acquisition.clock import Clock
 from core.units import NS_PER_S
-from service.evidence.clock_words import compact
 from service.evidence.files import sync_folder, write_whole
 from service.evidence.folders import INCOMPLETE, REMOVED, Place, places, removed
+from service.runtime.times import compact
 
 MAX_REMOVED = 10_000
 """Names that are remembered of each unit."""

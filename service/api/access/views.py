@@ -5,7 +5,7 @@ from typing import Any
 from service.api.access.account_models import AccountModel
 from service.api.access.desk import AccessDesk, Caller
 from service.api.access.session_models import SessionModel
-from service.api.times import rfc3339
+from service.runtime.times import rfc3339
 from service.security.keys import ApiKey
 from service.security.roles import Permission, Role
 from service.store.access_port import Account

@@ -2,12 +2,12 @@
 
 from html import escape
 
-from service.evidence.clock_words import day_and_time
 from service.evidence.report.case import Case
 from service.evidence.report.figures import figures
 from service.evidence.report.style import STYLE
 from service.evidence.report.tables import estimators_table, events_table, films_table, footer
 from service.evidence.report.words import facts, headline, shortened, story
+from service.runtime.times import day_and_time
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
 """For the header of the answer and for the page that somebody opens from a bundle."""

@@ -6,10 +6,10 @@ from html import escape
 from core.alarms.alarm import AlarmEvent
 from core.stiffness.estimators import ESTIMATORS
 from service.evidence.bearing_part import AXES, BearingPart, EstimatorPart, FindingPart, ReadingPart
-from service.evidence.clock_words import day_and_time
 from service.evidence.document import Evidence
 from service.evidence.report.case import Case
 from service.evidence.report.words import CAUSES, change_words, plain, shortened
+from service.runtime.times import day_and_time
 
 GN_PER_M = 1e9
 

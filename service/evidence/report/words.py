@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from core.alarms.alarm import AlarmChange
 from core.alarms.kinds import FILM_KINDS
 from service.evidence.bearing_part import BearingPart, FindingPart, ReadingPart
-from service.evidence.clock_words import day_and_time
 from service.evidence.document import Evidence
 from service.evidence.report.case import Case
+from service.runtime.times import day_and_time
 from service.settings.alarm_kinds import kind_words
 
 SURE_95 = 1.96

@@ -8,8 +8,8 @@ import pytest
 
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
-from service.api.times import rfc3339
 from service.live import LinkState
+from service.runtime.times import rfc3339
 
 UJB = "/api/v1/units/U1/bearings/UJB"
 K = "order1_k_eff_xx_n_per_m"

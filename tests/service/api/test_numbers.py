@@ -8,8 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from service.api.parameters import ns_from_datetime
 from service.api.problems import ProblemError
-from service.api.times import ns_from_datetime, rfc3339
+from service.runtime.times import rfc3339
 
 NONE = ("nan", "inf", "-inf", "Infinity", "1e999")
 

@@ -19,7 +19,6 @@ from core.change.decision import WatchedReadings
 from core.change.settings import ChangeLimits
 from core.change.shaft_response import film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
-from service.api.times import rfc3339
 from service.back_test.bearing_run import BackTestRules
 from service.back_test.exporting import export_baselines
 from service.back_test.file_columns import ReadingsError
@@ -27,6 +26,7 @@ from service.back_test.histories import BearingRows, Place
 from service.back_test.periods import DAY_NS, Learning, MachineEvent
 from service.back_test.reading import read_histories
 from service.back_test.running import Found, run_back_test
+from service.runtime.times import rfc3339
 from service.store.documents import baseline_from_json
 
 START_NS = 19_723 * DAY_NS

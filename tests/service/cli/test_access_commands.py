@@ -12,7 +12,7 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from service.cli.commands import app
-from service.cli.made_by import made_by
+from service.runtime.made_by import made_by
 from service.security.backoff import Backoff
 from service.security.doors import Doors, LoggedIn, Refusal
 from service.security.identity import Identity

@@ -7,7 +7,7 @@ import pytest
 from rigs.probes import post
 
 from core.baseline.history import StiffnessHistory, Watched
-from service.api.times import rfc3339
+from service.runtime.times import rfc3339
 from service.store.documents import baseline_from_json
 
 BASELINES = "/api/v1/units/U1/bearings/UJB/baselines"

@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from core.baseline.history import StiffnessHistory
-from service.api.times import rfc3339
+from service.runtime.times import rfc3339
 
 READINGS = "/api/v1/units/U1/bearings/UJB/film/readings"
 DAY_NS = 86_400_000_000_000

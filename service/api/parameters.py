@@ -1,18 +1,12 @@
 """Time at the API: RFC 3339 in UTC outside, nanoseconds inside."""
 
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 
 from core.units import NS_PER_S
 from service.api.problems import ProblemError
+from service.runtime.times import EPOCH, rfc3339
 
-EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
-
-
-def rfc3339(time_ns: int) -> str:
-    """Time to the millisecond; exact down to that, whatever the year."""
-    moment = EPOCH + timedelta(microseconds=time_ns // 1_000_000 * 1000)
-    return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def written_as_date(text: object) -> object:

@@ -1,8 +1,16 @@
-"""Times in names of folders and in reports."""
+"""Times as text, in UTC: RFC 3339 for machines, to the second for people."""
 
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 from core.units import NS_PER_S
+
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def rfc3339(time_ns: int) -> str:
+    """Time to the millisecond; exact down to that, whatever the year."""
+    moment = EPOCH + timedelta(microseconds=time_ns // 1_000_000 * 1000)
+    return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def compact(time_ns: int) -> str:

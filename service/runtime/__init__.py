@@ -1,0 +1,1 @@
+"""A process and its machine: loops, heartbeats, files, disks, times, tables."""
