@@ -20,11 +20,11 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
 from core.quality import GOOD, Reading, Reason, bad
 from core.samples.blocks import DeviceClock, SampleBlock
-from service.conversion import calibration_of, machine_of
-from service.origin import Origin
+from service.app.captures import captures_of
+from service.app.simulations import simulated_feed
+from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file
-from service.wiring.captures import captures_of
-from service.wiring.simulations import simulated_feed
+from service.settings.origin import Origin
 
 DEMO = Path(__file__).parents[1] / "deploy" / "demo.toml"
 LIMIT_US = 100.0

@@ -11,10 +11,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.demo.past import fill
+from service.app.simulated_lives import simulated_history
+from service.app.stores import open_store
+from service.cli.offline.demo.past import fill
 from service.settings.loading import load_plant_file
-from service.wiring.simulated_lives import simulated_history
-from service.wiring.stores import open_store
 
 DEMO = Path(__file__).parents[1] / "deploy" / "demo-life.toml"
 PADWATCH = (sys.executable, "-m", "service.cli.main")

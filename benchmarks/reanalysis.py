@@ -15,10 +15,10 @@ from pathlib import Path
 from acquisition.clock import SystemClock
 from acquisition.delivery.blocks import BlockAssembler
 from acquisition.recordings.writer import RecordingWriter
-from service.conversion import calibration_of
+from service.app.simulations import simulated_feed
+from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
-from service.wiring.recorded_units import recorded_unit
-from service.wiring.simulations import simulated_feed
+from service.settings.recorded_units import recorded_unit
 
 PLANT = Path(__file__).parents[1] / "deploy" / "demo.toml"
 SECONDS = 3600.0

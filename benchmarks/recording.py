@@ -13,14 +13,14 @@ from pathlib import Path
 from acquisition.clock import SystemClock
 from acquisition.delivery.blocks import BlockAssembler
 from core.samples.blocks import SampleBlock
-from service.continuous.joining import join
-from service.continuous.pieces import TapeSettings
-from service.continuous.unit_tape import UnitTape
-from service.conversion import calibration_of
+from service.app.simulations import simulated_feed
+from service.recordings.continuous.joining import join
+from service.recordings.continuous.pieces import TapeSettings
+from service.recordings.continuous.unit_tape import UnitTape
+from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
+from service.settings.recorded_units import recorded_unit
 from service.settings.units import UnitSettings
-from service.wiring.recorded_units import recorded_unit
-from service.wiring.simulations import simulated_feed
 
 PLANT = Path(__file__).parents[1] / "deploy" / "demo.toml"
 SECONDS = 1200.0

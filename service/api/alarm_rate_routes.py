@@ -7,14 +7,14 @@ from fastapi import APIRouter, Query
 
 from core.alarms.alarm import PLANT
 from core.alarms.statistics import DAY_NS
-from service.api.access.declared import Reach, needs
 from service.api.alarm_rate_models import AlarmRatesModel
 from service.api.alarm_rate_views import alarm_rates_model, counted
+from service.api.auth.declared import Reach, needs
 from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.parameters import ns_from_datetime, require_order
 from service.api.problems import ProblemError, described_problems
-from service.security.roles import Permission
+from service.store.access.roles import Permission
 from service.store.port import AlarmQuery
 
 DEFAULT_DAYS, MAX_DAYS = 7, 400

@@ -17,9 +17,6 @@ from core.alarms.operation import (
     Unshelve,
 )
 from core.units import ns_from_s
-from service.api.access.actors import actor_or
-from service.api.access.declared import Reach, needs
-from service.api.access.gate import identity_of
 from service.api.alarm_models import (
     AlarmEventsModel,
     AlarmListModel,
@@ -34,6 +31,9 @@ from service.api.alarm_requests import (
 )
 from service.api.alarm_tables import event_table
 from service.api.alarm_views import alarm_events_model, alarm_list_model, alarm_model, grid_of
+from service.api.auth.actors import actor_or
+from service.api.auth.declared import Reach, needs
+from service.api.auth.gate import identity_of
 from service.api.bearing_routes import (
     Moment,
     attitude_range,
@@ -43,14 +43,14 @@ from service.api.bearing_routes import (
 from service.api.context import Context
 from service.api.film_conditions import states_named
 from service.api.film_routes import States
+from service.api.load.allowance import Allowance
 from service.api.parameters import ns_from_datetime, require_order
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered, worked
 from service.api.shared import SharedAnswer
 from service.api.tables import Format, table_content, table_response
-from service.load.allowance import Allowance
-from service.security.roles import Permission
 from service.settings.alarm_kinds import AlarmKindName
+from service.store.access.roles import Permission
 from service.store.port import AlarmQuery
 from service.store.value_range import ValueRange
 

@@ -18,9 +18,9 @@ from service.api.alarm_names import AlarmLevelName
 from service.api.film_conditions import STATE_NAMES, cell_of, condition_model
 from service.api.film_models import FilmConditionModel
 from service.api.ports import AlarmBoard, FilmBoard
-from service.origin import Origin
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
+from service.settings.origin import Origin
 from service.store.port import StoredEvent
 
 LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {

@@ -4,15 +4,16 @@ from importlib.metadata import version
 
 from fastapi import Depends
 
-from service.api.access.account_routes import account_router
-from service.api.access.application import GuardedApi
-from service.api.access.desk import AccessDesk
-from service.api.access.key_routes import key_router
-from service.api.access.session_routes import session_router
 from service.api.alarm_rate_routes import alarm_rate_router
 from service.api.alarm_routes import alarm_by_id_router, alarm_router, operation_router
 from service.api.audit_routes import audit_router
 from service.api.audit_trail import AuditTrail
+from service.api.auth.account_routes import account_router
+from service.api.auth.application import GuardedApi
+from service.api.auth.desk import AccessDesk
+from service.api.auth.key_routes import key_router
+from service.api.auth.refusals import Refusals
+from service.api.auth.session_routes import session_router
 from service.api.baseline_routes import baseline_action_router, baseline_router
 from service.api.bearing_routes import bearing_router, gap_router
 from service.api.centre_routes import centre_router
@@ -20,9 +21,9 @@ from service.api.channel_routes import channel_router
 from service.api.configuration_routes import configuration_router
 from service.api.context import Context
 from service.api.delivery_routes import delivery_router
-from service.api.evidence_routes import evidence_router
 from service.api.film_routes import film_router
 from service.api.health_routes import health_router
+from service.api.metrics_routes import metrics_router
 from service.api.motion_routes import motion_router, recorded_motion_router
 from service.api.order1_reference_routes import order1_reference_router
 from service.api.origin_header import OriginHeader
@@ -38,10 +39,9 @@ from service.api.revalidation import Revalidation
 from service.api.source_routes import source_router
 from service.api.spectra_routes import spectra_router
 from service.api.trend_routes import trend_router
-from service.audit.refusals import Refusals
 from service.dashboard.edition import EditionHeader
 from service.dashboard.routes import dashboard_router
-from service.metrics.routes import metrics_router
+from service.reports.routes import evidence_router
 
 DESCRIPTION = """
 Oil-film stiffness of hydrogenerator guide bearings, measured while the machine runs.

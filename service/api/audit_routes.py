@@ -6,18 +6,18 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Response
 
-from service.api.access.declared import needs
 from service.api.audit_models import AuditEntryModel, AuditModel
 from service.api.audit_tables import audit_table
+from service.api.auth.declared import needs
 from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.parameters import ns_from_datetime, require_order
 from service.api.problems import described_problems
 from service.api.rendering import rendered, worked
 from service.api.tables import Format, table_content, table_response
-from service.audit.entry import MAX_NAME, AuditEntry
 from service.runtime.times import rfc3339
-from service.security.roles import Permission
+from service.store.access.audit_entry import MAX_NAME, AuditEntry
+from service.store.access.roles import Permission
 from service.store.audit_port import AuditQuery
 
 MAX_ENTRIES = 1000

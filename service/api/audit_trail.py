@@ -5,9 +5,9 @@ import json
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
-from service.audit.acting import Acting, acting, acting_as
-from service.audit.entry import Deed, Source
-from service.audit.refusals import Refusals
+from service.api.auth.refusals import Refusals
+from service.store.access.acting import Acting, acting, acting_as
+from service.store.access.audit_entry import Deed, Source
 
 SAFE = ("GET", "HEAD", "OPTIONS")
 

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Path, Response
 
 from core.baseline.baseline import BearingBaseline
-from service.api.access.actors import actor_or
-from service.api.access.declared import needs
+from service.api.auth.actors import actor_or
+from service.api.auth.declared import needs
 from service.api.baseline_models import (
     BaselineActionModel,
     BaselineModel,
@@ -26,7 +26,7 @@ from service.api.film_routes import watched_place
 from service.api.parameters import ns_from_datetime
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered, worked
-from service.films.actions import (
+from service.live.film_actions import (
     Accept,
     Action,
     BaselineRefusedError,
@@ -35,10 +35,10 @@ from service.films.actions import (
     Renew,
     Thaw,
 )
-from service.films.progress import learning_progress
-from service.films.versions import versions_after
+from service.live.learning_progress import learning_progress
 from service.runtime.times import rfc3339
-from service.security.roles import Permission
+from service.store.access.roles import Permission
+from service.store.baseline_versions import versions_after
 from service.store.documents import BASELINE, FORMAT_VERSION, to_json
 
 Version = Annotated[int, Path(ge=1, le=10**15, description="Version of a baseline.", examples=[3])]

@@ -22,9 +22,9 @@ from service.api.baseline_models import (
 )
 from service.api.film_conditions import bounds
 from service.api.models import EstimatorName
-from service.films.progress import RECENT_DAYS, LearningProgress
-from service.films.versions import Versions
+from service.live.learning_progress import RECENT_DAYS, LearningProgress
 from service.runtime.times import rfc3339
+from service.store.baseline_versions import Versions
 from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
 
 

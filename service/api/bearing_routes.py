@@ -11,7 +11,7 @@ from core.monitor.catalogue import BY_NAME
 from core.samples.gaps import Gap
 from core.stiffness.estimators import ESTIMATORS
 from core.units import ns_from_s
-from service.api.access.declared import needs
+from service.api.auth.declared import needs
 from service.api.bearing_models import BearingModel
 from service.api.bearing_views import bearing_model
 from service.api.budget_models import BudgetModel
@@ -27,9 +27,9 @@ from service.api.views import (
     orbit_model,
     spectrum_model,
 )
-from service.live import CurrentBearing
+from service.live.live_view import CurrentBearing
 from service.runtime.times import rfc3339
-from service.security.roles import Permission
+from service.store.access.roles import Permission
 from service.store.value_range import ValueRange
 
 Moment = Annotated[datetime, BeforeValidator(written_as_date)]

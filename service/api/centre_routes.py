@@ -5,7 +5,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Query, Response
 
 from core.units import ns_from_s
-from service.api.access.declared import needs
+from service.api.auth.declared import needs
 from service.api.bearing_routes import TimeRange, oil_temperature_range
 from service.api.centre_models import CentreColumnModel, CentreLineModel
 from service.api.context import BearingId, Context, UnitId
@@ -19,7 +19,7 @@ from service.api.trend_tables import trend_table
 from service.api.trend_views import bucket_s, simulated_until, times_s, trend_columns
 from service.api.views import LEVEL_NAMES
 from service.runtime.times import rfc3339
-from service.security.roles import Permission
+from service.store.access.roles import Permission
 from service.store.codec import U_RANDOM, U_SYSTEMATIC
 from service.store.port import Trend, TrendQuery
 from service.store.value_range import ValueRange

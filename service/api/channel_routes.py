@@ -4,17 +4,17 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from service.api.access.declared import needs
+from service.api.auth.declared import needs
 from service.api.channel_models import ChannelsModel, WaveformModel
 from service.api.channel_views import channels_model, rows_of
 from service.api.context import Context, UnitId
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered
-from service.api.waveform_views import newest_stretch, waveform_model
-from service.live import HELD_S
-from service.security.roles import Permission
+from service.live.live_view import HELD_S
+from service.live.samples import newest_stretch, waveform_model
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
+from service.store.access.roles import Permission
 
 MAX_NUMBERS = 200_000
 """Samples of all channels together in one answer."""

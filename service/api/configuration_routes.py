@@ -5,12 +5,12 @@ from typing import Any
 
 from fastapi import APIRouter, Response
 
-from service.api.access.declared import Reach, needs
+from service.api.auth.declared import Reach, needs
 from service.api.configuration_models import ConfigurationModel
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
-from service.security.roles import Permission
 from service.settings.schema import plant_file_schema
+from service.store.access.roles import Permission
 
 SCHEMA = "/api/v1/configuration/schema"
 

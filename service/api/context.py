@@ -9,8 +9,10 @@ from fastapi import Path
 from prometheus_client.registry import Collector
 
 from acquisition.clock import Clock
-from service.api.access.desk import AccessDesk
+from service.api.auth.desk import AccessDesk
+from service.api.auth.refusals import Refusals
 from service.api.delivery_look import DeliveryLook
+from service.api.load.watch import LoadWatch
 from service.api.ports import (
     AlarmBoard,
     CaptureLook,
@@ -19,16 +21,14 @@ from service.api.ports import (
     Operators,
 )
 from service.api.problems import ProblemError
-from service.audit.refusals import Refusals
-from service.continuous.tape import Tape
-from service.evidence.desk import EvidenceDesk
-from service.load.watch import LoadWatch
-from service.metrics.polls import TimedSource
-from service.origin import Origin
-from service.references import ReferencesInForce
+from service.measuring.references import ReferencesInForce
+from service.recordings.continuous.tape import Tape
+from service.reports.desk import EvidenceDesk
+from service.runtime.polls import TimedSource
+from service.runtime.space.watch import SpaceWatch
 from service.settings.bearings import BearingSettings
+from service.settings.origin import Origin
 from service.settings.units import UnitSettings
-from service.space.watch import SpaceWatch
 from service.store.port import Store
 
 UnitId = Annotated[str, Path(description="Identifier of a unit.", examples=["U1"])]

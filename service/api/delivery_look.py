@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from service.delivery.deliveries import ReceiverView
+from service.notifications.deliveries import ReceiverView
 
 
 class DeliveryLook(Protocol):
-    """Who is told of alarms; see :class:`service.delivery.deliveries.Deliveries`."""
+    """Who is told of alarms; see :class:`service.notifications.deliveries.Deliveries`."""
 
     async def look(self) -> Sequence[ReceiverView]:
         """Look at all receivers."""

@@ -2,15 +2,15 @@
 
 from fastapi import APIRouter, Response
 
-from service.api.access.declared import Reach, needs
+from service.api.auth.declared import Reach, needs
 from service.api.context import Context
 from service.api.delivery_models import DeadLetterModel, DeliveryModel, ReceiverModel
 from service.api.problems import problem_responses
 from service.api.rendering import rendered_now
-from service.delivery.deliveries import ReceiverView
-from service.delivery.sender import SenderStatus
+from service.notifications.deliveries import ReceiverView
+from service.notifications.sender import SenderStatus
 from service.runtime.times import rfc3339
-from service.security.roles import Permission
+from service.store.access.roles import Permission
 from service.store.outbox_port import Backlog, LetterState, StoredLetter
 
 NO_BACKLOG = Backlog("", 0, None, 0, None, None)

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Response
 
-from service.api.access.declared import needs
+from service.api.auth.declared import needs
 from service.api.bearing_routes import TimeRange, eccentricity_range, oil_temperature_range
 from service.api.context import BearingId, Context, UnitId
 from service.api.film_conditions import states_named
@@ -16,8 +16,8 @@ from service.api.film_views import film_model, why_unwatched
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered, worked
 from service.api.tables import Column, Format, table_content, table_response
-from service.films.learning import FilmPlace
-from service.security.roles import Permission
+from service.measuring.films.learning import FilmPlace
+from service.store.access.roles import Permission
 from service.store.film_port import FilmHistory, FilmQuery
 from service.store.port import QueryTooLargeError
 from service.store.value_range import ValueRange

@@ -26,7 +26,7 @@ from service.api.film_models import (
     LevelHeldName,
     VerdictName,
 )
-from service.live import CurrentBearing
+from service.live.live_view import CurrentBearing
 from service.runtime.times import rfc3339
 
 CURRENT_PERIODS = 2.5

@@ -2,7 +2,7 @@
 
 from fastapi import APIRouter, Response
 
-from service.api.access.declared import OPEN
+from service.api.auth.declared import OPEN
 from service.api.context import Context
 from service.api.plant_models import HealthModel
 

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Response
 from acquisition.errors import ConfigError
 from core.machine.unit import Bearing
 from core.samples.blocks import SampleBlock
-from service.api.access.declared import needs
+from service.api.auth.declared import needs
 from service.api.context import BearingId, Context, UnitId
 from service.api.motion_models import MotionModel
 from service.api.motion_views import MotionOrigin, motion_model
@@ -20,15 +20,15 @@ from service.api.recording_routes import (
     unknown_recording,
 )
 from service.api.rendering import rendered, worked
-from service.conversion import machine_of
-from service.live import HELD_S
-from service.orbits.motion import channels_for, motion_of
-from service.orbits.recorded import NoMotionError, recorded_motion
-from service.orbits.stretch import newest_of, stretch_of
+from service.live.live_view import HELD_S
+from service.live.shaft_stretch import newest_of, stretch_of
+from service.recordings.motion import channels_for, motion_of
+from service.recordings.recorded_motion import NoMotionError, recorded_motion
 from service.recordings.shelf import Kept
-from service.security.roles import Permission
+from service.settings.core_values import machine_of
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
+from service.store.access.roles import Permission
 
 MAX_SAMPLES = 60_000
 """Of each direction in one answer: a hundred seconds at 600 Hz, and 2 MB."""

@@ -9,7 +9,7 @@ from core.arrays import FloatArray
 from core.machine.unit import Bearing
 from service.api.film_series_views import listed
 from service.api.motion_models import EllipseModel, MotionModel, MotionOrder1Model
-from service.orbits.motion import Order1, ShaftMotion
+from service.recordings.motion import Order1, ShaftMotion
 from service.runtime.times import rfc3339
 
 DECIMALS = 3

@@ -4,9 +4,8 @@ import asyncio
 
 from fastapi import APIRouter
 
-from service.alarms.order1_reference import VectorRefusedError, measured_vectors
-from service.api.access.actors import actor_or
-from service.api.access.declared import needs
+from service.api.auth.actors import actor_or
+from service.api.auth.declared import needs
 from service.api.context import BearingId, Context, UnitId
 from service.api.order1_reference_models import (
     Order1ReferenceModel,
@@ -14,8 +13,9 @@ from service.api.order1_reference_models import (
     VectorModel,
 )
 from service.api.problems import ProblemError, described_problems, problem_responses
+from service.measuring.alarms.order1_reference import VectorRefusedError, measured_vectors
 from service.runtime.times import rfc3339
-from service.security.roles import Permission
+from service.store.access.roles import Permission
 from service.store.vector_reference_port import SetVectorReference
 
 TAKE_PROBLEMS = described_problems(

@@ -21,7 +21,7 @@ from service.api.plant_models import (
 )
 from service.api.rendering import worked
 from service.api.views import latest_model, source_model
-from service.live import UnitStatus
+from service.live.live_view import UnitStatus
 from service.runtime.times import rfc3339
 
 DATA_AGE, AGE, NONE = b'"data_age_s":', b'"age_s":', b"null"

@@ -3,13 +3,13 @@
 from fastapi import APIRouter, Request, Response
 
 from core.monitor.catalogue import CATALOGUE
-from service.api.access.declared import Reach, needs
+from service.api.auth.declared import Reach, needs
 from service.api.context import Context, UnitId
 from service.api.overview import Overview
 from service.api.plant_models import OverviewModel, QuantityModel, UnitModel
 from service.api.problems import problem_responses
 from service.api.views import source_model
-from service.security.roles import Permission
+from service.store.access.roles import Permission
 
 
 def plant_router(context: Context) -> APIRouter:

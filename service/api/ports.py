@@ -13,15 +13,15 @@ from core.change.settings import FilmRules
 from core.monitor.assessment import Assessment
 from core.quality import Reason
 from core.samples.blocks import SampleBlock
-from service.alarms.count import AlarmCount
-from service.films.actions import Action as BaselineAction
-from service.films.learning import FilmPlace
-from service.live import CurrentBearing, UnitStatus
+from service.live.alarm_count import AlarmCount
+from service.live.film_actions import Action as BaselineAction
+from service.live.live_view import CurrentBearing, UnitStatus
+from service.measuring.films.learning import FilmPlace
 from service.settings.film_alarms import FilmAlarmSettings
 
 
 class LiveLook(Protocol):
-    """What is known now; see :class:`service.live.LiveView`."""
+    """What is known now; see :class:`service.live.live_view.LiveView`."""
 
     @property
     def revision(self) -> int:
@@ -68,7 +68,7 @@ class LiveLook(Protocol):
 
 
 class AlarmBoard(Protocol):
-    """All alarms as they are; see :class:`service.alarms.engine.AlarmEngine`."""
+    """All alarms as they are; see :class:`service.measuring.alarms.engine.AlarmEngine`."""
 
     @property
     def revision(self) -> int:
@@ -103,7 +103,7 @@ class AlarmBoard(Protocol):
 
 
 class FilmBoard(Protocol):
-    """The films of all bearings; see :class:`service.films.keeper.FilmKeeper`."""
+    """The films of all bearings; see :class:`service.measuring.films.keeper.FilmKeeper`."""
 
     @property
     def unwatched(self) -> Mapping[str, str]:
@@ -133,7 +133,7 @@ class FilmBoard(Protocol):
 
 
 class CaptureLook(Protocol):
-    """Samples around alarms, as they are kept; see :class:`service.capture.captures.Captures`."""
+    """Samples around alarms; see :class:`service.recordings.capture.captures.Captures`."""
 
     @property
     def error(self) -> str | None:

@@ -11,8 +11,8 @@ from fastapi.responses import Response
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
-from service.api.access.declared import allowed_methods
-from service.api.elsewhere import NotCarriedOutError, NotHereError
+from service.api.auth.declared import allowed_methods
+from service.live.elsewhere import NotCarriedOutError, NotHereError
 from service.store.port import QueryTooLargeError, StoreError
 
 MEDIA_TYPE = "application/problem+json"

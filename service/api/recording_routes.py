@@ -8,7 +8,7 @@ from fastapi import APIRouter, Path, Query, Response
 from fastapi.responses import StreamingResponse
 
 from acquisition.errors import ConfigError
-from service.api.access.declared import needs
+from service.api.auth.declared import needs
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
 from service.api.recording_models import (
@@ -18,9 +18,9 @@ from service.api.recording_models import (
 )
 from service.api.recording_views import recording_info, recording_model
 from service.api.rendering import rendered, worked
-from service.evidence.desk import EvidenceDesk, TooManyDownloadsError
 from service.recordings.shelf import Shelf
-from service.security.roles import Permission
+from service.reports.desk import EvidenceDesk, TooManyDownloadsError
+from service.store.access.roles import Permission
 from service.store.waveform_port import WaveformKind
 
 RecordingId = Annotated[

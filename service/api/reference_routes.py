@@ -4,12 +4,12 @@ import asyncio
 
 from fastapi import APIRouter
 
-from service.api.access.declared import needs
+from service.api.auth.declared import needs
 from service.api.bearing_models import SetReferenceModel
 from service.api.bearing_views import set_reference_model
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import problem_responses
-from service.security.roles import Permission
+from service.store.access.roles import Permission
 
 
 def reference_router(context: Context) -> APIRouter:

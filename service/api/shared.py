@@ -8,7 +8,7 @@ from fastapi import Response
 
 from acquisition.clock import Clock
 from service.api.rendering import Dated, rendered_now
-from service.asker import ASKER
+from service.runtime.asker import ASKER
 
 FRESH_S = 1.0
 """How old an answer may be in what no revision tells, such as what ends by time alone."""

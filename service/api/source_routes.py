@@ -2,13 +2,13 @@
 
 from fastapi import APIRouter
 
-from service.api.access.declared import needs
+from service.api.auth.declared import needs
 from service.api.context import Context
 from service.api.source_models import PollsModel, SourceHealthModel
 from service.api.views import source_model
-from service.metrics.durations import Seen
-from service.security.roles import Permission
+from service.runtime.durations import Seen
 from service.settings.units import UnitSettings
+from service.store.access.roles import Permission
 
 
 def source_router(context: Context) -> APIRouter:

@@ -5,7 +5,7 @@ from typing import Annotated
 import structlog
 from fastapi import APIRouter, Query, Response
 
-from service.api.access.declared import needs
+from service.api.auth.declared import needs
 from service.api.bearing_routes import TimeRange
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import problem_responses
@@ -14,7 +14,7 @@ from service.api.series_models import PlaceName
 from service.api.spectra_models import SpectraModel
 from service.api.spectra_views import spectra_model
 from service.api.views import PLACES
-from service.security.roles import Permission
+from service.store.access.roles import Permission
 from service.store.spectra_port import SpectraQuery
 
 MAX_SPECTRA = 1000

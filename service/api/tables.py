@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 from fastapi import Depends, Query, Request
 from fastapi.responses import StreamingResponse
 
-from service.audit.csv_file import harmless
+from service.api.audit_csv import harmless
 from service.runtime.times import rfc3339
 
 FormatName = Literal["json", "csv", "parquet"]

@@ -8,7 +8,7 @@ from fastapi import APIRouter, Depends, Query, Response
 from core.condition.cells import CellGrid
 from core.monitor.catalogue import BY_NAME
 from core.units import ns_from_s
-from service.api.access.declared import needs
+from service.api.auth.declared import needs
 from service.api.bearing_routes import TimeRange, eccentricity_range, oil_temperature_range
 from service.api.context import BearingId, Context, UnitId
 from service.api.film_conditions import states_named
@@ -20,7 +20,7 @@ from service.api.tables import Format, table_content, table_response
 from service.api.trend_groups import GroupName, TooManyGroupsError, TrendGroup, trend_groups
 from service.api.trend_tables import trend_table
 from service.api.trend_views import trend_columns, trend_model
-from service.security.roles import Permission
+from service.store.access.roles import Permission
 from service.store.port import Trend, TrendQuery
 from service.store.value_range import ValueRange
 

@@ -25,7 +25,7 @@ from service.api.series_models import (
     SpectrumChannelModel,
     SpectrumModel,
 )
-from service.live import CurrentBearing, UnitStatus
+from service.live.live_view import CurrentBearing, UnitStatus
 from service.runtime.times import rfc3339
 
 LEVEL_NAMES: dict[Level, LevelName] = {

@@ -6,16 +6,16 @@ from datetime import UTC, datetime
 
 import typer
 
-from service.audit.acting import Acting, acting_as
-from service.audit.entry import Source
+from service.api.auth.passwords import PasswordRefusedError
+from service.app.stores import has_store, open_store, store_name
 from service.cli.plant_file import fail
 from service.runtime.made_by import made_by
-from service.security.names import NameRefusedError
-from service.security.passwords import PasswordRefusedError
 from service.settings.plant import PlantFile
-from service.store.access_port import AccessRefusedError, AccessStore
+from service.store.access.acting import Acting, acting_as
+from service.store.access.audit_entry import Source
+from service.store.access.names import NameRefusedError
+from service.store.access.port import AccessRefusedError, AccessStore
 from service.store.port import StoreError
-from service.wiring.stores import has_store, open_store, store_name
 
 NS_PER_S = 1_000_000_000
 

@@ -7,14 +7,14 @@ import typer
 
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
-from service.cli.ending import leave, run_to_its_end
+from service.api.http.listening import PortInUseError, listen
+from service.app.health.serving import HOST
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.stream import stream_settings
-from service.health.serving import HOST
-from service.http.listening import PortInUseError, listen
-from service.notify import ServiceManager
+from service.measuring.sources import live_units
+from service.runtime.ending import leave, run_to_its_end
+from service.runtime.service_manager import ServiceManager
 from service.settings.plant import PlantFile
-from service.wiring.sources import live_units
 
 
 def acquire(
@@ -29,7 +29,7 @@ def acquire(
     ] = None,
 ) -> None:
     """Read devices and publish their blocks to the stream until Ctrl-C or SIGTERM."""
-    from service.acquire_program import run_acquire  # loads NATS, which other commands do not need
+    from service.app.acquire_program import run_acquire
 
     plant = read_plant_file(plant_file)
     settings = stream_settings(plant)

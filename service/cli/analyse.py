@@ -6,17 +6,17 @@ from typing import Annotated
 import typer
 
 from acquisition.clock import SystemClock
-from service.cli.ending import leave, run_to_its_end
+from service.api.http.listening import PortInUseError, listen
+from service.app.health.serving import HOST
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.stream import stream_settings
-from service.health.serving import HOST
-from service.http.listening import PortInUseError, listen
-from service.notify import ServiceManager
-from service.roles.partition import Partition
+from service.cluster.partition import Partition
+from service.cluster.stream.errors import StreamAnewError
+from service.measuring.sources import monitor_of
+from service.runtime.ending import leave, run_to_its_end
+from service.runtime.service_manager import ServiceManager
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
-from service.stream.errors import StreamAnewError
-from service.wiring.sources import monitor_of
 
 
 def analyse(
@@ -34,7 +34,7 @@ def analyse(
 
     A second process for the same units stands by, and takes over when the first one ends.
     """
-    from service.analyse_program import run_analyse  # loads NATS, which other commands do not need
+    from service.app.analyse_program import run_analyse
 
     plant = read_plant_file(plant_file)
     settings = stream_settings(plant)

@@ -7,11 +7,11 @@ from typing import Annotated
 import typer
 from pydantic import TypeAdapter
 
-from service.audit.csv_file import write_csv
-from service.audit.walk import Verdict
+from service.api.audit_csv import write_csv
+from service.app.stores import open_trail
 from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.store.access.audit_walk import Verdict
 from service.store.port import StoreError
-from service.wiring.stores import open_trail
 
 app = typer.Typer(no_args_is_help=True, help="The audit trail: who did what to what.")
 

@@ -7,17 +7,17 @@ from typing import Annotated, Any
 import typer
 
 from acquisition.clock import SystemClock
-from service.back_test.arguments import event_of, time_ns_of
-from service.back_test.bearing_run import BackTestRules
-from service.back_test.exporting import export_baselines
-from service.back_test.file_columns import ReadingsError
-from service.back_test.histories import BearingRows, Place
-from service.back_test.listing import lines_of
-from service.back_test.periods import Learning
-from service.back_test.reading import read_histories
-from service.back_test.report import BackTestReport
-from service.back_test.rules import places_of, rules_of
-from service.back_test.running import Found, run_back_test
+from service.cli.offline.back_test.arguments import event_of, time_ns_of
+from service.cli.offline.back_test.bearing_run import BackTestRules
+from service.cli.offline.back_test.exporting import export_baselines
+from service.cli.offline.back_test.file_columns import ReadingsError
+from service.cli.offline.back_test.histories import BearingRows, Place
+from service.cli.offline.back_test.listing import lines_of
+from service.cli.offline.back_test.periods import Learning
+from service.cli.offline.back_test.reading import read_histories
+from service.cli.offline.back_test.report import BackTestReport
+from service.cli.offline.back_test.rules import places_of, rules_of
+from service.cli.offline.back_test.running import Found, run_back_test
 from service.cli.plant_file import fail, read_plant_file
 from service.runtime.made_by import made_by
 from service.settings.film_alarms import FilmAlarmSettings

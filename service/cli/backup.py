@@ -9,14 +9,14 @@ from typing import Annotated
 import typer
 
 from acquisition.clock import SystemClock
-from service.backup.backing_up import back_up
-from service.backup.check import BackupError
-from service.backup.restoring import restore as put_back
-from service.backup.taken_back import AccessAfter, access_before, take_back
+from service.app.stores import database_path, store_name
 from service.cli.access import access_of
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.settings.plant import PlantFile
-from service.wiring.stores import database_path, store_name
+from service.store.backup.backing_up import back_up
+from service.store.backup.check import BackupError
+from service.store.backup.restoring import restore as put_back
+from service.store.backup.taken_back import AccessAfter, access_before, take_back
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 

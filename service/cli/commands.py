@@ -9,7 +9,6 @@ from service.cli.backtest import backtest
 from service.cli.backup import backup, restore
 from service.cli.daq import daq
 from service.cli.demo import demo
-from service.cli.logs import set_up_logging
 from service.cli.reanalyse import reanalyse
 from service.cli.record import record
 from service.cli.replay import replay
@@ -17,6 +16,7 @@ from service.cli.run import run
 from service.cli.serve import serve
 from service.cli.store import app as store_app
 from service.cli.validate import validate
+from service.runtime.logs import set_up_logging
 
 app = typer.Typer(
     no_args_is_help=True,

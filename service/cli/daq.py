@@ -10,13 +10,13 @@ import uvloop
 from acquisition.clock import FastClock, SystemClock
 from acquisition.errors import AcquisitionError
 from acquisition.simulated.feed import SampleFeed
+from service.app.daq_program import run_daq
+from service.app.daqs import daq_of
+from service.app.recordings import recorded_feed, recordings_by_unit
+from service.app.simulations import simulated_feed
+from service.app.wires import Wire, over_wire
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.daq_program import run_daq
 from service.settings.plant import PlantFile
-from service.wires import Wire, over_wire
-from service.wiring.daqs import daq_of
-from service.wiring.recordings import recorded_feed, recordings_by_unit
-from service.wiring.simulations import simulated_feed
 
 SpeedOption = Annotated[
     float,

@@ -10,16 +10,16 @@ import typer
 import uvloop
 
 from acquisition.clock import SystemClock
+from service.app.delivery import composer_of, receivers_of
+from service.app.stores import has_store, open_store, store_name
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.delivery.facts import Surroundings
-from service.delivery.message import dumps
-from service.delivery.outcome import Delivered, Outcome, Refused
-from service.delivery.sender import Receiver
-from service.origin import Origin
+from service.notifications.facts import Surroundings
+from service.notifications.message import dumps
+from service.notifications.outcome import Delivered, Outcome, Refused
+from service.notifications.sender import Receiver
+from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
-from service.wiring.delivery import composer_of, receivers_of
-from service.wiring.stores import has_store, open_store, store_name
 
 app = typer.Typer(no_args_is_help=True, help="Test receivers of alarms; send again.")
 

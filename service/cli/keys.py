@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from acquisition.clock import SystemClock
+from service.api.auth.people import create_key
 from service.cli.access import access_of, time_text
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.security.keys import MAX_DAYS, ApiKey
-from service.security.people import create_key
-from service.security.roles import Role
+from service.store.access.keys import MAX_DAYS, ApiKey
+from service.store.access.roles import Role
 
 app = typer.Typer(no_args_is_help=True, help="Keys of machines: create, list, revoke.")
 

@@ -8,7 +8,7 @@ from typing import NoReturn
 
 import typer
 
-from service.cli.ending import leave
+from service.runtime.ending import leave
 
 EXIT_BUG = 70
 

@@ -13,9 +13,23 @@ from pydantic import ValidationError
 from acquisition.errors import AcquisitionError
 from acquisition.modbus.cells import ByteOrder
 from core.machine.channel import Measurand
+from service.cli.offline.probes import (
+    identify_once,
+    measure_in_flight,
+    read_map_once,
+    read_once,
+    read_ring_once,
+)
+from service.cli.offline.probing import (
+    RegisterLook,
+    RingLook,
+    ValueLook,
+    looks,
+    ring_look,
+    value_looks,
+)
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.units import UnitOption, one_unit
-from service.probing import RegisterLook, RingLook, ValueLook, looks, ring_look, value_looks
 from service.runtime.times import rfc3339
 from service.settings.map_file import load_map_file
 from service.settings.modbus_link import ModbusLinkSettings
@@ -23,13 +37,6 @@ from service.settings.modbus_map import RegisterMapSettings
 from service.settings.modbus_sources import MappedDeviceSettings
 from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
-from service.wiring.probes import (
-    identify_once,
-    measure_in_flight,
-    read_map_once,
-    read_once,
-    read_ring_once,
-)
 
 app = typer.Typer(
     no_args_is_help=True, help="Look into a device: read once, print everything, store nothing."

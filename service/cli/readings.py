@@ -7,14 +7,14 @@ from typing import Annotated
 import typer
 
 from acquisition.clock import SystemClock
-from service.back_test.arguments import time_ns_of
-from service.back_test.stored import SUFFIXES, ReadingsFile, stored_histories, table_of
+from service.app.stores import has_store, open_store, store_name
+from service.cli.offline.back_test.arguments import time_ns_of
+from service.cli.offline.back_test.stored import SUFFIXES, ReadingsFile, stored_histories, table_of
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.films.rules import watched_estimator
+from service.settings.film_rules import watched_estimator
 from service.settings.plant import PlantFile
 from service.store.film_port import FilmStore
 from service.store.port import StoreError
-from service.wiring.stores import has_store, open_store, store_name
 
 app = typer.Typer(no_args_is_help=True, help="Readings of the films, out of the store.")
 

@@ -15,18 +15,18 @@ from acquisition.errors import AcquisitionError
 from acquisition.source import SampleSource
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
-from service.cli.plant_file import fail, read_plant_file
-from service.cli.units import UnitOption, one_unit
-from service.conversion import analysis_of, calibration_of, machine_of
-from service.reanalysis import (
+from service.app.recordings import recording_of, recording_source, selection_of
+from service.cli.offline.reanalysis import (
     LastAverages,
     assessment_model,
     assessments,
     calibration_differences,
     is_full,
 )
+from service.cli.plant_file import fail, read_plant_file
+from service.cli.units import UnitOption, one_unit
 from service.runtime.times import rfc3339
-from service.wiring.recordings import recording_of, recording_source, selection_of
+from service.settings.core_values import analysis_of, calibration_of, machine_of
 
 
 class WindowChoice(StrEnum):

@@ -15,12 +15,12 @@ from acquisition.clock import Clock, SystemClock
 from acquisition.errors import AcquisitionError, LinkError
 from acquisition.recordings.writer import RecordingWriter
 from acquisition.source import SampleSource
+from service.app.recordings import recording_of, recording_writer
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.units import UnitOption, one_unit
+from service.measuring.sources import source_of
 from service.runtime.made_by import made_by
 from service.settings.modbus_sources import ModbusVectorSettings
-from service.wiring.recordings import recording_of, recording_writer
-from service.wiring.sources import source_of
 
 MAX_SECONDS = 7 * 86_400.0
 

@@ -10,6 +10,8 @@ import typer
 from acquisition.errors import AcquisitionError
 from acquisition.recordings.export import ExportFormat, export_recording
 from acquisition.recordings.summary import summary_of
+from service.app.recordings import recording_of
+from service.cli.offline.imports import import_recording
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.recording_check import check
 from service.cli.recording_listing import json_of, lines_of
@@ -17,8 +19,6 @@ from service.cli.units import UnitOption, one_unit
 from service.runtime.made_by import made_by
 from service.settings.import_mapping import ImportMapping
 from service.settings.toml_file import TomlFileError, load_toml
-from service.wiring.imports import import_recording
-from service.wiring.recordings import recording_of
 
 app = typer.Typer(
     no_args_is_help=True, help="Look into recordings, check them, export and import them."

@@ -9,13 +9,11 @@ from pydantic import TypeAdapter
 
 from acquisition.clock import SystemClock
 from core.machine.unit import Bearing
-from service.audit.acting import Acting, acting_as
-from service.audit.entry import Source
+from service.app.stores import has_store, open_store, store_name
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.reference_listing import BearingReferences, bearing_references, text_lines
 from service.cli.units import UnitOption, one_unit
-from service.conversion import machine_of
-from service.reference_setting import (
+from service.measuring.reference_setting import (
     Gaps,
     ReferenceRefusedError,
     doubts,
@@ -23,10 +21,12 @@ from service.reference_setting import (
     measured_gaps,
 )
 from service.runtime.made_by import person
+from service.settings.core_values import machine_of
 from service.settings.plant import PlantFile
+from service.store.access.acting import Acting, acting_as
+from service.store.access.audit_entry import Source
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import Store, StoreError
-from service.wiring.stores import has_store, open_store, store_name
 
 app = typer.Typer(
     no_args_is_help=True, help="Set or list references: the probe gaps with the shaft centred."

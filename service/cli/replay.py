@@ -11,22 +11,22 @@ import typer
 
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError, LinkError
+from service.api.http.listening import PortInUseError
+from service.app.program import Performance, run_service
+from service.app.recordings import recordings_by_unit, replay_source
+from service.app.replay import PlayedOut, replay_folder, replayed_plant
+from service.app.stores import database_path
+from service.app.web import listener_of
+from service.app.wires import Wire, over_wire
 from service.cli.daq import SpeedOption
 from service.cli.daq_process import RunningDaq, daq_process
-from service.cli.ending import run_to_its_end
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import announce
-from service.http.listening import PortInUseError
-from service.origin import Origin
-from service.program import Performance, run_service
-from service.replay import PlayedOut, replay_folder, replayed_plant
+from service.measuring.sources import source_of, watched_units
+from service.runtime.ending import run_to_its_end
+from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
-from service.wires import Wire, over_wire
-from service.wiring.http import listener_of
-from service.wiring.recordings import recordings_by_unit, replay_source
-from service.wiring.sources import source_of, watched_units
-from service.wiring.stores import database_path
 
 
 def replay(

@@ -8,17 +8,17 @@ import typer
 
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
-from service.cli.ending import leave, run_to_its_end
+from service.api.http.listening import PortInUseError
+from service.api.http.tls import CertificateError
+from service.app.access import ClosedError
+from service.app.program import Performance, run_service
+from service.app.web import listener_of
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.http.listening import PortInUseError
-from service.http.tls import CertificateError
-from service.notify import ServiceManager
-from service.program import Performance, run_service
+from service.measuring.sources import live_units
+from service.runtime.ending import leave, run_to_its_end
+from service.runtime.service_manager import ServiceManager
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
-from service.wiring.access import ClosedError
-from service.wiring.http import listener_of
-from service.wiring.sources import live_units
 
 log = structlog.get_logger()
 

@@ -6,14 +6,14 @@ from typing import Annotated
 import typer
 
 from acquisition.clock import SystemClock
-from service.cli.ending import leave, run_to_its_end
+from service.api.http.listening import PortInUseError
+from service.app.serve_program import run_serve
+from service.app.web import listener_of
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.run import CLOSED, announce
-from service.http.listening import PortInUseError
-from service.notify import ServiceManager
-from service.serve_program import run_serve
+from service.runtime.ending import leave, run_to_its_end
+from service.runtime.service_manager import ServiceManager
 from service.store.port import StoreError
-from service.wiring.http import listener_of
 
 NEEDS_POSTGRESQL = (
     "padwatch serve shows what other processes write into PostgreSQL, and this plant file has no"

@@ -9,11 +9,11 @@ from typing import Annotated
 
 import typer
 
+from service.app.stores import database_path, store_name
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
 from service.store.sqlite.checking import Finding, findings
-from service.wiring.stores import database_path, store_name
 
 app = typer.Typer(no_args_is_help=True, help="The database: whether it is whole.")
 

@@ -6,13 +6,13 @@ from typing import Annotated
 import typer
 
 from acquisition.clock import SystemClock
+from service.api.auth.passwords import Hashing
+from service.api.auth.people import People
 from service.cli.access import access_of, time_text
 from service.cli.passwords import PasswordFd, password_from
 from service.cli.plant_file import PlantPath, read_plant_file
-from service.security.names import account_name
-from service.security.passwords import Hashing
-from service.security.people import People
-from service.security.roles import Role
+from service.store.access.names import account_name
+from service.store.access.roles import Role
 
 app = typer.Typer(no_args_is_help=True, help="Accounts of people: add, list, change, remove.")
 

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from service.validation import paper
-from service.validation.comparison import (
+from service.cli.offline.validation import paper
+from service.cli.offline.validation.comparison import (
     Row,
     errors,
     measured_rows,

@@ -4,7 +4,7 @@ from functools import cache
 
 from fastapi import APIRouter, HTTPException, Request, Response
 
-from service.api.access.declared import OPEN
+from service.api.auth.declared import OPEN
 from service.dashboard.assets import Asset, pages, plotly
 from service.dashboard.edition import edition
 

@@ -12,11 +12,11 @@ from acquisition.recordings.export import csv_tables
 from acquisition.recordings.manifest import Manifest, checksum_of, read_manifest
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.summary import RecordingSummary, summary_of
-from service.capture.folders import ALARM, FILES
-from service.continuous.names import KIND, unit_of
-from service.evidence.bundle import Sink, zipped
+from service.recordings.capture.folders import ALARM, FILES
+from service.recordings.continuous.names import KIND, unit_of
+from service.recordings.keeping.folders import finished, n_bytes_of
+from service.reports.bundle import Sink, zipped
 from service.store.waveform_port import WaveformKind
-from service.waveforms.folders import finished, n_bytes_of
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,119}")
 

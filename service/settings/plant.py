@@ -6,8 +6,8 @@ from typing import Annotated, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from core.units import hz_from_rpm
-from service.security.addresses import is_loopback
 from service.settings.access import AccessSettings, TlsSettings
+from service.settings.addresses import is_loopback
 from service.settings.alarms import AlarmSettings, CaptureSettings
 from service.settings.base import MisfitError, Settings, refuse_twice
 from service.settings.delivery import DeliverySettings

@@ -15,8 +15,8 @@ from core.alarms.alarm import (
 from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
-from service.audit.entry import Deed
 from service.settings.alarm_kinds import ALARM_KINDS
+from service.store.access.audit_entry import Deed
 from service.store.audit_deeds import alarm_deeds
 from service.store.commands import answer_command
 from service.store.commands_port import DONE

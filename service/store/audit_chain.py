@@ -6,10 +6,10 @@ from dataclasses import asdict, astuple
 from pathlib import Path
 from threading import Lock
 
-from service.audit.entry import AuditEntry, Deed
-from service.audit.hashing import FIRST, chained
-from service.audit.head import AuditHead, HeadError, read_head, write_head
-from service.audit.walk import HEAD_DIFFERED
+from service.store.access.audit_entry import AuditEntry, Deed
+from service.store.access.audit_hashing import FIRST, chained
+from service.store.access.audit_head import AuditHead, HeadError, read_head, write_head
+from service.store.access.audit_walk import HEAD_DIFFERED
 from service.store.database import Connection, Database
 from service.store.port import StoreError
 

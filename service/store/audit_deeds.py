@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmNews, Hold
-from service.audit.acting import acting
-from service.audit.entry import Deed, Source
-from service.films.versions import Versions, versions_after
+from service.store.access.acting import acting
+from service.store.access.audit_entry import Deed, Source
+from service.store.baseline_versions import Versions, versions_after
 from service.store.baselines import select_steps
 from service.store.database import Connection
 from service.store.film_port import BaselineStep, StoredStep

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
-from service.audit.entry import Deed
+from service.store.access.audit_entry import Deed
 from service.store.audit_chain import AuditChain
 from service.store.database import Connection
 from service.store.highwater.commits import CommitMarks

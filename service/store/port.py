@@ -11,7 +11,7 @@ from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import Level, Reading
 from core.samples.gaps import Gap, Reach
-from service.store.access_port import AccessStore
+from service.store.access.port import AccessStore
 from service.store.audit_port import AuditStore
 from service.store.commands_port import Commands
 from service.store.database import Hold

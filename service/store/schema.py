@@ -7,7 +7,7 @@ triggers; one that it cannot translate is written for PostgreSQL beside it, in
 tests of the store, which go over both.
 """
 
-from service.store.access_schema import ACCESS_TABLES, MUST_CHANGE
+from service.store.access.schema import ACCESS_TABLES, MUST_CHANGE
 from service.store.audit_schema import AUDIT_TABLES
 from service.store.commands import COMMAND_TABLES
 from service.store.film_schema import FILM_TABLES

@@ -9,7 +9,7 @@ from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.samples.gaps import Gap, Reach
-from service.store.access import SqlAccess
+from service.store.access.tables import SqlAccess
 from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.audit import SqlAudit
 from service.store.audit_chain import AuditChain

@@ -13,15 +13,15 @@ from pathlib import Path
 
 from rigs.command_line import OPEN
 
+from service.api.auth.passwords import Hashing
+from service.api.auth.people import People
+from service.app.simulated_lives import simulated_history
+from service.app.stores import open_store
 from service.cli.access import access_of
-from service.demo.past import fill
-from service.security.passwords import Hashing
-from service.security.people import People
-from service.security.roles import Role
+from service.cli.offline.demo.past import fill
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
-from service.wiring.simulated_lives import simulated_history
-from service.wiring.stores import open_store
+from service.store.access.roles import Role
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 DEMO, DEMO_LIFE = DEPLOY / "demo.toml", DEPLOY / "demo-life.toml"

@@ -18,13 +18,13 @@ from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import RawBlock
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
-from service.conversion import analysis_of, calibration_of, machine_of
-from service.reanalysis import assessments
+from service.app.recordings import recording_writer, replay_source
+from service.app.simulations import simulated_feed
+from service.cli.offline.reanalysis import assessments
+from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
-from service.wiring.recordings import recording_writer, replay_source
-from service.wiring.simulations import simulated_feed
 
 HERE = Path(__file__).parent
 START_NS = 1_767_225_600 * 1_000_000_000

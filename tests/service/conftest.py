@@ -22,8 +22,8 @@ from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingLimits, OperatingState
 from core.machine.unit import Estimator
 from core.quality import Reason
-from service.origin import Origin
 from service.settings.loading import PlantFileError, load_plant_file
+from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
 from service.store.postgres.address import PostgresAddress

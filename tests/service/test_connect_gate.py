@@ -5,7 +5,7 @@ import heapq
 
 import numpy as np
 
-from service.connect_gate import ConnectGate
+from service.measuring.connect_gate import ConnectGate
 
 PER_S = 50.0
 POLL_S = 0.5

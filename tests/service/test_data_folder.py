@@ -7,8 +7,8 @@ import pytest
 from rigs.command_line import padwatch
 from structlog.testing import capture_logs
 
-from service.instance import only_one
 from service.store.file_system import FileSystem
+from service.store.instance import only_one
 from service.store.port import StoreError
 
 

@@ -10,7 +10,7 @@ from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reason
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount
-from service.live import LinkState, LiveView
+from service.live.live_view import LinkState, LiveView
 
 STALE_AFTER_S = 30.0
 BLOCK = SampleBlock("U1", 1, 0, 0, 600.0, np.zeros((1, 60), dtype=np.float32), (GOOD,))

@@ -15,11 +15,16 @@ from acquisition.delivery.calibration import RawBlock, calibrate
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import Rejection
-from service.conversion import calibration_of, machine_of
-from service.reanalysis import LastAverages, assessment_model, assessments, calibration_differences
+from service.app.recordings import recording_of, recording_source, recording_writer, selection_of
+from service.app.simulations import simulated_feed
+from service.cli.offline.reanalysis import (
+    LastAverages,
+    assessment_model,
+    assessments,
+    calibration_differences,
+)
+from service.settings.core_values import calibration_of, machine_of
 from service.settings.units import UnitSettings
-from service.wiring.recordings import recording_of, recording_source, recording_writer, selection_of
-from service.wiring.simulations import simulated_feed
 
 ANALYSIS = AnalysisSettings(segment_samples=1024, n_segments=4)
 

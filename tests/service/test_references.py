@@ -14,8 +14,13 @@ from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.quality import Reading, Reason, missing, uncertain
-from service.reference_setting import ReferenceRefusedError, doubts, given_gaps, measured_gaps
-from service.references import LOOK_EVERY_S, ReferencesInForce, with_reference
+from service.measuring.reference_setting import (
+    ReferenceRefusedError,
+    doubts,
+    given_gaps,
+    measured_gaps,
+)
+from service.measuring.references import LOOK_EVERY_S, ReferencesInForce, with_reference
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoredReadings, StoreError
 from service.store.sqlite import SqliteStore

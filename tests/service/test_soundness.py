@@ -11,11 +11,11 @@ import pytest
 
 from core.limits import AlarmLevel
 from core.monitor.assessment import Assessment
-from service.alarms.health import ServiceHealth
-from service.alarms.service_alarms import ServiceAlarms
-from service.live import LiveView
-from service.metrics.kept import soundness_metrics
-from service.soundness import LOOK_EVERY_S, Soundness
+from service.live.live_view import LiveView
+from service.measuring.alarms.health import ServiceHealth
+from service.measuring.alarms.service_alarms import ServiceAlarms
+from service.measuring.metrics.kept import soundness_metrics
+from service.measuring.soundness import LOOK_EVERY_S, Soundness
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError, TrendQuery
 from service.store.sqlite import SqliteStore

@@ -19,11 +19,11 @@ from core.monitor.catalogue import BY_NAME
 from core.monitor.monitor import UnitMonitor
 from core.quality import Level, Reason, bad, missing
 from core.stiffness.estimators import ESTIMATORS, is_reversed
-from service.conversion import analysis_of, calibration_of, machine_of
+from service.app.simulations import scenario_of
+from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
-from service.wiring.simulations import scenario_of
 
 DEMO = Path(__file__).parents[2] / "deploy" / "demo.toml"
 MINUTES = 6

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from acquisition.clock import SystemClock
+from service.measuring.sources import source_of
 from service.settings.loading import load_plant_file
-from service.wiring.sources import source_of
 
 
 async def test_all_machines_of_a_daq_begin_when_it_begins_to_serve(

@@ -30,7 +30,7 @@ from core.quality import Reason, bad
 from core.samples.blocks import SampleBlock
 from core.spectra.runout import RunoutVerdict
 from core.spectra.speed import SpeedSource
-from service.conversion import calibration_of, machine_of
+from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
 

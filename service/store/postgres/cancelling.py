@@ -6,7 +6,7 @@ from threading import Event, Thread
 
 import psycopg
 
-from service.asker import ASKER, Asker
+from service.runtime.asker import ASKER, Asker
 from service.store.port import StoreError
 from service.store.postgres.connection import Session
 

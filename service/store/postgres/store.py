@@ -3,10 +3,10 @@
 import time
 from pathlib import Path
 
-from service.audit.acting import acting
-from service.audit.entry import Deed
-from service.audit.head import AuditHead, write_head
-from service.origin import Origin
+from service.settings.origin import Origin
+from service.store.access.acting import acting
+from service.store.access.audit_entry import Deed
+from service.store.access.audit_head import AuditHead, write_head
 from service.store.audit_chain import newest_of
 from service.store.outbox_port import Address, nobody
 from service.store.port import StoreError

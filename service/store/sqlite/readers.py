@@ -7,7 +7,7 @@ from pathlib import Path
 from threading import Lock
 
 from acquisition.clock import SystemClock
-from service.asker import ASKER
+from service.runtime.asker import ASKER
 
 BUSY_TIMEOUT_S = 5.0
 N_KEPT = 4

@@ -4,8 +4,8 @@ import sqlite3
 from pathlib import Path
 from threading import Lock
 
-from service.audit.head import head_path
-from service.origin import Origin
+from service.settings.origin import Origin
+from service.store.access.audit_head import head_path
 from service.store.audit_chain import begin_head
 from service.store.integrity import Marked
 from service.store.outbox_port import Address, nobody

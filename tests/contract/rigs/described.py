@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from service.api.access.application import GuardedApi
 from service.api.app import create_app
+from service.api.auth.application import GuardedApi
 from service.api.context import Context
 
 _DOCUMENTS: dict[frozenset[str], dict[str, Any]] = {}

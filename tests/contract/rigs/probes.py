@@ -10,7 +10,7 @@ import numpy as np
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reading, Reason, bad
 from core.samples.blocks import SampleBlock
-from service.recorder import Findings
+from service.measuring.recorder import Findings
 
 ALARMS = "/api/v1/alarms"
 PROBE = "U1:ujb_shaft_x:channel_not_ok"

@@ -36,10 +36,10 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel, Judgement, unknown
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
-from service.alarms.engine import AlarmEngine
-from service.live import LiveView
-from service.parked_rows import FILE, ParkedRows
-from service.recorder import Findings, Recorder
+from service.live.live_view import LiveView
+from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.parked_rows import FILE, ParkedRows
+from service.measuring.recorder import Findings, Recorder
 from service.store.port import AlarmQuery
 from service.store.sqlite import SqliteStore
 

@@ -14,13 +14,13 @@ from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel
 from core.samples.gaps import SampleAccount
-from service.alarms.engine import AlarmEngine
-from service.alarms.health import ServiceHealth
-from service.alarms.service_alarms import ServiceAlarms
-from service.alarms.service_rules import ServiceRules
-from service.live import LiveView
-from service.parked_rows import FILE, ParkedRows
-from service.recorder import Findings, Recorder
+from service.live.live_view import LiveView
+from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.alarms.health import ServiceHealth
+from service.measuring.alarms.service_alarms import ServiceAlarms
+from service.measuring.alarms.service_rules import ServiceRules
+from service.measuring.parked_rows import FILE, ParkedRows
+from service.measuring.recorder import Findings, Recorder
 from service.store.port import AlarmQuery
 from service.store.sqlite import SqliteStore
 

@@ -24,28 +24,28 @@ from core.alarms.life_cycle import update
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.alarms.engine import AlarmEngine
-from service.alarms.start import alarm_engine
-from service.api.access.desk import AccessDesk
+from service.api.auth.desk import AccessDesk
 from service.api.context import Context
-from service.api.in_process import InProcess
-from service.capture.file import CaptureFile
-from service.conversion import analysis_of, calibration_of, machine_of
-from service.delivery.deliveries import Deliveries
-from service.evidence.keeper import EvidenceKeeper
-from service.films.keeper import FilmKeeper
-from service.films.start import film_keeper
-from service.live import LinkState, LiveView
-from service.origin import Origin
-from service.parked_rows import FILE, ParkedRows
-from service.recorder import Recorder
-from service.references import ReferencesInForce
-from service.security.roles import Role
+from service.app.captures import captures_of
+from service.app.evidence import evidence_desk, evidence_of, watch
+from service.app.simulations import simulated_feed
+from service.live.live_view import LinkState, LiveView
+from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.alarms.start import alarm_engine
+from service.measuring.films.keeper import FilmKeeper
+from service.measuring.films.start import film_keeper
+from service.measuring.in_process import InProcess
+from service.measuring.parked_rows import FILE, ParkedRows
+from service.measuring.recorder import Recorder
+from service.measuring.references import ReferencesInForce
+from service.notifications.deliveries import Deliveries
+from service.recordings.capture.file import CaptureFile
+from service.reports.keeper import EvidenceKeeper
+from service.settings.core_values import analysis_of, calibration_of, machine_of
+from service.settings.origin import Origin
 from service.settings.plant import PlantFile
+from service.store.access.roles import Role
 from service.store.sqlite import SqliteStore
-from service.wiring.captures import captures_of
-from service.wiring.evidence import evidence_desk, evidence_of, watch
-from service.wiring.simulations import simulated_feed
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 

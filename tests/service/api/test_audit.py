@@ -3,7 +3,7 @@
 import asyncio
 from typing import Any
 
-from service.audit.refusals import N_AT_ONCE, SECONDS_EACH
+from service.api.auth.refusals import N_AT_ONCE, SECONDS_EACH
 
 AUDIT = "/api/v1/audit"
 FREEZE = "/api/v1/units/U1/bearings/UJB/baselines/freeze"

@@ -8,7 +8,7 @@ import pytest
 
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
-from service.live import LinkState
+from service.live.live_view import LinkState
 from service.runtime.times import rfc3339
 
 UJB = "/api/v1/units/U1/bearings/UJB"

@@ -10,7 +10,7 @@ import pytest
 from core.quality import GOOD, Reading, Reason, bad, missing
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount
-from service.live import HELD_S, LinkState
+from service.live.live_view import HELD_S, LinkState
 from service.settings.plant import PlantFile
 
 CHANNELS = "/api/v1/units/U1/channels"

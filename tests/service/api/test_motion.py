@@ -13,9 +13,9 @@ from acquisition.delivery.calibration import RawBlock, calibrate
 from core.quality import Reason, bad, missing
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount
-from service.conversion import calibration_of
+from service.app.recordings import recording_writer
+from service.settings.core_values import calibration_of
 from service.settings.plant import PlantFile
-from service.wiring.recordings import recording_writer
 
 MOTION = "/api/v1/units/U1/bearings/UJB/motion"
 RATE_HZ, TURN_HZ, N = 600.0, 92.3 / 60.0, 50

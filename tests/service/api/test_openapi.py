@@ -10,8 +10,8 @@ import pytest
 from jsonschema_rs import Draft202012Validator
 from pydantic import BaseModel
 
-from service.api.access.application import GuardedApi
 from service.api.app import create_app
+from service.api.auth.application import GuardedApi
 
 Operations = list[tuple[str, dict[str, Any]]]
 
@@ -185,7 +185,7 @@ def test_every_field_of_every_answer_is_explained(read_only: Any) -> None:
 
 def _models(base: type[BaseModel]) -> Iterator[type[BaseModel]]:
     for model in base.__subclasses__():
-        if model.__module__.startswith(("service.api.", "service.evidence.")):
+        if model.__module__.startswith(("service.api.", "service.reports.")):
             yield model
         yield from _models(model)
 

@@ -9,8 +9,8 @@ from core.monitor.catalogue import CATALOGUE
 from core.quality import GOOD
 from core.samples.blocks import DeviceClock, SampleBlock, StampFault
 from core.samples.gaps import Gap, SampleAccount
-from service.evidence.configuration import Configuration
-from service.live import LinkState
+from service.live.live_view import LinkState
+from service.reports.configuration import Configuration
 from service.settings.schema import plant_file_schema
 from service.store.port import UnitGap
 

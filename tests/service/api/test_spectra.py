@@ -15,7 +15,7 @@ from core.quality import GOOD, Reading
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import CrossSpectrum
 from service.api.spectra_views import MAX_NUMBERS
-from service.conversion import analysis_of, machine_of
+from service.settings.core_values import analysis_of, machine_of
 from service.settings.plant import PlantFile
 
 SPECTRA = "/api/v1/units/U1/bearings/UJB/spectra"

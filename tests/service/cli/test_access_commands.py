@@ -11,14 +11,14 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
+from service.api.auth.backoff import Backoff
+from service.api.auth.doors import Doors, LoggedIn, Refusal
+from service.api.auth.passwords import Hashing
 from service.cli.commands import app
 from service.runtime.made_by import made_by
-from service.security.backoff import Backoff
-from service.security.doors import Doors, LoggedIn, Refusal
-from service.security.identity import Identity
-from service.security.passwords import Hashing
-from service.security.roles import Role
-from service.store.access_port import AccessStore
+from service.store.access.identity import Identity
+from service.store.access.port import AccessStore
+from service.store.access.roles import Role
 from service.store.audit_port import AuditQuery
 from service.store.sqlite import SqliteStore
 

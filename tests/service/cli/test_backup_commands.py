@@ -7,10 +7,10 @@ from pathlib import Path
 
 from rigs.command_line import padwatch
 
-from service.security.keys import KeyState
-from service.security.people import create_key
-from service.security.roles import Role
-from service.security.sessions import Session
+from service.api.auth.people import create_key
+from service.store.access.keys import KeyState
+from service.store.access.roles import Role
+from service.store.access.sessions import Session
 from service.store.sqlite import SqliteStore
 
 

@@ -8,13 +8,13 @@ import pytest
 from rigs.command_line import padwatch
 
 from core.machine.unit import Estimator
+from service.app.simulated_lives import simulated_history
 from service.cli import demo
 from service.cli.daq_process import RunningDaq
-from service.films.versions import versions_after
 from service.settings.plant import PlantFile
+from service.store.baseline_versions import versions_after
 from service.store.film_port import FilmQuery
 from service.store.sqlite import SqliteStore
-from service.wiring.simulated_lives import simulated_history
 
 PORTS = {"U1": 5021, "U2": 5022}
 PAST_YEARS = 0.2

@@ -10,10 +10,10 @@ from rigs.command_line import padwatch
 
 from acquisition.delivery.calibration import RawBlock, calibrate
 from core.samples.blocks import Rejection
-from service.conversion import calibration_of
+from service.app.recordings import recording_of, recording_writer
+from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
-from service.wiring.recordings import recording_of, recording_writer
 
 START_NS = 1_767_225_600_000_000_000
 

@@ -11,8 +11,8 @@ from rigs.capturing import Rig, block
 from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.manifest import RecordedUnit
-from service.continuous.pieces import Shed, TapeSettings
-from service.continuous.tape import Tape
+from service.recordings.continuous.pieces import Shed, TapeSettings
+from service.recordings.continuous.tape import Tape
 
 SETTINGS = TapeSettings(stretch_s=10.0, part_s=2.0)
 

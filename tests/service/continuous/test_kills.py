@@ -12,10 +12,10 @@ from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.summary import summary_of
 from core.samples.blocks import SampleBlock
-from service.continuous.joining import clear_unfinished, join, unjoined
-from service.continuous.last import last_end
-from service.continuous.pieces import TapeSettings
-from service.continuous.unit_tape import UnitTape
+from service.recordings.continuous.joining import clear_unfinished, join, unjoined
+from service.recordings.continuous.last import last_end
+from service.recordings.continuous.pieces import TapeSettings
+from service.recordings.continuous.unit_tape import UnitTape
 
 SETTINGS = TapeSettings(stretch_s=4.0, part_s=2.0)
 N_BLOCKS = 30

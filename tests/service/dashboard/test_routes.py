@@ -11,11 +11,11 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from starlette.types import Message
 
+from service.api.http.answers import BoundedAnswers
 from service.dashboard import edition as told
 from service.dashboard.assets import Asset, pages, plotly
 from service.dashboard.edition import EditionHeader, edition
 from service.dashboard.routes import dashboard_router
-from service.http.answers import BoundedAnswers
 from service.settings.http_limits import HttpLimitSettings
 
 FILES = f"/static/{edition()}/"

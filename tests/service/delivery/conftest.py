@@ -15,12 +15,12 @@ from rigs.standing_clock import T0, SetClock
 from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
-from service.delivery.facts import Surroundings
-from service.delivery.message import Composer, Plant
-from service.delivery.network import Timeouts, Trust
-from service.delivery.routing import Route, Router
-from service.delivery.sender import Receiver, Sender
-from service.delivery.webhook import Webhook, WebhookTarget
+from service.notifications.facts import Surroundings
+from service.notifications.message import Composer, Plant
+from service.notifications.network import Timeouts, Trust
+from service.notifications.routing import Route, Router
+from service.notifications.sender import Receiver, Sender
+from service.notifications.webhook import Webhook, WebhookTarget
 from service.settings.delivery import TOLD
 from service.store.sqlite import SqliteStore
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from service.delivery.network import Trust
-from service.delivery.outcome import Failed
-from service.delivery.webhook import Webhook, WebhookTarget
+from service.notifications.network import Trust
+from service.notifications.outcome import Failed
+from service.notifications.webhook import Webhook, WebhookTarget
 
 
 @pytest.fixture

@@ -71,9 +71,9 @@ DELIVER_AND_HANG = """
 import asyncio, sys, threading
 from pathlib import Path
 from acquisition.clock import SystemClock
-from service.delivery.network import Trust
-from service.delivery.sender import Receiver, Sender
-from service.delivery.webhook import Webhook, WebhookTarget
+from service.notifications.network import Trust
+from service.notifications.sender import Receiver, Sender
+from service.notifications.webhook import Webhook, WebhookTarget
 from service.store.sqlite import SqliteStore
 
 store = SqliteStore(Path(sys.argv[1]))

@@ -10,14 +10,14 @@ from core.baseline.history import StiffnessHistory
 from core.change.decision import JUDGED, Verdict
 from core.machine.unit import Estimator
 from core.units import NS_PER_S
-from service.demo.past import fill, without_past
-from service.films.versions import versions_after
+from service.app.simulated_lives import simulated_history
+from service.cli.offline.demo.past import fill, without_past
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
+from service.store.baseline_versions import versions_after
 from service.store.film_port import FilmQuery
 from service.store.port import TrendQuery
 from service.store.sqlite import SqliteStore
-from service.wiring.simulated_lives import simulated_history
 
 NOW_NS = 1_794_657_615 * NS_PER_S
 YEARS = 0.3

@@ -13,18 +13,18 @@ from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.quality import Reading
-from service.conversion import machine_of
-from service.evidence.archive import EvidenceArchive
-from service.evidence.capture_link import CapturePart, linked
-from service.films.keeper import FilmKeeper
-from service.films.start import film_keeper
-from service.live import LinkState, LiveView
-from service.origin import Origin
+from service.app.captures import captures_of
+from service.app.evidence import evidence_folders, evidence_of
+from service.live.live_view import LinkState, LiveView
+from service.measuring.films.keeper import FilmKeeper
+from service.measuring.films.start import film_keeper
+from service.reports.archive import EvidenceArchive
+from service.reports.capture_link import CapturePart, linked
+from service.settings.core_values import machine_of
 from service.settings.loading import load_plant_file
+from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
-from service.wiring.captures import captures_of
-from service.wiring.evidence import evidence_folders, evidence_of
 
 T0 = 1_767_225_600_000_000_000
 SECOND = 1_000_000_000

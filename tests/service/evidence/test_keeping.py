@@ -12,14 +12,14 @@ import pytest
 from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import AlarmEvent
 from core.quality import Reading
-from service.capture.file import _write_alarms
-from service.capture.folders import ALARM
-from service.capture.outcome import Outcome
-from service.evidence import keeper as module
-from service.evidence.archive import DamagedEvidenceError
-from service.evidence.document import Evidence
-from service.evidence.folders import INCOMPLETE, place_of
-from service.evidence.snapshot import Camera
+from service.recordings.capture.file import _write_alarms
+from service.recordings.capture.folders import ALARM
+from service.recordings.capture.outcome import Outcome
+from service.reports import keeper as module
+from service.reports.archive import DamagedEvidenceError
+from service.reports.document import Evidence
+from service.reports.folders import INCOMPLETE, place_of
+from service.reports.snapshot import Camera
 
 Make = Callable[..., Any]
 NOBODY: frozenset[tuple[str, int]] = frozenset()

@@ -6,8 +6,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from service.evidence.plots.plot import BOTTOM, LEFT, RIGHT, TOP, Plot
-from service.evidence.plots.scales import Scale, TimeScale, around
+from service.reports.plots.plot import BOTTOM, LEFT, RIGHT, TOP, Plot
+from service.reports.plots.scales import Scale, TimeScale, around
 
 
 def plot(x_label: str = "Time, UTC", **changes: object) -> Plot:

@@ -10,8 +10,8 @@ from unittest.mock import Mock
 
 import pytest
 
-from service.evidence.folders import Place, clear_leftovers, places, removed
-from service.evidence.room import SURVEY_S, EvidenceLimits, EvidenceRoom
+from service.reports.folders import Place, clear_leftovers, places, removed
+from service.reports.room import SURVEY_S, EvidenceLimits, EvidenceRoom
 
 RoomOf = Callable[..., EvidenceRoom]
 KB = b"x" * 1000

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 import pytest
 from starlette.types import Receive, Scope, Send
 
-from service.asker import ASKER, Asker
-from service.http.config import GuardedConfig
-from service.http.protocol import GuardedProtocol
-from service.http.server import GuardedServer
+from service.api.http.config import GuardedConfig
+from service.api.http.protocol import GuardedProtocol
+from service.api.http.server import GuardedServer
+from service.runtime.asker import ASKER, Asker
 from service.settings.http_limits import HttpLimitSettings
 
 PATIENCE_S = 20.0

@@ -10,8 +10,8 @@ import pytest
 from starlette.responses import PlainTextResponse
 
 from acquisition.clock import SystemClock
+from service.app.web import server_of
 from service.settings.plant import PlantFile
-from service.wiring.http import server_of
 
 GET = b"GET / HTTP/1.1\r\nHost: localhost\r\n"
 POST = b"POST / HTTP/1.1\r\nHost: localhost\r\n"

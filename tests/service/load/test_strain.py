@@ -8,11 +8,11 @@ import pytest
 from rigs.capturing import block
 from starlette.responses import PlainTextResponse
 
-from service.bus import Bus
-from service.load.questions import question
-from service.load.shedding import Shedding
-from service.load.strain import LoadLimits, Refused, Strain, advance
-from service.load.watch import N_LOOKS, LoadWatch
+from service.api.load.questions import question
+from service.api.load.shedding import Shedding
+from service.api.load.strain import LoadLimits, Refused, Strain, advance
+from service.api.load.watch import N_LOOKS, LoadWatch
+from service.measuring.bus import Bus
 
 NOTHING, HISTORY, VIEWS = Refused
 

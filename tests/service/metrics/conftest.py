@@ -19,15 +19,15 @@ from acquisition.source import SampleSource
 from core.quality import Reason, bad
 from core.samples.blocks import DeviceClock, Rejection, SampleBlock
 from core.samples.gaps import SampleAccount
-from service.conversion import calibration_of
-from service.http.listening import listen
-from service.metrics.polls import TimedSource
-from service.program import Performance, run_service
-from service.roles.watched_unit import WatchedUnit
+from service.api.http.listening import listen
+from service.app.program import Performance, run_service
+from service.app.simulations import simulated_feed
+from service.measuring.sources import monitor_of
+from service.measuring.watched_unit import WatchedUnit
+from service.runtime.polls import TimedSource
+from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
-from service.wiring.simulations import simulated_feed
-from service.wiring.sources import monitor_of
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 BLOCK = 1024

@@ -12,9 +12,9 @@ import pytest
 import yaml
 from prometheus_client.metrics_core import Metric
 
-from service.live import LinkState
-from service.replica.metrics import unit_metrics as replica_unit_metrics
-from service.stream.consumer_metrics import consumer_metrics
+from service.cluster.replica.metrics import unit_metrics as replica_unit_metrics
+from service.cluster.stream.consumer_metrics import consumer_metrics
+from service.live.live_view import LinkState
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
 DASHBOARD = json.loads((DEPLOY / "grafana" / "padwatch.json").read_text("utf-8"))

@@ -10,11 +10,11 @@ import pytest
 
 from acquisition.clock import Clock
 from core.samples.blocks import SampleBlock
-from service.heartbeats import Unheard
-from service.metrics.acquired import MAX_REASONS, bounded
-from service.metrics.durations import Durations
-from service.metrics.polls import PollClock, TimedSource
-from service.metrics.timings import Timings
+from service.measuring.metrics.acquired import MAX_REASONS, bounded
+from service.measuring.metrics.timings import Timings
+from service.runtime.durations import Durations
+from service.runtime.heartbeats import Unheard
+from service.runtime.polls import PollClock, TimedSource
 
 
 def test_a_bound_belongs_to_its_bucket_and_nothing_is_left_out(stepped_clock: Any) -> None:

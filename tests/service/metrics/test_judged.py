@@ -12,11 +12,11 @@ from core.change.decision import Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
-from service.alarms.engine import AlarmEngine
-from service.delivery.deliveries import ReceiverView
-from service.delivery.sender import Receiver, SenderStatus
-from service.metrics.judged import alarm_metrics, film_metrics
-from service.metrics.told import delivery_metrics
+from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.metrics.judged import alarm_metrics, film_metrics
+from service.notifications.deliveries import ReceiverView
+from service.notifications.metrics import delivery_metrics
+from service.notifications.sender import Receiver, SenderStatus
 from service.store.outbox_port import Backlog
 
 HOUR_NS = 3_600_000_000_000

@@ -10,8 +10,8 @@ from core.arrays import FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from core.quality import Reading
-from service.orbits.motion import ShaftMotion, motion_of
-from service.orbits.stretch import ShaftStretch
+from service.live.shaft_stretch import ShaftStretch
+from service.recordings.motion import ShaftMotion, motion_of
 
 RATE_HZ, TURN_HZ, N = 600.0, 1.5, 6000
 TURNS = TURN_HZ * np.arange(N) / RATE_HZ

@@ -7,11 +7,11 @@ from pydantic import ValidationError
 from structlog.testing import capture_logs
 
 from acquisition.clock import Clock
-from service.retaining import LOOK_S, PERIOD_S, REST_SHARE, Retaining
+from service.app.retention import retention_limits
 from service.settings.retention import RetentionSettings
 from service.store.port import StoreError
+from service.store.retaining import LOOK_S, PERIOD_S, REST_SHARE, Retaining
 from service.store.retention.limits import DAY_NS, RetentionLimits
-from service.wiring.retention import retention_limits
 
 LIMITS = RetentionLimits(readings_ns=DAY_NS)
 

@@ -10,13 +10,13 @@ from harness.waiting import at_work, until
 from rigs.standing_clock import StandingClock
 
 from acquisition.clock import SystemClock
-from service.delivery.deliveries import Deliveries
-from service.delivery.outcome import Delivered
-from service.delivery.sender import Receiver
-from service.heartbeats import UNHEARD, Heartbeats, Pulse
-from service.roles.holding import HoldLostError, Holds
-from service.roles.leadership import Leadership
-from service.roles.partition import Partition
+from service.cluster.holding import HoldLostError, Holds
+from service.cluster.leadership import Leadership
+from service.cluster.partition import Partition
+from service.notifications.deliveries import Deliveries
+from service.notifications.outcome import Delivered
+from service.notifications.sender import Receiver
+from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
 from service.settings.loading import load_plant_file
 from service.store.database import Hold
 from service.store.port import StoreError

@@ -8,13 +8,13 @@ from typing import Any
 from core.alarms.alarm import PLANT, Alarm, AlarmChange, AlarmIdentity, AlarmNews, changed
 from core.alarms.statistics import ChatterRule
 from core.limits import AlarmLevel
-from service.alarms.engine import AlarmEngine
-from service.alarms.health import ServiceHealth
-from service.alarms.start import alarm_engine
-from service.origin import Origin
-from service.replica.alarms import ReplicaAlarms
-from service.roles.partition import Partition
+from service.cluster.partition import Partition
+from service.cluster.replica.alarms import ReplicaAlarms
+from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.alarms.health import ServiceHealth
+from service.measuring.alarms.start import alarm_engine
 from service.settings.loading import load_plant_file
+from service.settings.origin import Origin
 from service.store.sqlite import SqliteStore
 
 LOST = Alarm(AlarmIdentity(PLANT, "U2", "samples_lost"))

@@ -21,16 +21,16 @@ from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import Reach
-from service.alarms.engine import AlarmEngine
-from service.capture.captures import Captures
-from service.capture.file import MakeWriter
-from service.capture.span import CaptureSettings
-from service.films.keeper import FilmKeeper
-from service.live import LiveView
-from service.parked_rows import FILE, ParkedRows
-from service.recorder import Recorder
-from service.roles.watched_unit import WatchedUnit
-from service.runner import Runner
+from service.live.live_view import LiveView
+from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.films.keeper import FilmKeeper
+from service.measuring.parked_rows import FILE, ParkedRows
+from service.measuring.recorder import Recorder
+from service.measuring.runner import Runner
+from service.measuring.watched_unit import WatchedUnit
+from service.recordings.capture.captures import Captures
+from service.recordings.capture.file import MakeWriter
+from service.recordings.capture.span import CaptureSettings
 from service.settings.film_alarms import FilmAlarmSettings
 from service.store.sqlite import SqliteStore
 

@@ -9,9 +9,9 @@ import structlog
 
 from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
-from service.bus import Bus
-from service.live import LinkState
-from service.roles.acquiring import CONNECTS_PER_S
+from service.live.live_view import LinkState
+from service.measuring.acquiring import CONNECTS_PER_S
+from service.measuring.bus import Bus
 
 Make = Callable[..., Any]
 

@@ -23,14 +23,14 @@ from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.samples.gaps import Gap
-from service import recorder as recording
 from service.api.app import create_app
 from service.api.context import Context
-from service.api.in_process import InProcess
-from service.delivery.deliveries import Deliveries
-from service.parked_rows import FILE, ParkedRows
-from service.recorder import Findings, NotStoredError, Recorder
-from service.references import ReferencesInForce
+from service.measuring import recorder as recording
+from service.measuring.in_process import InProcess
+from service.measuring.parked_rows import FILE, ParkedRows
+from service.measuring.recorder import Findings, NotStoredError, Recorder
+from service.measuring.references import ReferencesInForce
+from service.notifications.deliveries import Deliveries
 from service.store.port import TrendQuery, UnitGap
 
 K = "order1_k_eff_xx_n_per_m"

@@ -8,11 +8,11 @@ import pytest
 from argon2 import PasswordHasher
 from harness.places import Place, SqlitePlace
 
-from service.security.backoff import Backoff
-from service.security.doors import Doors
-from service.security.passwords import Hashing
-from service.security.people import People
-from service.store.access_port import AccessStore
+from service.api.auth.backoff import Backoff
+from service.api.auth.doors import Doors
+from service.api.auth.passwords import Hashing
+from service.api.auth.people import People
+from service.store.access.port import AccessStore
 from service.store.sql_store import SqlStore
 
 

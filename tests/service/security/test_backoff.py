@@ -2,7 +2,7 @@
 
 import pytest
 
-from service.security.backoff import OF_ACCOUNT, OF_PEER, Backoff, FailureBook, WaitRule, place_of
+from service.api.auth.backoff import OF_ACCOUNT, OF_PEER, Backoff, FailureBook, WaitRule, place_of
 
 S = 1_000_000_000
 HERE, THERE = "10.0.0.1", "10.0.0.2"

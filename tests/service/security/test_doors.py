@@ -9,17 +9,17 @@ from pathlib import Path
 import pytest
 from argon2 import PasswordHasher
 
-from service.security.addresses import Doorway, why_closed
-from service.security.backoff import OF_ACCOUNT, Backoff
-from service.security.doors import Doors, LoggedIn, NotLoggedIn, Refusal
-from service.security.identity import Identity, Means
-from service.security.passwords import Hashing
-from service.security.people import People, create_key
-from service.security.roles import Permission, Role
-from service.security.sessions import SessionLimits
-from service.security.tokens import digest
-from service.store.access_port import AccessStore
-from service.store.accounts import MAX_SESSIONS
+from service.api.auth.backoff import OF_ACCOUNT, Backoff
+from service.api.auth.doors import Doors, LoggedIn, NotLoggedIn, Refusal
+from service.api.auth.passwords import Hashing
+from service.api.auth.people import People, create_key
+from service.settings.addresses import Doorway, why_closed
+from service.store.access.accounts import MAX_SESSIONS
+from service.store.access.identity import Identity, Means
+from service.store.access.port import AccessStore
+from service.store.access.roles import Permission, Role
+from service.store.access.sessions import SessionLimits
+from service.store.access.tokens import digest
 
 T0 = 1_767_225_600_000_000_000
 S = 1_000_000_000

@@ -8,22 +8,17 @@ from argon2 import extract_parameters
 from argon2.low_level import Type
 from harness.places import Place
 
-from service.audit.acting import Acting, acting_as
-from service.audit.entry import Source
-from service.security.doors import Doors, LoggedIn, Refusal
-from service.security.identity import Identity, Means
-from service.security.keys import NS_PER_DAY, KeyState
-from service.security.names import NameRefusedError, account_name
-from service.security.passwords import (
-    Hashing,
-    PasswordRefusedError,
-    new_password,
-    plant_hasher,
-)
-from service.security.people import SET_UP_S, People, create_key
-from service.security.roles import Role
-from service.security.tokens import key_id, new_key
-from service.store.access_port import AccessRefusedError, AccessStore
+from service.api.auth.doors import Doors, LoggedIn, Refusal
+from service.api.auth.passwords import Hashing, PasswordRefusedError, new_password, plant_hasher
+from service.api.auth.people import SET_UP_S, People, create_key
+from service.store.access.acting import Acting, acting_as
+from service.store.access.audit_entry import Source
+from service.store.access.identity import Identity, Means
+from service.store.access.keys import NS_PER_DAY, KeyState
+from service.store.access.names import NameRefusedError, account_name
+from service.store.access.port import AccessRefusedError, AccessStore
+from service.store.access.roles import Role
+from service.store.access.tokens import key_id, new_key
 from service.store.audit_port import AuditQuery
 from service.store.sql_store import SqlStore
 

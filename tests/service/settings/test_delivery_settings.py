@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 
 from acquisition.clock import SystemClock
-from service.delivery.facts import Surroundings
-from service.origin import Origin
+from service.app.delivery import receivers_of, router_of
+from service.notifications.facts import Surroundings
 from service.settings.loading import load_plant_file
+from service.settings.origin import Origin
 from service.store.outbox_port import nobody
-from service.wiring.delivery import receivers_of, router_of
 
 WEBHOOK = """
 [[delivery.receiver]]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from core.machine.channel import Measurand, SlowRollVector
-from service.conversion import calibration_of, machine_of
+from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file
 
 Mistakes = Callable[[str | bytes], list[str]]

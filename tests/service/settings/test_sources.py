@@ -11,6 +11,7 @@ from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegister
 from core.spectra.polls import VectorPart, VectorRow
 from service.settings.base import MisfitError
 from service.settings.can import CanSettings
+from service.settings.expected_identity import identity_of
 from service.settings.modbus_identity import IdentitySettings
 from service.settings.modbus_sources import (
     ModbusFifoSettings,
@@ -19,7 +20,6 @@ from service.settings.modbus_sources import (
     SlowDeviceSettings,
 )
 from service.settings.response import FOLDER
-from service.wiring.modbus_identity import identity_of
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
 SKF = "maps/vector-rack-skf-like.toml"

@@ -9,12 +9,12 @@ from pydantic import ValidationError
 
 from acquisition.clock import Clock
 from core.limits import AlarmLevel
+from service.app.space import space_limits
+from service.runtime.space.disk import DiskSpace, measure_disk
+from service.runtime.space.growth import Growth
+from service.runtime.space.limits import SpaceLimits
+from service.runtime.space.watch import SpaceWatch
 from service.settings.space import SpaceSettings
-from service.space.disk import DiskSpace, measure_disk
-from service.space.growth import Growth
-from service.space.limits import SpaceLimits
-from service.space.watch import SpaceWatch
-from service.wiring.space import space_limits
 
 GB = 10**9
 HOUR_S = 3600.0

@@ -8,8 +8,8 @@ from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.life_cycle import update
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
-from service.security.keys import ApiKey
-from service.security.roles import Role
+from service.store.access.keys import ApiKey
+from service.store.access.roles import Role
 from service.store.audit_port import AuditQuery
 from service.store.commands_port import Command, OpenCommand
 from service.store.film_port import BaselineStep, StoredStep

@@ -14,7 +14,7 @@ from rigs.store_fixtures import at, gap, query
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.quality import Level, Quality, Reading, Reason, missing, uncertain
-from service.asker import ASKER, Asker
+from service.runtime.asker import ASKER, Asker
 from service.store import sql_store, trends
 from service.store.codec import Layout
 from service.store.port import QueryTooLargeError, RefusedRowError, StoreError

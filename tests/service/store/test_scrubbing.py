@@ -10,14 +10,14 @@ import pytest
 from rigs.assessments import assessment
 from rigs.store_fixtures import Execute, at
 
-from service.background import LOOK_S
-from service.heartbeats import PATIENCE_S, Heartbeats
-from service.live import LiveView
-from service.scrubbing import Scrubbing
-from service.security.roles import Role
-from service.security.sessions import Session
-from service.soundness import Soundness
+from service.live.live_view import LiveView
+from service.measuring.soundness import Soundness
+from service.runtime.background import LOOK_S
+from service.runtime.heartbeats import PATIENCE_S, Heartbeats
+from service.store.access.roles import Role
+from service.store.access.sessions import Session
 from service.store.audit_port import AuditQuery
+from service.store.scrubbing import Scrubbing
 from service.store.seals.damage import Place
 from service.store.sqlite import SqliteStore, scrubbing
 from service.store.sqlite.checking import findings

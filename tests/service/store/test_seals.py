@@ -10,7 +10,7 @@ from rigs.assessments import assessment
 from rigs.rolled_trends import gather_all
 from rigs.store_fixtures import Execute, at, gap, query
 
-from service.security.roles import Role
+from service.store.access.roles import Role
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError, TrendQuery
 from service.store.seals.damage import MAX_PLACES, DamageLog, Place

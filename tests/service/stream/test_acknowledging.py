@@ -26,14 +26,14 @@ from harness.stream_rig import (
 from nats.aio.msg import Msg
 from nats.js.errors import NotFoundError
 
+from service.app.stores import open_store
+from service.cluster.stream import consumer as consuming
+from service.cluster.stream.consumer import Consumer
+from service.cluster.stream.names import consumer_name, stream_name, subject
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
 from service.store.sql_store import SqlStore
-from service.stream import consumer as consuming
-from service.stream.consumer import Consumer
-from service.stream.names import consumer_name, stream_name, subject
-from service.wiring.stores import open_store
 
 N_BLOCKS = 60
 UNIT = "U1"

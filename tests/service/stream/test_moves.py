@@ -22,10 +22,10 @@ from core.quality import GOOD, Quality, Reading, Reason, bad, uncertain
 from core.samples.axis import RECOUNTED_EPOCHS
 from core.samples.blocks import Rejection, SampleBlock
 from core.units import NS_PER_S
-from service.live import LinkState
-from service.roles.link_news import LinkNews
+from service.cluster.stream.wire import encoded_block, encoded_link
+from service.live.live_view import LinkState
+from service.measuring.link_news import LinkNews
 from service.settings.units import UnitSettings
-from service.stream.wire import encoded_block, encoded_link
 
 LEDGER = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)
 SPAN = LEDGER.n_segments * LEDGER.hop_samples

@@ -15,15 +15,15 @@ from nats.js.client import JetStreamContext
 from acquisition.clock import SystemClock
 from core.quality import GOOD
 from core.samples.blocks import SampleBlock
-from service.live import LinkState
-from service.roles.link_news import LinkNews
+from service.cluster.stream.errors import StreamError, StreamMisfitError
+from service.cluster.stream.names import identity_of, stream_name, subject
+from service.cluster.stream.publisher import Publisher
+from service.cluster.stream.session import session
+from service.cluster.stream.wire import Taken, decoded
+from service.live.live_view import LinkState
+from service.measuring.link_news import LinkNews
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
-from service.stream.errors import StreamError, StreamMisfitError
-from service.stream.names import identity_of, stream_name, subject
-from service.stream.publisher import Publisher
-from service.stream.session import session
-from service.stream.wire import Taken, decoded
 
 WAIT_S = 30.0
 

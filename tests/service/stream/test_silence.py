@@ -13,11 +13,11 @@ from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import Life, Message, MovingUnit
 from harness.stream_rig import analysing, blocks
 
-from service.live import LinkState
+from service.cluster.stream.silence import Silence, silences_s
+from service.cluster.stream.wire import encoded_block
+from service.live.live_view import LinkState
 from service.settings.loading import load_plant_file
 from service.store.port import AlarmQuery
-from service.stream.silence import Silence, silences_s
-from service.stream.wire import encoded_block
 
 LEDGER = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)
 UNIT = "U1"

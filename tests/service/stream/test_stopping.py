@@ -8,12 +8,12 @@ import pytest
 from nats.aio.client import Client
 
 from acquisition.clock import SystemClock
+from service.cluster.stream.consumer import Consumer
+from service.cluster.stream.identity import UnitIdentity
+from service.cluster.stream.outbound import Outgoing
+from service.cluster.stream.publisher import Publisher
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
-from service.stream.consumer import Consumer
-from service.stream.identity import UnitIdentity
-from service.stream.outbound import Outgoing
-from service.stream.publisher import Publisher
 
 SETTINGS = StreamSettings(servers=("nats://127.0.0.1:9",))
 

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
-from service.live import LinkState
-from service.roles.link_news import LinkNews
-from service.stream.identity import UnitIdentity, fingerprint
-from service.stream.wire import Taken, decoded, encoded_block, encoded_link
-from service.stream.wire_errors import WireError
+from service.cluster.stream.identity import UnitIdentity, fingerprint
+from service.cluster.stream.wire import Taken, decoded, encoded_block, encoded_link
+from service.cluster.stream.wire_errors import WireError
+from service.live.live_view import LinkState
+from service.measuring.link_news import LinkNews
 
 OWN = UnitIdentity("U1", fingerprint("Plant"), fingerprint("sx"))
 TAKEN_NS = 1_767_225_600_000_000_007

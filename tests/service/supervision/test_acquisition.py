@@ -10,13 +10,13 @@ import pytest
 
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
-from service.heartbeats import PATIENCE_S, Heartbeats
-from service.live import LinkState, LiveView
-from service.metrics.polls import TimedSource
-from service.notify import ServiceManager
-from service.roles.acquiring import Acquirer
-from service.roles.watched_unit import WatchedUnit
-from service.supervision import Supervision
+from service.app.supervision import Supervision
+from service.live.live_view import LinkState, LiveView
+from service.measuring.acquiring import Acquirer
+from service.measuring.watched_unit import WatchedUnit
+from service.runtime.heartbeats import PATIENCE_S, Heartbeats
+from service.runtime.polls import TimedSource
+from service.runtime.service_manager import ServiceManager
 
 from .conftest import Gates
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import structlog
 
-from service.notify import ServiceManager
+from service.runtime.service_manager import ServiceManager
 
 
 @pytest.mark.parametrize("manager_socket", ["", "\0"], ids=["path", "abstract"], indirect=True)

@@ -13,16 +13,16 @@ from acquisition.delivery.calibration import RawBlock
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand
-from service.space.disk import DiskSpace
-from service.space.limits import SpaceLimits
+from service.recordings.keeping.caretaker import Caretaker, Custody
+from service.recordings.keeping.gauge import Gauge
+from service.recordings.keeping.index import Index
+from service.recordings.keeping.keeper import WaveformKeeper
+from service.recordings.keeping.room import RoomLimits
+from service.recordings.keeping.watch_keeping import WatchKeeping
+from service.runtime.space.disk import DiskSpace
+from service.runtime.space.limits import SpaceLimits
 from service.store.sqlite import SqliteStore
 from service.store.waveform_port import WaveformFile, WaveformKind
-from service.waveforms.caretaker import Caretaker, Custody
-from service.waveforms.gauge import Gauge
-from service.waveforms.index import Index
-from service.waveforms.keeper import WaveformKeeper
-from service.waveforms.room import RoomLimits
-from service.waveforms.watch_keeping import WatchKeeping
 
 T0 = 1_767_225_600_000_000_000
 HOUR_NS = 3600 * 10**9

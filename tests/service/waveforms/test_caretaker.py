@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
+from service.recordings.keeping.folders import put_out_of_sight
+from service.recordings.keeping.inspection import again
+from service.recordings.keeping.place import place_of
 from service.store.waveform_port import WaveformKind, WaveformState
-from service.waveforms.folders import put_out_of_sight
-from service.waveforms.inspection import again
-from service.waveforms.place import place_of
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
 T0 = 1_767_225_600_000_000_000
@@ -120,7 +120,7 @@ def test_what_is_read_once_more_takes_a_small_share_of_the_time(
     for hour in range(3):
         rig.make(hour)
     rig.caretaker.look()
-    monkeypatch.setattr("service.waveforms.caretaker.again", slow)
+    monkeypatch.setattr("service.recordings.keeping.caretaker.again", slow)
     rig.clock.s = DAY_S + 1.0
     for _ in range(100):
         rig.caretaker.look()

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from service.alarms.health import health_of
+from service.measuring.alarms.health import health_of
 from service.recordings.shelf import Shelf
-from service.space.disk import DiskSpace
+from service.runtime.space.disk import DiskSpace
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
 from service.store.waveforms import StoredWaveforms

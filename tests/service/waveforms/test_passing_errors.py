@@ -10,11 +10,11 @@ from harness.corruption import CHANGES, corrupted
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.reader import open_recording
+from service.recordings.keeping import inspection
+from service.recordings.keeping.check import Found, RecordingCheck
+from service.recordings.keeping.unread import AGAIN_S
 from service.recordings.shelf import Shelf
 from service.store.waveform_port import WaveformKind, WaveformState
-from service.waveforms import inspection
-from service.waveforms.check import Found, RecordingCheck
-from service.waveforms.unread import AGAIN_S
 
 CONTINUOUS = WaveformKind.CONTINUOUS
 DAY_S = 86_400.0

@@ -3,9 +3,9 @@
 from dataclasses import replace
 from typing import Any
 
-from service.space.disk import DiskSpace
+from service.recordings.keeping.ages import NotOldFrom
+from service.runtime.space.disk import DiskSpace
 from service.store.waveform_port import WaveformFile, WaveformKind
-from service.waveforms.ages import NotOldFrom
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
 

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from acquisition.clock import SystemClock
-from service.replay import replayed_plant
-from service.security.roles import Role
+from service.app.access import access_desk
+from service.app.replay import replayed_plant
 from service.settings.access import AccessSettings, TlsSettings
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
+from service.store.access.roles import Role
 from service.store.sqlite import SqliteStore
-from service.wiring.access import access_desk
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 TLS = TlsSettings(certificate="a.crt", key="a.key")

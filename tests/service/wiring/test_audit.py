@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from acquisition.clock import SystemClock
-from service.audit.entry import AuditEntry
-from service.origin import Origin
+from service.app.audit_trail import ServiceTrail
+from service.settings.origin import Origin
 from service.settings.plant import PlantFile
+from service.store.access.audit_entry import AuditEntry
 from service.store.audit_port import AuditQuery
 from service.store.sqlite import SqliteStore
-from service.wiring.audit import ServiceTrail
 
 
 def told(store: SqliteStore) -> list[AuditEntry]:

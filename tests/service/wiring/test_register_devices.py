@@ -14,17 +14,10 @@ from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.conversion import calibration_of, machine_of
-from service.settings.loading import load_plant_file
-from service.settings.modbus_sources import (
-    ModbusFifoSettings,
-    ModbusPolledSettings,
-    ModbusVectorSettings,
-)
-from service.settings.units import UnitSettings
-from service.wiring.probes import link_settings_of
-from service.wiring.register_daqs import fifo_device, modbus_server, polled_device, vector_device
-from service.wiring.registers import (
+from service.app.register_daqs import fifo_device, modbus_server, polled_device, vector_device
+from service.app.simulations import simulated_feed
+from service.cli.offline.probes import link_settings_of
+from service.measuring.registers import (
     at_poll_rate,
     fifo_source,
     polled_settings,
@@ -32,8 +25,15 @@ from service.wiring.registers import (
     vector_monitor,
     vector_source,
 )
-from service.wiring.simulations import simulated_feed
-from service.wiring.sources import retry_s
+from service.measuring.sources import retry_s
+from service.settings.core_values import calibration_of, machine_of
+from service.settings.loading import load_plant_file
+from service.settings.modbus_sources import (
+    ModbusFifoSettings,
+    ModbusPolledSettings,
+    ModbusVectorSettings,
+)
+from service.settings.units import UnitSettings
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 N_SEGMENTS = 6

@@ -17,11 +17,11 @@ from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.units import NS_PER_S
-from service.conversion import analysis_of, calibration_of, machine_of
+from service.app.simulated_lives import simulated_history
+from service.app.simulations import scenario_of, simulated_feed
+from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import PlantFileError, load_plant_file
 from service.settings.plant import PlantFile
-from service.wiring.simulated_lives import simulated_history
-from service.wiring.simulations import scenario_of, simulated_feed
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 CLEARANCE_UM = {"UJB": 500.0, "LJB": 615.0, "TJB": 425.0}

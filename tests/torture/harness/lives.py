@@ -15,7 +15,7 @@ from core.monitor.monitor import UnitMonitor
 from core.samples.gaps import Gap
 from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.truth import BEARINGS
-from service.conversion import analysis_of, calibration_of, machine_of
+from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.plant import PlantFile
 from service.store.port import Store, TrendQuery
 

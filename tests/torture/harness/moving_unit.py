@@ -10,16 +10,16 @@ import numpy as np
 
 from acquisition.clock import Clock, SystemClock
 from harness.stream_rig import ground_of
-from service.bus import Bus
-from service.delivery.facts import Around
-from service.recorder import Findings
-from service.roles.analysis import Analysis, analysis_on
+from service.app.analysis import Analysis, analysis_on
+from service.cluster.stream.names import identity_of
+from service.cluster.stream.progress import UnitProgress
+from service.cluster.stream.stored import memories_of, usable
+from service.measuring.bus import Bus
+from service.measuring.recorder import Findings
+from service.notifications.facts import Around
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
-from service.stream.names import identity_of
-from service.stream.progress import UnitProgress
-from service.stream.stored import memories_of, usable
 
 STREAM = "born once"
 

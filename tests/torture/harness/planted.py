@@ -21,11 +21,11 @@ from core.samples.blocks import SampleBlock
 from core.samples.ring import Ring
 from core.units import NS_PER_S
 from harness.open_program import main
-from service.alarms.engine import AlarmEngine
-from service.continuous import joining, tape, unit_tape
-from service.continuous.stretch import Stretch
-from service.live import LiveView
-from service.recorder import Findings, Recorder
+from service.live.live_view import LiveView
+from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.recorder import Findings, Recorder
+from service.recordings.continuous import joining, tape, unit_tape
+from service.recordings.continuous.stretch import Stretch
 from service.store import sql_store
 
 SLOW_S = 1.5

@@ -18,26 +18,26 @@ from core.units import NS_PER_S
 from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer
 from harness.waiting import at_work
-from service.analyse_program import Analysing
-from service.bus import Bus
-from service.delivery.facts import Around
-from service.heartbeats import Heartbeats
-from service.live import LinkState
-from service.metrics.timings import Timings
-from service.origin import Origin
-from service.roles.analysis import analysis_on
-from service.roles.ground import Ground, live_view
-from service.roles.link_news import LinkNews
-from service.roles.partition import Partition
+from service.app.analyse_program import Analysing
+from service.app.analysis import analysis_on
+from service.app.ground import Ground, live_view
+from service.app.stores import open_store
+from service.cluster.partition import Partition
+from service.cluster.stream.names import identity_of, stream_name, subject
+from service.cluster.stream.publisher import Publisher
+from service.cluster.stream.wire import Taken, decoded
+from service.live.live_view import LinkState
+from service.measuring.bus import Bus
+from service.measuring.link_news import LinkNews
+from service.measuring.metrics.timings import Timings
+from service.measuring.sources import monitor_of
+from service.notifications.facts import Around
+from service.runtime.heartbeats import Heartbeats
 from service.settings.loading import load_plant_file
+from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.port import Store
 from service.store.sqlite import SqliteStore
-from service.stream.names import identity_of, stream_name, subject
-from service.stream.publisher import Publisher
-from service.stream.wire import Taken, decoded
-from service.wiring.sources import monitor_of
-from service.wiring.stores import open_store
 
 LEDGER = LedgerPlant(n_units=2, load=1.0, segment_samples=8192, n_segments=2)
 T0 = 1_767_225_600 * NS_PER_S

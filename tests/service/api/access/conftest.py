@@ -11,14 +11,14 @@ import pytest
 from argon2 import PasswordHasher
 from rigs.described import described_app
 
-from service.api.access.desk import AccessDesk
-from service.bus import Bus
-from service.metrics.scrape import scrape
-from service.metrics.timings import Timings
-from service.metrics.watched import Watched
-from service.security.passwords import Hashing
-from service.security.people import create_key
-from service.security.roles import Role
+from service.api.auth.desk import AccessDesk
+from service.api.auth.passwords import Hashing
+from service.api.auth.people import create_key
+from service.app.scrape import scrape
+from service.app.watched import Watched
+from service.measuring.bus import Bus
+from service.measuring.metrics.timings import Timings
+from service.store.access.roles import Role
 
 PASSWORD = "the river is high in may"  # noqa: S105
 OWN = {"Origin": "http://padwatch"}

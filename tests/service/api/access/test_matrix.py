@@ -11,11 +11,11 @@ from rigs.tiers import covering, fast_and_long
 from starlette.responses import PlainTextResponse
 from starlette.routing import Mount
 
-from service.api.access.application import GuardedApi
-from service.api.access.declared import OPEN, Reach, UndeclaredRouteError, declared, needs
+from service.api.auth.application import GuardedApi
+from service.api.auth.declared import OPEN, Reach, UndeclaredRouteError, declared, needs
 from service.dashboard.edition import edition
-from service.security.roles import Permission, Role
-from service.security.tokens import new_key, new_token
+from service.store.access.roles import Permission, Role
+from service.store.access.tokens import new_key, new_token
 
 ROLES = ("viewer", "operator", "engineer", "admin")
 NO_ROLE = None

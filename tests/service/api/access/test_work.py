@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from service.api.access.work import MAX_WAITING, AccessWork, TooManyLoginsError
-from service.security.passwords import MAX_AT_ONCE
+from service.api.auth.passwords import MAX_AT_ONCE
+from service.api.auth.work import MAX_WAITING, AccessWork, TooManyLoginsError
 from service.store.port import StoreError
 
 

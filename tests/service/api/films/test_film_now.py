@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from core.quality import Reason, bad
-from service.live import LinkState
+from service.live.live_view import LinkState
 
 FILM = "/api/v1/units/U1/bearings/UJB/film"
 LJB = "/api/v1/units/U1/bearings/LJB/film"

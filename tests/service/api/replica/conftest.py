@@ -9,10 +9,10 @@ import pytest
 from rigs.described import described_app
 
 from core.alarms.alarm import PLANT
-from service.heartbeats import Heartbeats
-from service.replica.carrying_out import CarryingOut
-from service.replica.reporter import Reporter
-from service.roles.replica import Replica, replica_context, replica_on
+from service.app.replica import Replica, replica_context, replica_on
+from service.cluster.replica.carrying_out import CarryingOut
+from service.cluster.replica.reporter import Reporter
+from service.runtime.heartbeats import Heartbeats
 from service.settings.plant import PlantFile
 
 

@@ -6,9 +6,9 @@ import pytest
 
 from core.alarms.alarm import AlarmState
 from core.limits import AlarmLevel
-from service.live import LinkState
-from service.replica.live import NOBODY, SILENT_AFTER_S
-from service.roles.replica import replica_on
+from service.app.replica import replica_on
+from service.cluster.replica.live import NOBODY, SILENT_AFTER_S
+from service.live.live_view import LinkState
 from service.store.port import StoreError
 
 SAME = [
@@ -128,7 +128,9 @@ async def test_a_report_of_another_version_is_no_sign_of_life(
     pair: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pair.service.clock.s += SILENT_AFTER_S + 0.1
-    monkeypatch.setattr("service.replica.reporter.written_signs", lambda _: '[{"version": 9}]')
+    monkeypatch.setattr(
+        "service.cluster.replica.reporter.written_signs", lambda _: '[{"version": 9}]'
+    )
     await pair.told()
 
     assert not pair.replica.live.is_alive("U1")

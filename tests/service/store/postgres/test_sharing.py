@@ -14,8 +14,8 @@ from rigs.assessments import assessment
 from rigs.store_fixtures import Build
 
 from core.monitor.assessment import Assessment
-from service.audit.entry import Deed
-from service.origin import Origin
+from service.settings.origin import Origin
+from service.store.access.audit_entry import Deed
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore

@@ -1,0 +1,41 @@
+"""The audit trail as a CSV file that is safe to open in a spreadsheet."""
+
+import csv
+from collections.abc import Iterable
+from dataclasses import astuple, fields
+from typing import TextIO
+
+from service.runtime.times import rfc3339
+from service.store.access.audit_entry import AuditEntry
+
+HEADER = ("time", *(field.name for field in fields(AuditEntry)))
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "|", "%", "'", "＝", "＋", "－", "＠")
+"""A spreadsheet takes what begins so for more than text; the quote, so that it can be undone."""
+
+
+def write_csv(file: TextIO, entries: Iterable[AuditEntry]) -> int:
+    """Write entries, one a row; return how many.
+
+    Text that a spreadsheet could take for a formula begins with a single quote.
+    """
+    rows = csv.writer(file, quoting=csv.QUOTE_ALL, lineterminator="\r\n")
+    rows.writerow(HEADER)
+    n_entries = 0
+    for entry in entries:
+        rows.writerow([rfc3339(entry.time_ns), *map(_cell, astuple(entry))])
+        n_entries += 1
+    return n_entries
+
+
+def harmless(text: str) -> str:
+    """A text that no spreadsheet takes for a formula; what is no text is replaced."""
+    text = text.encode("utf-8", "replace").decode("utf-8").replace("\0", "\ufffd")
+    is_formula = text.lstrip(" \u00a0\ufeff").startswith(FORMULA) or text.startswith(FORMULA)
+    return f"'{text}" if is_formula else text
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, str):
+        return harmless(value)
+    return "" if value is None else value

@@ -1,0 +1,139 @@
+"""What each route needs, said beside it; with a route that does not say it nothing starts."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Any
+
+from fastapi import Depends, FastAPI
+from fastapi.dependencies.models import Dependant
+from fastapi.routing import APIRoute, iter_route_contexts
+from starlette.routing import BaseRoute, Route
+
+from service.store.access.roles import Permission
+
+
+class Reach(StrEnum):
+    """What of the plant a route shows or changes where its path names no unit."""
+
+    PLANT = "plant"
+    """All units: nothing for a key of some units."""
+
+    NO_UNIT = "no_unit"
+    """What belongs to no unit."""
+
+    ASKED = "asked"
+    """The unit that the parameter ``unit`` names; all of them without it."""
+
+
+@dataclass(frozen=True)
+class Needs:
+    """What is needed for a route, as a dependency of it; None for nothing: it is open."""
+
+    permission: Permission | None
+    reach: Reach = Reach.PLANT
+
+    async def __call__(self) -> None:
+        """Only say so: what is said is held by `service.api.auth.gate`."""
+
+
+def needs(permission: Permission, reach: Reach = Reach.PLANT) -> Any:
+    """Declare what a route, or every route of a router, needs."""
+    return Depends(Needs(permission, reach))
+
+
+OPEN: Any = Depends(Needs(None, Reach.NO_UNIT))
+"""Declares that a route answers everybody."""
+
+
+class UndeclaredRouteError(Exception):
+    """A route does not say what it needs; the message names it."""
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A route with what it needs."""
+
+    method: str
+    path: str
+    route: BaseRoute
+    needs: Needs
+
+    @property
+    def operation(self) -> str:
+        """Method and path."""
+        return f"{self.method} {self.path}"
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it answers everybody."""
+        return self.needs.permission is None
+
+    @cached_property
+    def query_parameters(self) -> Sequence[str]:
+        """Names of the parameters that its query may have."""
+        if not isinstance(self.route, APIRoute):
+            return ()
+        return tuple(dict.fromkeys(_query_names(self.route.dependant)))
+
+    def matches(self, path: str) -> bool:
+        """Whether a request's path could be for it."""
+        return isinstance(self.route, Route) and self.route.path_regex.match(path) is not None
+
+
+def declared(app: FastAPI) -> Mapping[str, Declared]:
+    """What each operation of an application needs, by method and path.
+
+    Raises
+    ------
+    UndeclaredRouteError
+        If one has no declaration, or is no operation at all. Of several the nearest counts: a
+        route's own before its router's.
+    """
+    found: dict[str, Declared] = {}
+    for one in _all(app):
+        if one.operation in found:
+            raise UndeclaredRouteError(f"{one.operation}: there are two such operations")
+        found[one.operation] = one
+    return found
+
+
+def allowed_methods(operations: Iterable[Declared], path: str) -> list[str]:
+    """The methods of a path; none for one that no operation has.
+
+    Of two templates that fit, as `/x/{version}` and `/x/freeze`, the one with fewer parameters is
+    meant.
+    """
+    fitting = [operation for operation in operations if operation.matches(path)]
+    n_parameters = min((operation.path.count("{") for operation in fitting), default=0)
+    return sorted({each.method for each in fitting if each.path.count("{") == n_parameters})
+
+
+def _all(app: FastAPI) -> Iterator[Declared]:
+    for context in iter_route_contexts(app.routes):
+        route = context.original_route
+        path = str(context.path)
+        for method in sorted(context.methods or ()) or ("?",):
+            yield Declared(method, path, route, _needs_of(app, method, path, context, route))
+
+
+def _needs_of(app: FastAPI, method: str, path: str, context: Any, route: BaseRoute) -> Needs:
+    if isinstance(route, Route) and not isinstance(route, APIRoute) and path == app.openapi_url:
+        return Needs(None, Reach.NO_UNIT)
+    said = _said(context.dependencies) if isinstance(route, APIRoute) else []
+    if not said:
+        raise UndeclaredRouteError(f"{method} {path}: does not declare what it needs or OPEN")
+    return said[-1]
+
+
+def _said(dependencies: Sequence[Any]) -> list[Needs]:
+    return [each.dependency for each in dependencies if isinstance(each.dependency, Needs)]
+
+
+def _query_names(dependant: Dependant) -> Iterator[str]:
+    """Names of query parameters of an operation and of what it depends on."""
+    for field in dependant.query_params:
+        yield field.alias
+    for inner in dependant.dependencies:
+        yield from _query_names(inner)

@@ -1,0 +1,117 @@
+"""Changing who may come in: accounts, keys, and the very first account."""
+
+from collections.abc import Sequence
+
+from service.api.auth.passwords import Hashing, new_password
+from service.store.access.keys import MAX_DAYS, NS_PER_DAY, ApiKey
+from service.store.access.names import account_name
+from service.store.access.port import AccessRefusedError, AccessStore
+from service.store.access.roles import Role
+from service.store.access.tokens import digest, is_token, new_key, new_token
+
+NS_PER_S = 1_000_000_000
+SET_UP_S = 3600.0
+"""How long the set-up token may be used."""
+
+
+class People:
+    """Accounts. Blocks while a password is hashed: call it from a thread.
+
+    Parameters
+    ----------
+    store
+        Where they are kept.
+    """
+
+    def __init__(self, store: AccessStore, hashing: Hashing) -> None:
+        self._store, self._hashing = store, hashing
+
+    def add(
+        self, name: str, role: Role, password: str, now_ns: int, must_change: bool = False
+    ) -> str:
+        """Add an account; return its name as it is stored.
+
+        Parameters
+        ----------
+        must_change
+            Whether the password is to be changed at the first login.
+
+        Raises
+        ------
+        NameRefusedError, PasswordRefusedError
+            If one is not accepted.
+        AccessRefusedError
+            If there is an account of that name.
+        """
+        name = account_name(name)
+        hashed = self._hashing.hash(new_password(password, name))
+        self._store.accounts.add(name, role, hashed, now_ns, must_change)
+        return name
+
+    def set_password(
+        self, name: str, password: str, now_ns: int, must_change: bool = False
+    ) -> None:
+        """Change a password; all sessions of the account end.
+
+        Parameters
+        ----------
+        must_change
+            Whether it is to be changed at the next login.
+
+        Raises
+        ------
+        PasswordRefusedError
+            If it is not accepted.
+        AccessRefusedError
+            If there is no such account.
+        """
+        hashed = self._hashing.hash(new_password(password, name))
+        self._store.accounts.set_password(name, hashed, now_ns, must_change)
+
+    def offer_set_up(self, now_ns: int) -> str | None:
+        """Draw the token with which the first account is made; None if there is an account.
+
+        A token that was drawn before is void.
+        """
+        token = new_token()
+        expires_ns = now_ns + round(SET_UP_S * NS_PER_S)
+        return token if self._store.set_up.offer(digest(token), expires_ns) else None
+
+    def set_up(self, token: str, name: str, password: str, now_ns: int) -> bool:
+        """Make the first account, an admin; whether the token was good for it.
+
+        Raises
+        ------
+        NameRefusedError, PasswordRefusedError
+            If one is not accepted; the token is not used up then.
+        """
+        name = account_name(name)
+        password = new_password(password, name)
+        if not is_token(token) or not self._store.set_up.holds(digest(token), now_ns):
+            return False  # before hashing: strangers must not keep the host busy
+        hashed = self._hashing.hash(password)
+        return self._store.set_up.take(digest(token), name, hashed, now_ns)
+
+
+def create_key(
+    store: AccessStore, name: str, role: Role, units: Sequence[str], days: int, now_ns: int
+) -> tuple[ApiKey, str]:
+    """Make a key for a machine: what is stored, and the key itself, which nobody can show again.
+
+    Raises
+    ------
+    NameRefusedError
+        If the name is not accepted.
+    AccessRefusedError
+        If it would be valid for no or too many days, or administer only some units.
+    """
+    if not 1 <= days <= MAX_DAYS:
+        raise AccessRefusedError(f"a key is valid for 1 to {MAX_DAYS} days, not for {days}")
+    if role is Role.ADMIN and units:
+        raise AccessRefusedError("accounts belong to no unit: a key for some units is no admin's")
+    id_, shown = new_key()
+    open_units = tuple(dict.fromkeys(units))
+    expires_ns = now_ns + days * NS_PER_DAY
+    key = ApiKey(id_, account_name(name), digest(shown), role, open_units, now_ns, expires_ns)
+    store.keys.add(key)
+    return key, shown

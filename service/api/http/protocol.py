@@ -1,0 +1,278 @@
+"""Uvicorn's HTTP/1.1 protocol with deadlines, sizes and counts, which it has none of.
+
+Uvicorn closes a connection only that is silent *after* an answer: one that never finishes its
+headers or body, or never reads its answer, stays for ever.
+"""
+
+import asyncio
+from enum import Enum, auto
+from typing import Any
+
+import httptools
+from uvicorn._types import ASGI3Application
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
+from uvicorn.server import ServerState
+
+from service.api.http.config import GuardedConfig
+from service.api.http.refusals import (
+    FULL,
+    HEAD_TOO_LARGE,
+    NOT_HTTP,
+    TARGET_TOO_LONG,
+    TOO_SLOW,
+    Refusal,
+)
+from service.api.http.security_headers import ALWAYS, API_ONLY
+
+MAX_PIPELINED = 8
+"""Requests that a client may send ahead of its answers; browsers send none."""
+
+FRAMING_BYTES = 256 * 1024
+"""What a chunked body may have around its data, besides 8 bytes for each of its bytes."""
+
+PROGRESS_BYTES = 48 * 1024
+"""One who takes less of his answer than this within ``unsent_s`` does not read it."""
+
+
+class Phase(Enum):
+    """What the other end is to send next."""
+
+    HEAD = auto()
+    BODY = auto()
+    NOTHING = auto()
+
+
+class GuardedProtocol(HttpToolsProtocol):
+    """One connection that ends in time."""
+
+    def __init__(
+        self,
+        config: GuardedConfig,
+        server_state: ServerState,
+        app_state: dict[str, Any],
+        _loop: asyncio.AbstractEventLoop | None = None,
+    ) -> None:
+        super().__init__(config, server_state, app_state, _loop)
+        self.peer = ""
+        self._all, self._limits = config.connections, config.connections.limits
+        self._phase, self._since_s = Phase.HEAD, self._all.now_s()
+        self._unsent_since_s: float | None = None
+        self._n_head = self._n_wire = self._n_body = self._n_unsent = 0
+        self._refusal: Refusal = NOT_HTTP
+        self._has_asked = self._is_deaf = False
+        self._running: RequestResponseCycle | None = None
+
+    # the transport's side
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        """Count the connection in, or send it away."""
+        super().connection_made(transport)
+        self.peer = self.client[0] if self.client else ""
+        if not self._all.admit(self):
+            self._end(FULL)
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        """Count the connection out."""
+        super().connection_lost(exc)
+        self._is_deaf = True
+        self._drop_answers()
+        self._all.leave(self)
+
+    def data_received(self, data: bytes) -> None:
+        """Take bytes in; what is no HTTP, or too much of it, ends the connection."""
+        self._unset_keepalive_if_required()
+        if self._is_deaf:
+            return
+        try:
+            self.parser.feed_data(data)
+        except httptools.HttpParserUpgrade:
+            self._answer_and_close()  # there is nothing else spoken here
+        except httptools.HttpParserError:
+            self._refuse()
+        else:
+            self._n_wire += len(data)  # of this request, or of the one before it too
+            self._check_sizes()
+
+    def resume_writing(self) -> None:
+        """The other end has taken a good part of its answer."""
+        super().resume_writing()
+        self._unsent_since_s = None
+
+    # the parser's side; what is raised here comes out of feed_data as HttpParserError
+
+    def on_message_begin(self) -> None:
+        """The first byte of a request."""
+        super().on_message_begin()
+        if self._phase is not Phase.HEAD:
+            self._enter(Phase.HEAD)
+        self._n_head = self._n_wire = self._n_body = 0
+        self._refusal = NOT_HTTP
+
+    def on_url(self, url: bytes) -> None:
+        """A piece of path and query."""
+        super().on_url(url)
+        if len(self.url) > 1024 * self._limits.max_target_kb:
+            self._stop(TARGET_TOO_LONG)
+
+    def on_header(self, name: bytes, value: bytes) -> None:
+        """A whole header."""
+        if self._phase is Phase.BODY:
+            self._stop(NOT_HTTP)  # trailers: nobody needs them, and there is no end to them
+        super().on_header(name, value)
+        self._n_head += len(name) + len(value) + 4
+        if self._n_head > 1024 * self._limits.max_head_kb:
+            self._stop(HEAD_TOO_LARGE)
+
+    def on_headers_complete(self) -> None:
+        """A whole head: the application is asked, or the request waits for its turn."""
+        if len(self.pipeline) >= MAX_PIPELINED:
+            self._stop(NOT_HTTP)
+        if not self.url.startswith(b"/"):
+            self._stop(NOT_HTTP)  # as for a proxy: it would name a host besides the header
+        super().on_headers_complete()
+        self._enter(Phase.BODY)
+
+    def on_body(self, body: bytes) -> None:
+        """A piece of a body; how much is taken is decided where it is read."""
+        self._n_body += len(body)
+        super().on_body(body)
+
+    def on_message_complete(self) -> None:
+        """A whole request."""
+        super().on_message_complete()
+        self._has_asked = True
+        self._enter(Phase.NOTHING)
+
+    def on_response_complete(self) -> None:
+        """An answer is written, which is not to say taken."""
+        super().on_response_complete()
+        self._unsent_since_s = None
+        if self._phase is Phase.NOTHING:
+            self._enter(Phase.NOTHING)
+
+    def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:
+        self._running = cycle
+        super()._start_asgi_task(cycle, app)
+
+    # the server's side
+
+    def check(self, now_s: float) -> None:
+        """Close the connection if a deadline has passed."""
+        if self._is_stuck(now_s):
+            self.abort()
+        elif self.transport.is_closing():
+            pass  # on its way
+        elif self.flow.read_paused and self._phase is not Phase.NOTHING:
+            self._since_s = now_s  # it may not send just now
+        elif now_s - self._since_s > self._patience_s():
+            self._end(TOO_SLOW if self._phase is not Phase.NOTHING and self._n_wire else None)
+
+    def excuse(self, seconds: float) -> None:
+        """Do not count a time in which nobody was listened to."""
+        self._since_s += seconds
+        if self._unsent_since_s is not None:
+            self._unsent_since_s += seconds
+
+    def waits_since(self) -> tuple[bool, float] | None:
+        """Whether it ever asked, and since when it waits; None while it is answered."""
+        is_answered = self._phase is Phase.NOTHING and self._is_answering()
+        if is_answered or self.transport.is_closing():
+            return None
+        return self._has_asked, self._since_s
+
+    def n_unsent(self) -> int:
+        """Bytes that the other end has not taken."""
+        return self.transport.get_write_buffer_size()
+
+    def give_way(self) -> None:
+        """Close in favour of another connection."""
+        self._end(None)
+
+    def abort(self) -> None:
+        """Close at once."""
+        self._is_deaf = True
+        self._drop_answers()
+        self.transport.abort()
+
+    def shutdown(self) -> None:
+        """The server stops: what is not completely asked is not answered any more."""
+        if self._phase is Phase.BODY:
+            self._end(None)
+        else:
+            super().shutdown()
+
+    # inside
+
+    def _enter(self, phase: Phase) -> None:
+        self._phase, self._since_s = phase, self._all.now_s()
+
+    def _patience_s(self) -> float:
+        if self._phase is Phase.HEAD:
+            return self._limits.head_s
+        if self._phase is Phase.BODY:
+            return self._limits.body_s
+        return float("inf") if self._is_answering() else self._limits.keep_alive_s
+
+    def _is_answering(self) -> bool:
+        return self.cycle is not None and not self.cycle.response_complete
+
+    def _is_stuck(self, now_s: float) -> bool:
+        n_unsent = self.n_unsent()
+        if not n_unsent:
+            self._unsent_since_s = None
+            return False
+        if self._unsent_since_s is None or n_unsent <= self._n_unsent - PROGRESS_BYTES:
+            self._unsent_since_s, self._n_unsent = now_s, n_unsent
+        return now_s - self._unsent_since_s > self._limits.unsent_s
+
+    def _stop(self, refusal: Refusal) -> None:
+        self._refusal = refusal
+        raise ValueError(refusal.title)
+
+    def _check_sizes(self) -> None:
+        """What the parser keeps to itself: a header without end, or framing without data."""
+        if self._phase is Phase.HEAD and self._n_wire > 1024 * (
+            self._limits.max_head_kb + self._limits.max_target_kb
+        ):
+            self._end(HEAD_TOO_LARGE)
+        elif self._phase is Phase.BODY and self._n_wire > FRAMING_BYTES + 8 * self._n_body:
+            self._end(NOT_HTTP)
+
+    def _refuse(self) -> None:
+        """End with what was wrong, after the answers to what was right."""
+        if self._phase is Phase.HEAD and self._is_answering():
+            self._answer_and_close()
+        else:
+            self._end(self._refusal)
+
+    def _answer_and_close(self) -> None:
+        self._is_deaf = True
+        if self._is_answering():
+            self.cycle.keep_alive = False
+        else:
+            self.transport.close()
+
+    def _end(self, refusal: Refusal | None) -> None:
+        """Close, with a last word where one fits in."""
+        self._is_deaf = True
+        if refusal is not None and self._may_speak():
+            self.transport.write(refusal.on_the_wire([*ALWAYS, *API_ONLY]))
+        self._drop_answers()
+        self.transport.close()
+
+    def _drop_answers(self) -> None:
+        """Let nothing more be written; uvicorn tells it only to the newest request."""
+        waiting = [cycle for cycle, _ in self.pipeline]
+        self.pipeline.clear()
+        for cycle in (self._running, self.cycle, *waiting):
+            if cycle is not None and not cycle.response_complete:
+                cycle.disconnected = True
+                cycle.message_event.set()
+
+    def _may_speak(self) -> bool:
+        """Whether the next answer on this connection is the server's to write."""
+        if self.transport.is_closing():
+            return False
+        if self._phase is Phase.BODY:
+            return not (self.cycle.response_started or self.pipeline)
+        return not self._is_answering()

@@ -1,0 +1,36 @@
+"""Metrics of what is given up while the service cannot keep up."""
+
+from collections.abc import Iterator
+
+from prometheus_client.metrics_core import Metric
+
+from service.api.load.strain import Refused
+from service.app.watched import Watched
+from service.runtime.families import counter, gauge
+
+KINDS = (Refused.HISTORY, Refused.VIEWS)
+
+
+def load_metrics(watched: Watched) -> Iterator[Metric]:
+    """Questions that were not answered; none where nobody looks at the load."""
+    load = watched.load
+    if load is None:
+        return
+    yield counter(
+        "questions_refused",
+        "Questions answered by 503 because the service was behind.",
+        ("about",),
+        [((kind.name.lower(),), load.n_refused[kind]) for kind in KINDS],
+    )
+    yield gauge(
+        "refusing",
+        "1 while such questions are refused.",
+        ("about",),
+        [((kind.name.lower(),), load.refused >= kind) for kind in KINDS],
+    )
+    yield gauge(
+        "event_loop_lag_seconds",
+        "By how much the program has been late at every look within the last second.",
+        (),
+        [((), load.lag_s)],
+    )

@@ -1,0 +1,1 @@
+"""Builds processes from a plant file and a set of roles, and runs them."""

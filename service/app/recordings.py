@@ -1,0 +1,121 @@
+"""Recordings of a unit: written, opened, and as sources."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+from acquisition.clock import Clock
+from acquisition.errors import ConfigError
+from acquisition.recordings.manifest import read_manifest
+from acquisition.recordings.reader import Recording, open_recording
+from acquisition.recordings.source import RecordingSource, Selection, select
+from acquisition.recordings.writer import RecordingWriter
+from acquisition.simulated.devices.recorded import RecordedFeed
+from acquisition.simulated.feed import SampleFeed
+from acquisition.source import SampleSource
+from service.settings.core_values import calibration_of, machine_of
+from service.settings.plant import PlantFile
+from service.settings.recorded_units import recorded_unit
+from service.settings.units import UnitSettings
+
+
+def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
+    """A recording of a unit, about to be written; of counts if the first block is just that.
+
+    Raises
+    ------
+    ConfigError
+        If the folder exists or cannot be made.
+    """
+    return RecordingWriter(folder, recorded_unit(unit), made_by, first_decides=True)
+
+
+def recording_of(folder: Path) -> Recording:
+    """A finished recording, checked from end to end.
+
+    Raises
+    ------
+    ConfigError
+        If anything about it is wrong.
+    """
+    return open_recording(folder)
+
+
+def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, Path]:
+    """Recordings by the unit they are of.
+
+    Raises
+    ------
+    ConfigError
+        If one has no readable manifest, is of no unit of the plant, or of the same as another.
+    """
+    known = [unit.id for unit in plant.unit]
+    found: dict[str, Path] = {}
+    for folder in folders:
+        unit = read_manifest(folder).unit
+        if unit not in known:
+            raise ConfigError(f"{folder}: is of unit {unit}, the plant has {', '.join(known)}")
+        if unit in found:
+            raise ConfigError(f"{folder}: is of unit {unit}, like {found[unit]}; play one of them")
+        found[unit] = folder
+    return found
+
+
+def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
+    """What a unit needs of a recording.
+
+    Raises
+    ------
+    ConfigError
+        If it is not there, or at another rate or in another unit.
+    """
+    slow_units = {channel.id: channel.unit for channel in unit.slow_channel}
+    machine = replace(machine_of(unit), rate_hz=unit.sampling_hz)
+    return select(recording.manifest, machine, slow_units)
+
+
+def recording_source(
+    recording: Recording, selection: Selection, unit: UnitSettings | None, clock: Clock
+) -> SampleSource:
+    """A recording as an unpaced source.
+
+    Parameters
+    ----------
+    unit
+        Whose calibration is to replace the recorded one, if any.
+    """
+    if unit is not None:
+        selection = replace(selection, calibration=calibration_of(unit))
+    return RecordingSource(recording, clock, selection)
+
+
+def replay_source(
+    folder: Path, unit: UnitSettings, clock: Clock, speed: float | None
+) -> SampleSource:
+    """A recording in the place of a unit's own source, read with the unit's own calibration.
+
+    Parameters
+    ----------
+    speed
+        Seconds of the recording in a second, or None for as fast as it is taken.
+
+    Raises
+    ------
+    ConfigError
+        If it is damaged or does not fit the unit.
+    """
+    recording = open_recording(folder)
+    selection = replace(selection_of(recording, unit), calibration=calibration_of(unit))
+    return RecordingSource(recording, clock, selection, speed)
+
+
+def recorded_feed(folder: Path, unit: UnitSettings) -> SampleFeed:
+    """A recording behind a simulated DAQ.
+
+    Raises
+    ------
+    ConfigError
+        If it is damaged or does not fit the unit.
+    """
+    recording = open_recording(folder)
+    return RecordedFeed(recording, selection_of(recording, unit))

@@ -1,0 +1,1 @@
+"""Work of commands without a running service: back-test, analysis again, validation, imports."""

@@ -1,0 +1,1 @@
+"""Several processes on one plant: JetStream, ownership of units, state through the database."""

@@ -1,0 +1,1 @@
+"""What crosses between measuring and serving: newest results, newest samples, commands."""

@@ -1,0 +1,119 @@
+"""What engineers do to baselines, and when it is refused."""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from service.measuring.films.learning import FilmPlace
+from service.store.baseline_versions import Versions
+from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
+
+
+class BaselineRefusedError(ValueError):
+    """An action does not fit the baselines as they are now; the message says why."""
+
+
+@dataclass(frozen=True)
+class Accept:
+    """Compare the bearing with a version from now on."""
+
+    version: int
+
+
+@dataclass(frozen=True)
+class Reject:
+    """Compare it with that version no longer, and never by itself again."""
+
+    version: int
+
+
+@dataclass(frozen=True)
+class Freeze:
+    """Learn no further."""
+
+
+@dataclass(frozen=True)
+class Thaw:
+    """Learn again."""
+
+
+@dataclass(frozen=True)
+class Renew:
+    """Begin again after a machine event, as an overhaul: older readings count no longer."""
+
+    from_ns: int
+
+
+Action: TypeAlias = Accept | Reject | Freeze | Thaw | Renew
+
+
+def step_of(
+    action: Action,
+    place: FilmPlace,
+    versions: Versions,
+    entries: list[BaselineEntry],
+    actor: str,
+    reason: str,
+    now_ns: int,
+) -> StoredStep:
+    """What is to be written if somebody does this now.
+
+    Parameters
+    ----------
+    entries
+        Every baseline of the bearing.
+
+    Raises
+    ------
+    BaselineRefusedError
+        If it does not fit the baselines as they are.
+    """
+
+    def done(step: BaselineStep, version: int | None, from_ns: int | None = None) -> StoredStep:
+        return StoredStep(place.unit, place.bearing, version, step, now_ns, actor, reason, from_ns)
+
+    match action:
+        case Accept(version):
+            _require_acceptable(version, place, versions, entries)
+            return done(BaselineStep.ACCEPTED, version)
+        case Reject(version):
+            _require_version(version, entries)
+            if version in versions.rejected:
+                raise BaselineRefusedError(f"version {version} is rejected already")
+            is_used = version == versions.in_force
+            return done(BaselineStep.WITHDRAWN if is_used else BaselineStep.REJECTED, version)
+        case Freeze():
+            if versions.in_force is None or versions.is_frozen:
+                why = "is frozen already" if versions.is_frozen else "has no baseline in force"
+                raise BaselineRefusedError(f"{place.bearing} {why}")
+            return done(BaselineStep.FROZEN, versions.in_force)
+        case Thaw():
+            if not versions.is_frozen:
+                raise BaselineRefusedError(f"{place.bearing} is not frozen")
+            return done(BaselineStep.THAWED, versions.in_force)
+        case Renew(from_ns):
+            if from_ns > now_ns:
+                raise BaselineRefusedError("a machine event cannot lie in the future")
+            if versions.renewed_ns is not None and from_ns < versions.renewed_ns:
+                raise BaselineRefusedError("there has been a later machine event already")
+            return done(BaselineStep.RENEWED, None, from_ns)
+
+
+def _require_version(version: int, entries: list[BaselineEntry]) -> BaselineEntry:
+    for entry in entries:
+        if entry.version == version:
+            return entry
+    raise BaselineRefusedError(f"there is no version {version}")
+
+
+def _require_acceptable(
+    version: int, place: FilmPlace, versions: Versions, entries: list[BaselineEntry]
+) -> None:
+    entry = _require_version(version, entries)
+    if version == versions.in_force:
+        raise BaselineRefusedError(f"version {version} is in force already")
+    if entry.estimator is not place.estimator:
+        raise BaselineRefusedError(
+            f"version {version} was learned of {entry.estimator}, watched is {place.estimator}"
+        )
+    if versions.renewed_ns is not None and entry.learned_from_ns < versions.renewed_ns:
+        raise BaselineRefusedError(f"version {version} is of before the last machine event")

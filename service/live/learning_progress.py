@@ -1,0 +1,131 @@
+"""How far learning the baseline of a bearing has come."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from core.baseline.history import ReadingOutcome
+from core.change.decision import JUDGED
+from core.condition.operating_state import STEADY
+from service.measuring.films.learning import DAY_NS, FilmPlace
+from service.settings.film_alarms import FilmAlarmSettings
+from service.store.baseline_versions import Versions
+from service.store.film_port import BaselineEntry, FilmHistory, FilmQuery, FilmStore
+
+RECENT_DAYS = 7.0
+
+
+@dataclass(frozen=True)
+class ReadingCounts:
+    """Readings of the last `RECENT_DAYS`: why a film is not learned or judged.
+
+    Parameters
+    ----------
+    n_at_speed
+        At rated speed, in any state.
+    n_settled
+        Of these, after the warm-up.
+    n_complete
+        Of these, with stiffness and condition in the direction that has fewer.
+    n_judged
+        Of these, with a verdict on the film.
+    """
+
+    n_at_speed: int
+    n_settled: int
+    n_complete: int
+    n_judged: int
+
+
+@dataclass(frozen=True)
+class LearningProgress:
+    """How far learning has come.
+
+    Parameters
+    ----------
+    since_ns, until_ns
+        The learning period; None before the first reading.
+    n_readings, n_days
+        Readings that count so far, in the direction that has fewer, and days that they are from;
+        None once there is a baseline of this period.
+    recent
+        What became of the newest readings.
+    """
+
+    since_ns: int | None
+    until_ns: int | None
+    is_over: bool
+    n_readings: int | None
+    n_days: int | None
+    recent: ReadingCounts
+
+
+def learning_progress(
+    store: FilmStore,
+    place: FilmPlace,
+    versions: Versions,
+    entries: list[BaselineEntry],
+    settings: FilmAlarmSettings,
+    now_ns: int,
+) -> LearningProgress:
+    """How far learning has come.
+
+    Parameters
+    ----------
+    entries
+        Every baseline of the bearing.
+    """
+    recent = _recent(store, place, settings, now_ns)
+    since_ns = versions.renewed_ns
+    if since_ns is None:
+        since_ns = store.first_ns(place.unit, place.bearing, place.estimator)
+    if since_ns is None:
+        return LearningProgress(None, None, False, 0, 0, recent)
+    until_ns = since_ns + round(settings.learning_days * DAY_NS)
+    is_learned = any(
+        entry.estimator is place.estimator and entry.learned_from_ns >= since_ns
+        for entry in entries
+    )
+    n_readings, n_days = (
+        (None, None) if is_learned else _counts(store, place, since_ns, until_ns, settings)
+    )
+    is_over = now_ns >= until_ns
+    return LearningProgress(since_ns, until_ns, is_over, n_readings, n_days, recent)
+
+
+def _counts(
+    store: FilmStore, place: FilmPlace, since_ns: int, until_ns: int, settings: FilmAlarmSettings
+) -> tuple[int, int]:
+    """Readings that count, and days that they are from."""
+    found = store.history(
+        FilmQuery(place.unit, place.bearing, place.estimator, since_ns, until_ns + 1)
+    )
+    if not len(found):
+        return 0, 0
+    usable = found.is_settled & ~np.any(found.level > 0, axis=0)
+    rows = [usable & complete for complete in _complete(found, settings)]
+    time_ns = found.history.time_ns
+    return min((int(row.sum()), np.unique(time_ns[row] // DAY_NS).size) for row in rows)
+
+
+def _recent(
+    store: FilmStore, place: FilmPlace, settings: FilmAlarmSettings, now_ns: int
+) -> ReadingCounts:
+    since_ns = now_ns - round(RECENT_DAYS * DAY_NS)
+    found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, since_ns))
+    if not len(found):
+        return ReadingCounts(0, 0, 0, 0)
+    is_judged = np.isin(found.verdict, [int(verdict) for verdict in JUDGED])
+    return ReadingCounts(
+        int(np.isin(found.state, [int(state) for state in STEADY]).sum()),
+        int(found.is_settled.sum()),
+        min(int((found.is_settled & row).sum()) for row in _complete(found, settings)),
+        int(is_judged.sum(axis=1).min()),
+    )
+
+
+def _complete(found: FilmHistory, settings: FilmAlarmSettings) -> list[npt.NDArray[np.bool_]]:
+    """(n,) for each direction: whether readings have stiffness and condition."""
+    is_known = settings.baseline.settings().is_known(found.history.conditions)
+    return [is_known & (outcome == ReadingOutcome.MEASURED) for outcome in found.history.outcome]

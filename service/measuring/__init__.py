@@ -1,0 +1,1 @@
+"""Sources to monitors to alarms to store; knows no HTTP."""

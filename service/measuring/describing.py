@@ -1,0 +1,77 @@
+"""From the live objects of a process that analyses to what it writes down of a unit."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from core.alarms.alarm import Alarm
+from core.monitor.assessment import Assessment
+from service.live.live_view import LiveView, UnitStatus
+from service.live.unit_state import BearingState, FilmState, UnitSigns, UnitState
+from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.alarms.service_rules import told_by
+from service.measuring.films.keeper import FilmKeeper
+from service.settings.units import UnitSettings
+
+
+def bearing_state(assessment: Assessment) -> BearingState:
+    """A result without its arrays."""
+    return BearingState(
+        time_ns=assessment.time_ns,
+        window=assessment.window,
+        speed_source=assessment.speed_source,
+        quality=assessment.quality,
+        readings=assessment.readings,
+        budgets=assessment.budgets,
+        estimators=assessment.estimators,
+        runout=assessment.runout,
+        clipped_share=assessment.clipped_share,
+        evidence=assessment.evidence,
+        condition=assessment.condition,
+    )
+
+
+def unit_state(
+    settings: UnitSettings, live: LiveView, alarms: AlarmEngine, films: FilmKeeper
+) -> UnitState:
+    """What is known of a unit now."""
+    unit, bearings = settings.id, [bearing.id for bearing in settings.bearing]
+    own = alarm_state([alarm for alarm in alarms.alarms if told_by(alarm.identity) == unit], alarms)
+    found = {bearing: live.assessment(unit, bearing) for bearing in bearings}
+    seen = {bearing: films.newest(unit, bearing) for bearing in bearings}
+    in_force = {bearing: films.baseline(unit, bearing) for bearing in bearings}
+    return replace(
+        own,
+        bearings={b: bearing_state(result) for b, result in found.items() if result is not None},
+        films={b: FilmState(news.reading, news.findings) for b, news in seen.items() if news},
+        baselines={b: baseline.origin.version for b, baseline in in_force.items() if baseline},
+    )
+
+
+def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
+    """What is known of alarms now, and of nothing else."""
+    return UnitState(
+        bearings={},
+        alarms=tuple(own),
+        judged=frozenset(a.identity.id for a in own if alarms.is_judged(a)),
+        chattering=frozenset(a.identity.id for a in own if alarms.is_chattering(a)),
+        films={},
+        baselines={},
+    )
+
+
+def plant_signs(live: LiveView) -> UnitSigns:
+    """How the process itself does."""
+    return UnitSigns(UnitStatus(), None, {}, live.n_unstored, live.store_error)
+
+
+def unit_signs(settings: UnitSettings, live: LiveView) -> UnitSigns:
+    """How samples of a unit arrive, and how old everything is."""
+    unit = settings.id
+    ages_s = {bearing.id: live.current(unit, bearing.id).age_s for bearing in settings.bearing}
+    return UnitSigns(
+        status=live.status(unit),
+        data_age_s=live.data_age_s(unit),
+        result_ages_s={bearing: age_s for bearing, age_s in ages_s.items() if age_s is not None},
+        n_unstored=live.n_unstored,
+        store_error=live.store_error,
+    )

@@ -1,0 +1,297 @@
+"""Findings on their way to the disk: in order, in batches, retried, never in the way."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeVar
+
+import structlog
+
+from acquisition.clock import Clock
+from core.alarms.alarm import AlarmNews
+from core.change.film_judge import FilmNews
+from core.monitor.assessment import Assessment
+from core.spectra.cross_spectrum import NO_SPECTRUM
+from service.live.live_view import LiveView
+from service.measuring.parked_rows import ParkedRows
+from service.runtime.heartbeats import UNHEARD, Pulse
+from service.store.port import RefusedRowError, Store, StoreError, UnitGap
+from service.store.positions_port import StreamPosition
+
+log = structlog.get_logger()
+
+RETRY_S = 1.0
+
+MAX_NEWS = 100_000
+"""News of alarms that wait for a store that does not answer; about 100 MB."""
+
+GIVEN_UP = "given_up"
+
+T = TypeVar("T")
+
+
+class NotStoredError(Exception):
+    """News of an alarm was given up, or refused by the database; the message says why."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What one block has taught: to be stored together or not at all."""
+
+    assessments: Sequence[Assessment] = ()
+    gaps: Sequence[UnitGap] = ()
+    alarms: Sequence[AlarmNews] = ()
+    films: Sequence[FilmNews] = ()
+    position: StreamPosition | None = None
+
+    @property
+    def parts(self) -> Iterator["Findings"]:
+        """Each row by itself, in an order in which they may be stored one after the other."""
+        yield from (Findings(alarms=[news]) for news in self.alarms)
+        yield from (Findings([assessment]) for assessment in self.assessments)
+        yield from (Findings(gaps=[gap]) for gap in self.gaps)
+        yield from (Findings(films=[news]) for news in self.films)
+        if self.position is not None:
+            yield Findings(position=self.position)
+
+    @property
+    def row(self) -> object:
+        """The one row of a part."""
+        return next(iter((*self.alarms, *self.assessments, *self.gaps, *self.films, self.position)))
+
+
+class Recorder:
+    """Writes findings to the store in a thread, so that a slow disk delays no samples.
+
+    A row that the database refuses is parked in a file, and the rest is stored without it.
+
+    Parameters
+    ----------
+    parked
+        The file.
+    capacity
+        Most findings that wait for a store that does not answer, besides those being written;
+        beyond it the oldest are given up and counted in :attr:`LiveView.n_unstored`. News of alarms
+        wait apart from them, up to `MAX_NEWS`, and are given up last.
+    told
+        Called when news of alarms has been written.
+    timed
+        Entered, in the thread, while the store writes.
+    finds_again
+        Whether what was not written when the process ends is found once more by the next one, as
+        by blocks that stay on a stream.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        live: LiveView,
+        clock: Clock,
+        parked: ParkedRows,
+        capacity: int = 5000,
+        told: Callable[[], None] = lambda: None,
+        timed: Callable[[], AbstractContextManager[None]] = nullcontext,
+        *,
+        finds_again: bool = False,
+    ) -> None:
+        self._store, self._live, self._clock, self._parked = store, live, clock, parked
+        self._capacity, self._told, self._timed = capacity, told, timed
+        self._finds_again = finds_again
+        self._waiting: deque[Findings] = deque()
+        self._alarms: deque[AlarmNews] = deque()
+        self._n_writing = 0
+        self._waits_since_s = 0.0
+        self._news = asyncio.Event()
+        self._progress = asyncio.Condition()
+        self._outcomes: dict[int, asyncio.Future[str | None]] = {}
+        # its own: the others may all be busy answering
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="recorder")
+
+    @property
+    def n_waiting(self) -> int:
+        """Findings and news of alarms that are still to be written."""
+        return len(self._waiting) + len(self._alarms)
+
+    @property
+    def behind_s(self) -> float:
+        """For how long something has been waiting without anything being written."""
+        if not (self._waiting or self._alarms):
+            return 0.0
+        return self._clock.monotonic_s() - self._waits_since_s
+
+    def put(self, findings: Findings) -> None:
+        """Queue findings."""
+        if not (self._waiting or self._alarms):
+            self._waits_since_s = self._clock.monotonic_s()
+        if findings.assessments or findings.gaps or findings.position:
+            self._waiting.append(replace(findings, alarms=()))
+        self._give_up_oldest()
+        self._alarms += findings.alarms
+        while len(self._alarms) > MAX_NEWS:
+            self._resolve(self._alarms.popleft(), "too much waits for the store")
+            self._live.note_unstored(1, GIVEN_UP)
+        self._news.set()
+
+    async def stored(self) -> None:
+        """Wait until the newest news of alarms is on the disk, however long it takes.
+
+        Raises
+        ------
+        NotStoredError
+            If it was given up, or the database refused it.
+        """
+        if not self._alarms:
+            return
+        key, loop = id(self._alarms[-1]), asyncio.get_running_loop()
+        outcome = self._outcomes.setdefault(key, loop.create_future())
+        refusal = await asyncio.shield(outcome)  # others may wait for it as well
+        if refusal is not None:
+            raise NotStoredError(refusal)
+
+    async def reached(self, position: StreamPosition) -> None:
+        """Wait until a position that was put is on the disk, however long it takes."""
+        async with self._progress:
+            await self._progress.wait_for(
+                lambda: all(findings.position is not position for findings in self._waiting)
+            )
+
+    async def require_store(self) -> None:
+        """See whether something could be written now, by a transaction without anything in it.
+
+        Raises
+        ------
+        StoreError
+            If not.
+        """
+        loop = asyncio.get_running_loop()
+        await loop.run_in_executor(self._thread, self._store.append, [], [])
+
+    async def settled(self) -> None:
+        """Wait until everything is on the disk, or the store has refused to take it."""
+        async with self._progress:
+            await self._progress.wait_for(
+                lambda: self._live.store_error or not (self._waiting or self._alarms)
+            )
+
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
+        """Write whatever is queued, for ever."""
+        while True:
+            pulse.rest()
+            await self._news.wait()
+            self._news.clear()
+            while self._waiting or self._alarms:
+                pulse.beat(RETRY_S)
+                if not await self._write():
+                    await self._clock.sleep(RETRY_S)
+
+    async def flush(self) -> None:
+        """Write what is queued now, once; used at the end."""
+        if (self._waiting or self._alarms) and not await self._write():
+            counts = {"n_findings": len(self._waiting), "n_alarm_news": len(self._alarms)}
+            if self._finds_again:
+                log.warning(
+                    "results were not stored; they are found again at the next start", **counts
+                )
+            else:
+                log.error("results are lost", **counts)
+
+    def _give_up_oldest(self) -> None:
+        """Keep to the capacity; what is being written may yet be stored, and is kept."""
+        while len(self._waiting) > self._capacity + self._n_writing:
+            del self._waiting[self._n_writing]
+            self._live.note_unstored(1, GIVEN_UP)
+
+    async def _write(self) -> bool:
+        batch, alarms = list(self._waiting), list(self._alarms)
+        self._n_writing = len(batch)
+        append = partial(self._append, [Findings(alarms=alarms), *batch])
+        try:
+            refused = await asyncio.get_running_loop().run_in_executor(self._thread, append)
+        except StoreError as error:
+            if self._live.store_error is None:
+                log.error("results are not being stored", reason=str(error))
+            self._live.store_error = str(error)
+            self._n_writing = 0
+            self._give_up_oldest()
+            await self._tell_progress()
+            return False
+        if self._live.store_error is not None:
+            log.info("results are being stored again")
+        self._live.store_error = None
+        self._waits_since_s = self._clock.monotonic_s()
+        self._note_parked(refused)
+        self._n_writing = 0
+        _drop(self._waiting, batch)
+        _drop(self._alarms, alarms)
+        reasons = {id(row): reason for row, reason in refused}
+        for news in alarms:
+            self._resolve(news, reasons.get(id(news)))
+        if alarms:
+            self._told()
+        await self._tell_progress()
+        return True
+
+    def _append(self, batch: Iterable[Findings]) -> list[tuple[object, str]]:
+        """Store what can be stored; return the rows that cannot, which are parked, and why."""
+        refused: list[tuple[object, str]] = []
+        with self._timed():
+            self._append_parts([part for findings in batch for part in findings.parts], refused)
+        if refused:
+            try:
+                self._parked.add(self._clock.now_ns(), refused)
+            except OSError as error:
+                raise StoreError(f"{self._parked.path}: {error}") from error
+        return refused
+
+    def _append_parts(self, parts: Sequence[Findings], refused: list[tuple[object, str]]) -> None:
+        """Store parts in one transaction; where that is refused, in halves."""
+        try:
+            self._store.append(
+                [row for part in parts for row in part.assessments],
+                [row for part in parts for row in part.gaps],
+                [row for part in parts for row in part.alarms],
+                [row for part in parts for row in part.films],
+                [part.position for part in parts if part.position],
+            )
+        except RefusedRowError as error:
+            middle = len(parts) // 2
+            if middle:
+                self._append_parts(parts[:middle], refused)
+                self._append_parts(parts[middle:], refused)
+                return
+            self._store.append([], [])  # or it is not the row that is refused
+            refused.append((parts[0].row, str(error)))
+            self._append_without_spectrum(parts[0].assessments)
+
+    def _append_without_spectrum(self, assessments: Sequence[Assessment]) -> None:
+        """Store the readings of a result whose spectrum alone may have been refused."""
+        if any(assessment.spectrum.frequency_hz.size for assessment in assessments):
+            with suppress(RefusedRowError):
+                self._store.append([replace(a, spectrum=NO_SPECTRUM) for a in assessments], [])
+
+    def _note_parked(self, refused: Sequence[tuple[object, str]]) -> None:
+        if refused:
+            reason = f"{refused[-1][1]} (parked in {self._parked.path.name})"
+            self._live.note_unstored(len(refused), reason)
+            log.error("results cannot be stored", n_parked=len(refused), reason=reason)
+
+    def _resolve(self, news: AlarmNews, refusal: str | None) -> None:
+        """Tell whoever waits for news of an alarm what has become of it."""
+        outcome = self._outcomes.pop(id(news), None)
+        if outcome is not None and not outcome.done():
+            outcome.set_result(refusal)
+
+    async def _tell_progress(self) -> None:
+        async with self._progress:
+            self._progress.notify_all()
+
+
+def _drop(queue: deque[T], written: Sequence[T]) -> None:
+    """Take off the queue what has been written, and nothing that has come since."""
+    ids = {id(entry) for entry in written}
+    while queue and id(queue[0]) in ids:
+        queue.popleft()

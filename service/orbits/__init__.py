@@ -1,1 +1,0 @@
-"""The motion of a shaft in its bearing, sample by sample: live, and out of recordings."""

@@ -1,0 +1,43 @@
+"""Metrics of continuous recording, and of all recordings that are kept."""
+
+from collections.abc import Iterator
+
+from prometheus_client.metrics_core import Metric
+
+from service.app.watched import Watched
+from service.runtime.families import counter, gauge
+
+
+def recording_metrics(watched: Watched) -> Iterator[Metric]:
+    """What is recorded, what is not and why, and what is found of recordings."""
+    tape, recordings = watched.tape, watched.recordings
+    if tape is not None:
+        yield counter(
+            "recording_samples",
+            "Samples of each channel that continuous recordings have brought to the disk.",
+            (),
+            [((), tape.n_written)],
+        )
+        yield counter(
+            "recording_shed_samples",
+            "Samples of each channel that are not in them, by reason.",
+            ("reason",),
+            [((reason.value,), n) for reason, n in sorted(tape.n_shed.items())],
+        )
+    if recordings is None:
+        return
+    found = recordings.found
+    for name, meaning, number in (
+        ("recordings_adopted", "Recordings that were entered into the index.", found.n_adopted),
+        ("recordings_checked", "Recordings that were read once more.", found.n_checked),
+        ("recordings_damaged", "Recordings that were found damaged.", found.n_damaged),
+        ("recordings_missing", "Recordings that were found missing.", found.n_missing),
+    ):
+        yield counter(name, meaning, (), [((), number)])
+    removed = [((kind,), n) for kind, n in sorted(found.n_removed.items())]
+    yield counter("recordings_removed", "Recordings that had to make room.", ("kind",), removed)
+    for name, meaning, numbers in (
+        ("recordings_files", "Recordings on the disk.", recordings.n_files),
+        ("recordings_bytes", "What they take.", recordings.n_bytes),
+    ):
+        yield gauge(name, meaning, ("kind",), [((k.value,), n) for k, n in numbers.items()])

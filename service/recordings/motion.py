@@ -1,0 +1,167 @@
+"""`ShaftMotion`: the path of a shaft in its bearing, and all that is drawn beside it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from core.arrays import FloatArray
+from core.condition.shaft_centre import locate_shaft
+from core.condition.shaft_readings import probe_axis
+from core.machine.channel import Channel, Measurand
+from core.machine.unit import Bearing, Unit
+from core.quality import Reading, Reason, missing
+from core.spectra.orbit import Ellipse, ellipse_of, marks_of, order_phasors, trace_of
+from core.units import hz_from_rpm, rpm_from_hz
+from service.live.shaft_stretch import ShaftStretch
+
+MIN_MARKS = 3
+"""From which on the mark says how fast the shaft turns."""
+
+
+@dataclass(frozen=True, eq=False)
+class Order1:
+    """The part of the motion at running speed.
+
+    Parameters
+    ----------
+    x_um, y_um
+        (n_samples,), NaN where too few samples lie around.
+    ellipse
+        In the middle of the stretch.
+    """
+
+    frequency_hz: float
+    x_um: FloatArray
+    y_um: FloatArray
+    ellipse: Ellipse
+
+
+@dataclass(frozen=True, eq=False)
+class ShaftMotion:
+    """Motion of a shaft relative to its bearing.
+
+    Parameters
+    ----------
+    x_um, y_um
+        (n_samples,) along the bearing's axes, mean removed; NaN where a sample is missing.
+    centre_um
+        Mean position in the clearance circle; none where it is not known.
+    speed_rpm
+        From the marks, or the slow channel; none where neither says it.
+    order1
+        None without a speed, or with too few samples.
+    marks
+        Where the key-phase mark passes, in samples from the first; None without a key-phase.
+    """
+
+    stretch: ShaftStretch
+    x_um: FloatArray
+    y_um: FloatArray
+    centre_um: tuple[float, float] | None
+    speed_rpm: float | None
+    order1: Order1 | None
+    marks: FloatArray | None
+
+
+def channels_for(unit: Unit, bearing: Bearing) -> list[str]:
+    """Waveform channels that the motion is made of, as far as the unit has them."""
+    wanted = (
+        *(bearing.shaft_x, bearing.shaft_y, bearing.opposite_x, bearing.opposite_y),
+        unit.key_phase,
+    )
+    return [id_ for id_ in wanted if id_ is not None]
+
+
+def motion_of(stretch: ShaftStretch, unit: Unit, bearing: Bearing) -> ShaftMotion:
+    """The motion in a stretch that holds the bearing's shaft channels."""
+    channels = {channel.id: channel for channel in unit.channels}
+    x_um, y_um = (
+        _displacement(stretch, channels[id_]) for id_ in (bearing.shaft_x, bearing.shaft_y)
+    )
+    marks = _marks(stretch, channels, unit.key_phase)
+    speed_rpm = _speed(stretch, unit, marks)
+    return ShaftMotion(
+        stretch=stretch,
+        x_um=x_um,
+        y_um=y_um,
+        centre_um=_centre(stretch, channels, bearing),
+        speed_rpm=speed_rpm,
+        order1=_order1(stretch, x_um, y_um, speed_rpm),
+        marks=marks,
+    )
+
+
+def _displacement(stretch: ShaftStretch, channel: Channel) -> FloatArray:
+    samples = channel.direction * stretch.samples[channel.id]
+    return samples - _mean(samples) if np.isfinite(samples).any() else samples
+
+
+def _mean(samples: FloatArray) -> float:
+    return float(samples[np.isfinite(samples)].mean())
+
+
+def _marks(
+    stretch: ShaftStretch, channels: dict[str, Channel], key_phase: str | None
+) -> FloatArray | None:
+    pulses = stretch.of(key_phase)
+    if pulses is None or key_phase is None:
+        return None
+    return marks_of(channels[key_phase].direction * pulses)
+
+
+def _speed(stretch: ShaftStretch, unit: Unit, marks: FloatArray | None) -> float | None:
+    if marks is not None and marks.size >= MIN_MARKS:
+        return rpm_from_hz(stretch.rate_hz / float(np.median(np.diff(marks))))
+    return stretch.mean_of(unit.speed_channel).value
+
+
+def _order1(
+    stretch: ShaftStretch, x_um: FloatArray, y_um: FloatArray, speed_rpm: float | None
+) -> Order1 | None:
+    frequency_hz = hz_from_rpm(speed_rpm or 0.0)
+    if not 0.0 < frequency_hz < stretch.rate_hz / 2.0:
+        return None
+    x, y = (order_phasors(each, stretch.rate_hz, frequency_hz) for each in (x_um, y_um))
+    known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    if not known.size:
+        return None
+    middle = known[np.argmin(np.abs(known - x.size // 2))]
+    return Order1(
+        frequency_hz=frequency_hz,
+        x_um=trace_of(x, stretch.rate_hz, frequency_hz),
+        y_um=trace_of(y, stretch.rate_hz, frequency_hz),
+        ellipse=ellipse_of(complex(x[middle]), complex(y[middle])),
+    )
+
+
+def _centre(
+    stretch: ShaftStretch, channels: dict[str, Channel], bearing: Bearing
+) -> tuple[float, float] | None:
+    near, far = (
+        [_gap(stretch, channels.get(id_ or ""), slow) for id_, slow in pairs]
+        for pairs in (
+            ((bearing.shaft_x, bearing.gap_x), (bearing.shaft_y, bearing.gap_y)),
+            (
+                (bearing.opposite_x, bearing.opposite_gap_x),
+                (bearing.opposite_y, bearing.opposite_gap_y),
+            ),
+        )
+    )
+    x, y = (probe_axis(bearing, near, far, axis) for axis in (0, 1))
+    centre = locate_shaft(x, y, bearing.clearance_um, bearing.gap_accuracy)
+    if centre.x_um.value is None or centre.y_um.value is None:
+        return None
+    return centre.x_um.value, centre.y_um.value
+
+
+def _gap(stretch: ShaftStretch, channel: Channel | None, slow_channel: str | None) -> Reading:
+    """Mean gap in µm, from the slow channel or from a DC-coupled probe."""
+    if slow_channel is not None:
+        gap_mm = stretch.mean_of(slow_channel)
+        return gap_mm if gap_mm.value is None else Reading(1e3 * gap_mm.value, gap_mm.quality)
+    samples = None if channel is None else stretch.of(channel.id)
+    if channel is None or samples is None or channel.measurand is not Measurand.GAP_UM:
+        return missing(Reason.NOT_MEASURED)
+    if not np.isfinite(samples).any():
+        return missing(Reason.SENSOR_FAILURE)
+    return Reading(_mean(samples))

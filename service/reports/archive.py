@@ -1,0 +1,211 @@
+"""`EvidenceArchive`: what there is of the occurrences of an alarm, honestly."""
+
+import hashlib
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import islice
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from acquisition.recordings.manifest import MANIFEST
+from core.alarms.alarm import ANNOUNCED, AlarmEvent
+from service.recordings.capture.span import is_captured
+from service.reports.capture_link import CapturePart, linked
+from service.reports.configuration import canonical
+from service.reports.document import Evidence
+from service.reports.folders import DOCUMENT, Place, kept_since_ns, parsed, places, removed
+from service.reports.keeper import EvidenceFolders
+from service.runtime.times import compact
+from service.store.film_port import FilmStore
+from service.store.port import AlarmQuery, Store
+
+PAGE = 1000
+"""Events that are read at once."""
+
+Occurrences = frozenset[tuple[str, int]]
+"""By alarm and number."""
+
+
+class EvidenceState(StrEnum):
+    """What there is of an occurrence."""
+
+    COMPLETE = "complete"
+    WAITING = "waiting"
+    LOST = "lost"
+    REMOVED = "removed"
+    NOT_KEPT = "not_kept"
+
+
+class SamplesState(StrEnum):
+    """What there is of the samples around it."""
+
+    COMPLETE = "complete"
+    BEING_MADE = "being_made"
+    LOST = "lost"
+    REMOVED = "removed"
+    NONE = "none"
+
+
+class DamagedEvidenceError(Exception):
+    """A bundle is not what was written; the message says which and why."""
+
+
+@dataclass(frozen=True)
+class Occurrence:
+    """An occurrence of an alarm with what there is of it.
+
+    Parameters
+    ----------
+    place
+        Where its bundle is; None unless it is complete.
+    """
+
+    event: AlarmEvent
+    state: EvidenceState
+    place: Place | None = None
+
+
+class EvidenceArchive:
+    """Reads what `EvidenceKeeper` has written; every method belongs into a thread."""
+
+    def __init__(self, folders: EvidenceFolders, store: Store) -> None:
+        self.folders, self._store = folders, store
+
+    @property
+    def films(self) -> FilmStore:
+        """Readings of films, as they are stored now."""
+        return self._store.films
+
+    def occurrences(self, alarm: str, pending: Occurrences, most: int) -> list[Occurrence]:
+        """The newest occurrences of an alarm, newest first.
+
+        Parameters
+        ----------
+        pending
+            What is still to be written, asked for before this.
+
+        Raises
+        ------
+        StoreError
+            If the store cannot be read.
+        """
+        events = (each for each in self.events(alarm) if each.change in ANNOUNCED)
+        found = list(islice(events, most))
+        return self._with_bundles(alarm, found, pending)
+
+    def occurrence(self, alarm: str, number: int, pending: Occurrences) -> Occurrence | None:
+        """One of them; None if there never was such a one.
+
+        Raises
+        ------
+        StoreError
+            If the store cannot be read.
+        """
+        for event in self.events(alarm):
+            if event.occurrence < number:
+                break  # the events of an occurrence come after all of those before
+            if event.occurrence == number and event.change in ANNOUNCED:
+                return self._with_bundles(alarm, [event], pending)[0]
+        return None
+
+    def events(self, alarm: str) -> Iterator[AlarmEvent]:
+        """All events of an alarm, newest first, read as far as they are wanted."""
+        before = AlarmQuery().before
+        while page := self._store.alarm_events(AlarmQuery(before, PAGE, alarm=alarm)):
+            yield from (stored.event for stored in page)
+            before = page[-1].id
+
+    def document(self, place: Place) -> Evidence:
+        """The document of a bundle.
+
+        Raises
+        ------
+        DamagedEvidenceError
+            If it is not what was written.
+        """
+        try:
+            text = (place.folder / DOCUMENT).read_bytes()
+            found = Evidence.model_validate_json(text)
+        except (OSError, ValidationError) as error:
+            raise DamagedEvidenceError(f"{place.folder.name}: {error}") from error
+        content = json.loads(text)
+        if hashlib.sha256(canonical(_without_hash(content))).hexdigest() != found.sha256:
+            raise DamagedEvidenceError(f"{place.folder.name}: changed since it was written")
+        return found
+
+    def samples(self, found: Occurrence, capturing: Occurrences) -> SamplesState:
+        """What there is of the samples around an occurrence.
+
+        Parameters
+        ----------
+        capturing
+            What is still being recorded, asked for before this.
+        """
+        name = (found.event.identity.id, found.event.occurrence)
+        capture = None if found.place is None else linked(found.place.folder)
+        if capture is not None:
+            folder = None if found.place is None else capture_folder(found.place, capture)
+            if capture.state == "lost":
+                return SamplesState.LOST
+            return SamplesState.COMPLETE if folder is not None else SamplesState.REMOVED
+        if name in capturing:
+            return SamplesState.BEING_MADE
+        was_kept = found.state is not EvidenceState.NOT_KEPT and is_captured(found.event)
+        if was_kept and found.place is not None:
+            was_kept = self.document(found.place).samples_expected
+        return SamplesState.LOST if was_kept else SamplesState.NONE
+
+    def configuration(self, version: str) -> Path | None:
+        """The file of a configuration; None if it is not there."""
+        path = self.folders.configurations / f"{version}.json"
+        return path if path.is_file() else None
+
+    def _with_bundles(
+        self, alarm: str, events: list[AlarmEvent], pending: Occurrences
+    ) -> list[Occurrence]:
+        unit, root = alarm.partition(":")[0], self.folders.evidence
+        kept: dict[int, list[Place]] = {}
+        for place in places(root, unit):
+            if place.alarm == alarm:
+                kept.setdefault(place.occurrence, []).append(place)
+        gone = {
+            number
+            for found in map(parsed, removed(root, unit))
+            if found and f"{unit}:{found[0]}:{found[1]}" == alarm
+            for number in found[2:]
+        }
+        since_ns = kept_since_ns(root)
+
+        def state(event: AlarmEvent) -> Occurrence:
+            place = _of_event(event, kept.get(event.occurrence, ()))
+            if place is not None:
+                return Occurrence(event, EvidenceState.COMPLETE, place)
+            if (alarm, event.occurrence) in pending:
+                return Occurrence(event, EvidenceState.WAITING)
+            if event.occurrence in gone:
+                return Occurrence(event, EvidenceState.REMOVED)
+            was_kept = since_ns is not None and event.time_ns >= since_ns
+            return Occurrence(event, EvidenceState.LOST if was_kept else EvidenceState.NOT_KEPT)
+
+        return [state(event) for event in events]
+
+
+def capture_folder(place: Place, capture: CapturePart) -> Path | None:
+    """Where the samples are; None if they are no longer there."""
+    if capture.folder is None or capture.manifest is None:
+        return None
+    folder = place.folder / capture.folder
+    return folder if (folder / MANIFEST).is_file() else None
+
+
+def _of_event(event: AlarmEvent, found: Sequence[Place]) -> Place | None:
+    """The bundle of an event: that of its time, should there be several."""
+    moment = compact(event.time_ns)
+    return max(found, key=lambda each: (each.moment == moment, each.moment), default=None)
+
+
+def _without_hash(content: dict[str, object]) -> dict[str, object]:
+    return {key: value for key, value in content.items() if key != "sha256"}

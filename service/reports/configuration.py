@@ -1,0 +1,102 @@
+"""`Configuration`: the settings of the plant file under a name that changes with each of them."""
+
+import hashlib
+import json
+import os
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from service.runtime.whole_files import write_whole
+from service.settings.plant import PlantFile
+
+FORMAT = "padwatch-configuration"
+
+LEFT_OUT = "left out"
+
+SECRETS = ("secret", "authorization", "password", "username")
+"""Keys whose values do not leave the plant file, wherever they stand."""
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A configuration in full, and its version: the SHA-256 of that.
+
+    Parameters
+    ----------
+    text
+        Canonical JSON: keys sorted, no spaces, UTF-8.
+    """
+
+    text: bytes
+
+    @property
+    def version(self) -> str:
+        """Its name."""
+        return hashlib.sha256(self.text).hexdigest()
+
+
+def configuration_of(plant: PlantFile, program: str, commit: str | None) -> Configuration:
+    """The configuration of a plant file, without its secrets.
+
+    Parameters
+    ----------
+    program, commit
+        Version of padwatch, and the commit that it was built from, if that is known.
+    """
+    settings = without_secrets(plant.model_dump(mode="json"))
+    document = {"format": FORMAT, "version": 1, "padwatch": program, "commit": commit}
+    return Configuration(canonical(document | {"settings": settings}))
+
+
+def canonical(document: object) -> bytes:
+    """One and the same text for one and the same document."""
+    text = json.dumps(
+        document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
+    )
+    return text.encode()
+
+
+def without_secrets(value: Any) -> Any:
+    """The same settings without what only the plant should know."""
+    if isinstance(value, dict):
+        return {key: _shown(key, each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [without_secrets(each) for each in value]
+    return value
+
+
+def keep_configuration(folder: Path, configuration: Configuration) -> None:
+    """Write a configuration under its name, unless it is there already.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses.
+    """
+    path = folder / f"{configuration.version}.json"
+    if path.exists() and path.read_bytes() == configuration.text:
+        return
+    os.makedirs(folder, exist_ok=True)
+    write_whole(path, configuration.text)
+
+
+def built_from() -> str | None:
+    """The commit that padwatch was installed from; None if it was not installed from one."""
+    try:
+        text = distribution("padwatch").read_text("direct_url.json")
+    except PackageNotFoundError:
+        return None
+    commit = json.loads(text or "{}").get("vcs_info", {}).get("commit_id")
+    return str(commit)[:64] if commit else None
+
+
+def _shown(key: str, value: Any) -> Any:
+    if key in SECRETS and value is not None:
+        return LEFT_OUT
+    if key == "url" and isinstance(value, str):
+        parts = urlsplit(value)  # its path may be as good as a password
+        return f"{parts.scheme}://{parts.hostname}/ ({LEFT_OUT})"
+    return without_secrets(value)

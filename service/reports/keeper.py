@@ -1,0 +1,209 @@
+"""`EvidenceKeeper`: a bundle for every occurrence of an alarm, without ever being in the way."""
+
+import asyncio
+from collections import deque
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import structlog
+
+from acquisition.clock import Clock
+from core.alarms.alarm import ANNOUNCED, AlarmEvent, AlarmNews
+from service.recordings.capture.captures import Captures
+from service.recordings.capture.outcome import Outcome
+from service.reports.capture_link import link, link_all, note_lost
+from service.reports.configuration import Configuration, keep_configuration
+from service.reports.folders import clear_leftovers, note_beginning, place_of
+from service.reports.room import EvidenceRoom
+from service.reports.snapshot import Camera, Snapshot
+from service.reports.writer import EvidenceWriter
+from service.runtime.heartbeats import UNHEARD, Pulse
+from service.store.port import StoreError
+
+log = structlog.get_logger()
+
+RETRY_S = 10.0
+
+MAX_BUSY_S = 300.0
+"""Longest that one bundle may take, or to look through all of them."""
+
+MAX_PENDING = 200
+"""Snapshots that wait for the disk; one holds a few hundred kilobytes of results alive."""
+
+STORE_ATTEMPTS = 5
+"""After so many a bundle is written without what the store does not give."""
+
+
+@dataclass(frozen=True)
+class EvidenceFolders:
+    """Where bundles, captures and configurations are, each below the data folder."""
+
+    evidence: Path
+    captures: Path
+    configurations: Path
+
+
+class EvidenceKeeper:
+    """Takes snapshots on the event loop, and writes them in a thread of its own, oldest first.
+
+    Attributes
+    ----------
+    error
+        Why the last attempt to write failed; None since one did not.
+    n_written, n_failed, n_lost
+        Bundles written, attempts that failed, and occurrences given up since the start.
+    """
+
+    def __init__(
+        self,
+        folders: EvidenceFolders,
+        camera: Camera,
+        writer: EvidenceWriter,
+        room: EvidenceRoom,
+        configuration: Configuration,
+        captures: Captures,
+        clock: Clock,
+    ) -> None:
+        self._folders, self._camera, self._writer, self._room = folders, camera, writer, room
+        self._configuration, self._captures, self._clock = configuration, captures, clock
+        self._pending: deque[Snapshot] = deque()
+        self._outcomes: deque[Outcome] = deque()
+        self._news = asyncio.Event()
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix="evidence")
+        self._n_store_attempts = 0
+        self.error: str | None = None
+        self.n_written = self.n_failed = self.n_lost = 0
+
+    @property
+    def n_pending(self) -> int:
+        """Occurrences whose bundles are still to be written."""
+        return len(self._pending)
+
+    def see(self, news: Sequence[AlarmNews]) -> None:
+        """Note what is known when alarms are raised or rise in level."""
+        for told in news:
+            for event in told.events:
+                if event.change in ANNOUNCED:
+                    self._take(event)
+
+    def captured(self, outcome: Outcome) -> None:
+        """Note that samples around alarms are complete, or lost."""
+        self._outcomes.append(outcome)
+        self._news.set()
+
+    @property
+    def pending(self) -> frozenset[tuple[str, int]]:
+        """Alarms and occurrences whose bundles are still to be written."""
+        return frozenset((s.event.identity.id, s.event.occurrence) for s in self._pending)
+
+    @property
+    def capturing(self) -> frozenset[tuple[str, int]]:
+        """Those around which samples are still to be written, or to be linked."""
+        ended = (event for outcome in self._outcomes for event in outcome.alarms)
+        linking = frozenset((event.identity.id, event.occurrence) for event in ended)
+        return self._captures.being_made | linking
+
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
+        """Write what is to be written, for ever; afterwards `close`."""
+        pulse.beat(MAX_BUSY_S)
+        await self._trying(self._begin)
+        await self._trying(self._make_room)
+        while True:
+            pulse.rest()
+            await self._news.wait()
+            self._news.clear()
+            while self._pending or self._outcomes:
+                pulse.beat(MAX_BUSY_S)
+                if not await self._write_one():
+                    await self._clock.sleep(RETRY_S)
+            pulse.beat(MAX_BUSY_S)
+            await self._trying(self._make_room)
+
+    async def close(self) -> None:
+        """Write what there is, once, and let go of the thread."""
+        while self._pending or self._outcomes:
+            if not await self._write_one():
+                break
+        if self._pending:
+            log.error("evidence of alarms is lost", n_occurrences=len(self._pending))
+        self._thread.shutdown(wait=False)
+
+    def _take(self, event: AlarmEvent) -> None:
+        expected = self._captures.expects(event)
+        self._pending.append(self._camera.take(event, self._clock.now_ns(), expected))
+        if len(self._pending) > MAX_PENDING:
+            lost = self._pending.popleft()
+            self.n_lost += 1
+            log.error("evidence of an alarm is lost", occurrence=lost.name)
+        self._news.set()
+
+    async def _write_one(self) -> bool:
+        """Write the oldest; what has become of captures follows bundles, which it is noted in."""
+        if self._pending:
+            snapshot = self._pending[0]
+            with_history = self._n_store_attempts < STORE_ATTEMPTS
+            if not await self._trying(partial(self._write, snapshot, with_history)):
+                return False
+            self._n_store_attempts = 0
+            if self._pending and self._pending[0] is snapshot:
+                self._pending.popleft()
+            return True
+        outcome = self._outcomes[0]
+        if not await self._trying(partial(self._link, outcome)):
+            return False
+        self._outcomes.popleft()
+        return True
+
+    def _write(self, snapshot: Snapshot, with_history: bool) -> None:
+        keep_configuration(self._folders.configurations, self._configuration)
+        self._room.note(self._writer.write(snapshot, with_history=with_history))
+        self.n_written += 1
+
+    def _link(self, outcome: Outcome) -> None:
+        """In the thread: tell all bundles of what was captured where to find it."""
+        for event in outcome.alarms:
+            place = place_of(self._folders.evidence, event)
+            if not place.folder.is_dir():
+                continue
+            if outcome.folder is None:
+                note_lost(place.folder, outcome.reason or "no samples arrived")
+            elif outcome.folder.is_dir():
+                link(place.folder, outcome.folder)
+            self._room.note(place)
+
+    def _begin(self) -> None:
+        """In the thread: keep the configuration, remove and link what a crash has left."""
+        keep_configuration(self._folders.configurations, self._configuration)
+        note_beginning(self._folders.evidence, self._clock.now_ns())
+        for folder in clear_leftovers(self._folders.evidence):
+            log.warning("unfinished evidence is removed", folder=folder.name)
+        link_all(self._folders.evidence, self._folders.captures)
+
+    def _make_room(self) -> None:
+        for name in self._room.make():
+            log.info("evidence is removed to make room", folder=name)
+
+    async def _trying(self, do: Callable[[], None]) -> bool:
+        """Do something in the thread; return whether the disk and the store let it."""
+        try:
+            await asyncio.get_running_loop().run_in_executor(self._thread, do)
+        except StoreError as error:
+            self._n_store_attempts += 1
+            self._failed(str(error))
+            return False
+        except OSError as error:
+            self._failed(str(error))
+            return False
+        if self.error is not None:
+            log.info("evidence of alarms is written again")
+        self.error = None
+        return True
+
+    def _failed(self, error: str) -> None:
+        self.n_failed += 1
+        if error != self.error:
+            log.error("evidence of alarms is not written", reason=error)
+        self.error = error

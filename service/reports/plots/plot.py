@@ -1,0 +1,170 @@
+"""`Plot`: axes with units, and what is drawn between them, as one SVG element."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from html import escape
+
+from service.reports.plots.scales import Scale, TimeScale
+
+LEFT, RIGHT, TOP, BOTTOM = 46.0, 8.0, 6.0, 30.0
+
+TIME_ROOM, NUMBER_ROOM = 62.0, 40.0
+"""That a tick takes along x."""
+
+Values = Sequence[float | None]
+"""None where there is no number."""
+
+
+@dataclass
+class Plot:
+    """A plot under construction.
+
+    Parameters
+    ----------
+    width, height
+        Of everything, in units of which the writing is 9 high.
+    x_label, y_label
+        What the axes show, with their units.
+    title
+        Read out in the place of the picture.
+    name
+        Of this plot alone on its page.
+    """
+
+    width: float
+    height: float
+    x: Scale | TimeScale
+    y: Scale
+    x_label: str
+    y_label: str
+    title: str
+    name: str
+    _marks: list[str] = field(default_factory=list)
+
+    def line(self, xs: Values, ys: Values, look: str, longest_step: float = math.inf) -> None:
+        """A line; it breaks where there is no number, or a step along x is too long."""
+        path, last = [], None
+        for x, y in zip(xs, ys, strict=True):
+            if x is None or y is None:
+                last = None
+                continue
+            begins = last is None or x - last > longest_step
+            path.append(f"{'M' if begins else 'L'}{self._x(x)} {self._y(y)}")
+            last = x
+        if path:
+            self._marks.append(f'<path class="{look}" d="{"".join(path)}"/>')
+
+    def band(self, xs: Values, lows: Values, highs: Values, look: str, longest_step: float) -> None:
+        """An area between two lines, in pieces where they break."""
+        piece: list[tuple[float, float, float]] = []
+        for x, low, high in zip(xs, lows, highs, strict=True):
+            is_known = x is not None and low is not None and high is not None
+            if piece and (x is None or not is_known or x - piece[-1][0] > longest_step):
+                self._area(piece, look)
+                piece = []
+            if x is not None and low is not None and high is not None:
+                piece.append((x, low, high))
+        self._area(piece, look)
+
+    def points(
+        self, xs: Values, ys: Values, look: str, radius: float = 1.6, errors: Values | None = None
+    ) -> None:
+        """Points, with error bars of this half-length along y."""
+        for i, (x, y) in enumerate(zip(xs, ys, strict=True)):
+            if x is None or y is None:
+                continue
+            error = None if errors is None else errors[i]
+            if error is not None and error > 0.0:
+                ends = f"M{self._x(x)} {self._y(y - error)}V{self._y(y + error)}"
+                self._marks.append(f'<path class="{look} bar" d="{ends}"/>')
+            self._marks.append(
+                f'<circle class="{look}" cx="{self._x(x)}" cy="{self._y(y)}" r="{radius:g}"/>'
+            )
+
+    def dots(self, xs: Values, ys: Values, look: str) -> None:
+        """Many points as one path."""
+        found = (
+            f"M{self._x(x)} {self._y(y)}h0"
+            for x, y in zip(xs, ys, strict=True)
+            if x is not None and y is not None
+        )
+        self._marks.append(f'<path class="{look} dots" d="{"".join(found)}"/>')
+
+    def cell(
+        self, x: tuple[float, float], y: tuple[float, float], look: str, opacity: float = 1.0
+    ) -> None:
+        """A rectangle between two values along each axis."""
+        left, right, top, bottom = self._x(x[0]), self._x(x[1]), self._y(y[1]), self._y(y[0])
+        self._marks.append(
+            f'<path class="{look}" fill-opacity="{opacity:.2f}"'
+            f' d="M{left} {top}H{right}V{bottom}H{left}Z"/>'
+        )
+
+    def upright(self, x: float, look: str, words: str = "", row: int = 0) -> None:
+        """A line from top to bottom, with words beside it, in rows from its top."""
+        place, y = self._x(x), TOP + 8 + 9 * row
+        self._marks.append(f'<path class="{look}" d="M{place} {TOP:g}V{self.height - BOTTOM:g}"/>')
+        self._marks.append(
+            f'<text class="note" x="{place}" y="{y:g}" dx="2">{escape(words)}</text>'
+        )
+
+    def level(self, y: float, look: str) -> None:
+        """A line from left to right."""
+        self._marks.append(f'<path class="{look}" d="M{LEFT:g} {self._y(y)}H{self._right:g}"/>')
+
+    def svg(self) -> str:
+        """The whole plot."""
+        size = f"0 0 {self.width:g} {self.height:g}"
+        clip = f"inside-{self.name}"
+        area = (
+            f'<clipPath id="{clip}"><rect x="{LEFT:g}" y="{TOP:g}"'
+            f' width="{self._right - LEFT:g}" height="{self.height - BOTTOM - TOP:g}"/></clipPath>'
+        )
+        return (
+            f'<svg viewBox="{size}" role="img" aria-label="{escape(self.title)}">'
+            f"{area}{self._axes()}"
+            f'<g clip-path="url(#{clip})">{"".join(self._marks)}</g></svg>'
+        )
+
+    @property
+    def _right(self) -> float:
+        return self.width - RIGHT
+
+    def _axes(self) -> str:
+        bottom = self.height - BOTTOM
+        parts = [f'<path class="frame" d="M{LEFT:g} {TOP:g}V{bottom:g}H{self._right:g}"/>']
+        room = TIME_ROOM if isinstance(self.x, TimeScale) else NUMBER_ROOM
+        most = max(2, int((self._right - LEFT) / room))
+        for value, words in self.x.ticks(most):
+            x = self._x(value)
+            parts.append(f'<path class="grid" d="M{x} {TOP:g}V{bottom:g}"/>')
+            parts.append(f'<text class="mid" x="{x}" y="{bottom + 11:g}">{escape(words)}</text>')
+        for value, words in self.y.ticks(max(2, int((bottom - TOP) / 24))):
+            y = self._y(value)
+            parts.append(f'<path class="grid" d="M{LEFT:g} {y}H{self._right:g}"/>')
+            parts.append(
+                f'<text class="end" x="{LEFT - 4:g}" y="{y}" dy="3">{escape(words)}</text>'
+            )
+        middle_x, middle_y = (LEFT + self._right) / 2, (TOP + bottom) / 2
+        label = escape(self.x_label)
+        parts.append(f'<text class="mid" x="{middle_x:g}" y="{self.height - 5:g}">{label}</text>')
+        parts.append(
+            f'<text class="mid" transform="translate(10 {middle_y:g}) rotate(-90)">'
+            f"{escape(self.y_label)}</text>"
+        )
+        return "".join(parts)
+
+    def _area(self, piece: Sequence[tuple[float, float, float]], look: str) -> None:
+        if not piece:
+            return
+        there = "L".join(f"{self._x(x)} {self._y(high)}" for x, _, high in piece)
+        back = "L".join(f"{self._x(x)} {self._y(low)}" for x, low, _ in reversed(piece))
+        self._marks.append(f'<path class="{look}" d="M{there}L{back}Z"/>')
+
+    def _x(self, value: float) -> str:
+        return f"{LEFT + self.x.at(value) * (self._right - LEFT):.1f}"
+
+    def _y(self, value: float) -> str:
+        bottom = self.height - BOTTOM
+        return f"{bottom - self.y.at(value) * (bottom - TOP):.1f}"

@@ -1,0 +1,109 @@
+"""`Case`: all that a report tells of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from core.alarms.alarm import AlarmEvent
+from core.machine.unit import Estimator
+from core.units import NS_PER_S
+from service.reports.archive import EvidenceArchive, Occurrence, SamplesState
+from service.reports.bearing_part import AXES, BearingPart, Direction
+from service.reports.comparison_part import ComparisonPart
+from service.reports.document import Evidence
+from service.reports.tables import ORBITS, SPECTRA, TREND, Columns, read_table, trend_columns
+from service.store.film_port import FilmQuery
+
+DAY_NS = 86_400 * NS_PER_S
+
+
+@dataclass(frozen=True)
+class Case:
+    """An occurrence with its bundle, and what has come after.
+
+    Parameters
+    ----------
+    spectra, orbits, before
+        Tables of the bundle; empty where there are none.
+    after
+        Readings of the film since, as the store has them now.
+    events
+        What has happened to the occurrence, oldest first.
+    """
+
+    evidence: Evidence
+    spectra: Columns
+    orbits: Columns
+    before: Columns
+    after: Columns
+    events: Sequence[AlarmEvent]
+    samples: SamplesState
+
+    @property
+    def bearing(self) -> BearingPart | None:
+        """The bearing that the alarm is about."""
+        found = (b for b in self.evidence.bearings if b.bearing == self.evidence.bearing)
+        return next(found, None)
+
+    @property
+    def direction(self) -> Direction:
+        """The direction that the alarm is about; x if it is about none."""
+        return self.evidence.direction or AXES[0]
+
+    @property
+    def comparison(self) -> ComparisonPart | None:
+        """The film in that direction."""
+        found = (c for c in self.evidence.comparisons if c.direction == self.direction)
+        return next(found, None)
+
+
+def read_case(
+    archive: EvidenceArchive, found: Occurrence, samples: SamplesState, trend_days: float
+) -> Case:
+    """Read what a report tells of.
+
+    Raises
+    ------
+    DamagedEvidenceError, TableError
+        If the bundle cannot be read.
+    LookupError
+        If there is none.
+    StoreError
+        If the store cannot be read.
+    """
+    if found.place is None:
+        raise LookupError("there is no bundle")
+    evidence = archive.document(found.place)
+    tables = {
+        name: read_table(found.place.folder / name) if name in evidence.files else {}
+        for name in (SPECTRA, ORBITS, TREND)
+    }
+    return Case(
+        evidence=evidence,
+        spectra=tables[SPECTRA],
+        orbits=tables[ORBITS],
+        before=tables[TREND],
+        after=_after(archive, evidence, trend_days) if tables[TREND] else {},
+        events=_of_occurrence(archive, found)[::-1],
+        samples=samples,
+    )
+
+
+def _of_occurrence(archive: EvidenceArchive, found: Occurrence) -> Sequence[AlarmEvent]:
+    """Its events, newest first."""
+    events = []
+    for event in archive.events(found.event.identity.id):
+        if event.occurrence < found.event.occurrence:
+            break
+        if event.occurrence == found.event.occurrence:
+            events.append(event)
+    return events
+
+
+def _after(archive: EvidenceArchive, evidence: Evidence, trend_days: float) -> Columns:
+    bearing, since_ns = evidence.bearing, evidence.alarm.time_ns
+    name = evidence.limits.get("estimators", {}).get(bearing)
+    if bearing is None or name is None:
+        return {}
+    until_ns = since_ns + round(trend_days * DAY_NS)
+    query = FilmQuery(evidence.alarm.unit, bearing, Estimator(name), since_ns + 1, until_ns)
+    return trend_columns(archive.films.history(query))

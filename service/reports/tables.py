@@ -1,0 +1,151 @@
+"""The tables of a bundle as Parquet: spectra, orbits, readings around the alarm."""
+
+from collections.abc import Iterable
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from core.change.decision import Verdict
+from core.monitor.assessment import Assessment
+from core.spectra.cross_spectrum import CrossSpectrum
+from service.reports.bearing_part import AXES
+from service.store.film_port import FilmHistory
+
+SPECTRA, ORBITS, TREND = "spectra.parquet", "orbits.parquet", "trend.parquet"
+
+CHANNELS = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
+"""In the order of a cross-spectrum."""
+
+PAIRS = [(i, j) for i in range(len(CHANNELS)) for j in range(i + 1, len(CHANNELS))]
+
+WORDS = np.array([verdict.name.lower() for verdict in Verdict])
+
+AnyArray = npt.NDArray[Any]
+
+Columns = dict[str, list[Any]]
+"""A table by column, as Python has it."""
+
+
+class TableError(Exception):
+    """A table of a bundle cannot be read; the message says which and why."""
+
+
+def spectra_table(found: Iterable[Assessment]) -> bytes:
+    """Cross-spectra of bearings; everything that padwatch knows of frequencies is made of them."""
+    tables = [_spectrum(each.bearing, each.spectrum) for each in found]
+    return _written(pa.concat_tables(tables))
+
+
+def orbits_table(found: Iterable[Assessment]) -> bytes | None:
+    """The newest turns of the shaft in each bearing; None where no samples were kept of them."""
+    tables = []
+    for each in found:
+        orbit = each.orbit
+        if orbit is None:
+            continue
+        n = orbit.shaft_x_um.size
+        columns = {
+            "bearing": pa.array([each.bearing] * n).dictionary_encode(),
+            "time_s": np.arange(n) / orbit.rate_hz,
+            "shaft_x_um": orbit.shaft_x_um,
+            "shaft_y_um": orbit.shaft_y_um,
+        }
+        tables.append(pa.table(columns))
+    return _written(pa.concat_tables(tables)) if tables else None
+
+
+def trend_table(found: FilmHistory) -> bytes:
+    """Readings of a film, oldest first."""
+    return _written(_trend(found))
+
+
+def _trend(found: FilmHistory) -> "pa.Table":
+    history = found.history
+    shared: dict[str, AnyArray] = {
+        "time_ns": history.time_ns,
+        "operating_state": found.state,
+        "is_settled": found.is_settled,
+        "is_simulated": found.is_simulated,
+        "speed_rpm": history.speed_rpm,
+        "power_mw": history.power_mw,
+        "eccentricity_ratio": history.eccentricity_ratio,
+        "attitude_deg": history.attitude_deg,
+        "oil_temperature_c": history.oil_temperature_c,
+        "baseline_version": found.baseline_version,
+    }
+    pairs: dict[str, AnyArray] = {
+        f"{name}_{axis}": column[row]
+        for row, axis in enumerate(AXES)
+        for name, column in (
+            ("stiffness_n_per_m", np.exp(history.ln_k)),
+            ("u_random", history.u_random),
+            ("shaft_um_pk", history.shaft_um_pk),
+            ("bearing_um_pk", history.bearing_um_pk),
+            ("verdict", WORDS[found.verdict]),
+            ("level", found.level),
+            ("change", found.change),
+            ("change_std", found.change_std),
+            ("deviation", found.deviation),
+            ("deviation_std", found.deviation_std),
+        )
+    }
+    return pa.table({name: _column(each) for name, each in (shared | pairs).items()})
+
+
+def trend_columns(found: FilmHistory) -> Columns:
+    """The same readings as Python has them."""
+    columns: Columns = _trend(found).to_pydict()
+    return columns
+
+
+def read_table(path: Path) -> Columns:
+    """A table of a bundle.
+
+    Raises
+    ------
+    TableError
+        If it cannot be read.
+    """
+    try:
+        columns: Columns = pq.read_table(path, memory_map=False).to_pydict()
+    except (OSError, pa.ArrowException) as error:
+        raise TableError(f"{path.name}: {error}") from error
+    return columns
+
+
+def _spectrum(bearing: str, found: CrossSpectrum) -> "pa.Table":
+    n = found.frequency_hz.size
+    columns = {
+        "bearing": pa.array([bearing] * n).dictionary_encode(),
+        "frequency_hz": found.frequency_hz,
+    }
+    columns |= {
+        f"{name}_um_pk": found.amplitude_um_pk(place) for place, name in enumerate(CHANNELS)
+    }
+    columns |= {
+        f"{part}_{CHANNELS[i]}_{CHANNELS[j]}_um2": column
+        for i, j in PAIRS
+        for part, column in (
+            ("re", np.ascontiguousarray(found.matrix[:, i, j].real)),
+            ("im", np.ascontiguousarray(found.matrix[:, i, j].imag)),
+        )
+    }
+    columns |= {
+        f"coherence_{axis}": found.coherence(place, place + 2) for place, axis in enumerate(AXES)
+    }
+    return pa.table(columns)
+
+
+def _column(values: AnyArray) -> "pa.Array":
+    return pa.array(np.ascontiguousarray(values), from_pandas=True)  # not a number is null
+
+
+def _written(table: "pa.Table") -> bytes:
+    sink = BytesIO()
+    pq.write_table(table, sink, compression="zstd")
+    return sink.getvalue()

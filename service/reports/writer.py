@@ -1,0 +1,97 @@
+"""`EvidenceWriter`: from a snapshot to a bundle on the disk; lives in the thread that writes."""
+
+import shutil
+from contextlib import suppress
+from pathlib import Path
+
+from core.monitor.assessment import Assessment
+from service.reports.compared import cell_of, comparisons
+from service.reports.comparison_part import ComparisonPart
+from service.reports.composed import composed, not_known, sealed
+from service.reports.folders import DOCUMENT, INCOMPLETE, Place, place_of
+from service.reports.maker import Maker
+from service.reports.members import members_of
+from service.reports.room import DAY_NS, EvidenceLimits
+from service.reports.snapshot import Snapshot
+from service.reports.tables import ORBITS, SPECTRA, TREND, orbits_table, spectra_table, trend_table
+from service.runtime.whole_files import file_part, sync_folder, write_synced
+from service.store.film_port import FilmQuery, FilmStore
+
+
+class EvidenceWriter:
+    """Writes bundles, each complete with its name or not there at all."""
+
+    def __init__(self, root: Path, maker: Maker, store: FilmStore, limits: EvidenceLimits) -> None:
+        self._root, self._maker, self._store, self._limits = root, maker, store, limits
+
+    def write(self, snapshot: Snapshot, *, with_history: bool = True) -> Place:
+        """Write a bundle; one that is there already stays.
+
+        Parameters
+        ----------
+        with_history
+            Whether readings are taken from the store; without, the document says so.
+
+        Raises
+        ------
+        OSError
+            If the disk refuses; then nothing of it is left.
+        StoreError
+            If the store cannot be read.
+        """
+        place = place_of(self._root, snapshot.event)
+        if place.folder.exists():
+            return place
+        aside = place.folder.with_name(place.folder.name + INCOMPLETE)
+        try:
+            aside.mkdir(parents=True, exist_ok=True)
+            self._fill(aside, snapshot, with_history)
+            sync_folder(aside)
+            aside.rename(place.folder)
+            sync_folder(place.folder.parent)
+        except BaseException:
+            with suppress(OSError):
+                shutil.rmtree(aside)
+            raise
+        return place
+
+    def _fill(self, folder: Path, snapshot: Snapshot, with_history: bool) -> None:
+        missing = [] if with_history else ["the store could not be read: no members, no trend"]
+        compared = self._compared(snapshot, with_history)
+        for name, content in self._tables(snapshot, with_history).items():
+            write_synced(folder / name, content)
+        files = {path.name: file_part(path) for path in sorted(folder.iterdir())}
+        document = composed(snapshot, self._maker)
+        document["comparisons"], document["missing"] = compared, [*missing, *not_known(snapshot)]
+        document["files"] = files
+        write_synced(folder / DOCUMENT, sealed(document))
+
+    def _compared(self, snapshot: Snapshot, with_history: bool) -> list[ComparisonPart]:
+        found = snapshot.bearings.get(snapshot.bearing or "")
+        if found is None or found.film is None or snapshot.rules is None:
+            return []
+        cell, members = cell_of(found.film, snapshot.rules), None
+        if with_history and cell is not None and found.baseline is not None:
+            members = members_of(self._store, cell, found.baseline, snapshot.rules)
+        return comparisons(found.film, found.baseline, snapshot.rules, members)
+
+    def _tables(self, snapshot: Snapshot, with_history: bool) -> dict[str, bytes]:
+        found = _assessments(snapshot)
+        tables = {SPECTRA: spectra_table(found), ORBITS: orbits_table(found)} if found else {}
+        query = self._trend_query(snapshot)
+        if with_history and query is not None:
+            tables[TREND] = trend_table(self._store.history(query))
+        return {name: table for name, table in tables.items() if table is not None}
+
+    def _trend_query(self, snapshot: Snapshot) -> FilmQuery | None:
+        bearing, rules = snapshot.bearing, snapshot.rules
+        if bearing is None or rules is None or bearing not in rules.estimators:
+            return None
+        event, days = snapshot.event, self._limits.trend_days
+        start_ns = event.time_ns - round(days * DAY_NS)
+        unit = event.identity.unit
+        return FilmQuery(unit, bearing, rules.estimators[bearing], start_ns, event.time_ns + 1)
+
+
+def _assessments(snapshot: Snapshot) -> list[Assessment]:
+    return [each.assessment for each in snapshot.bearings.values() if each.assessment is not None]

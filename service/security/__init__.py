@@ -1,1 +1,0 @@
-"""Who may do what: roles, accounts, sessions, keys of machines."""

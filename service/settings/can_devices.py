@@ -1,0 +1,154 @@
+"""CAN sources and DAQs of the plant file, as the adapter and the simulated DAQ take them."""
+
+from pathlib import Path
+from typing import Any
+
+from acquisition.can.compiler import compile_plan
+from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
+from acquisition.clock import Clock
+from acquisition.delivery.calibration import COUNTS_FULL_SCALE
+from acquisition.delivery.units import UNIT_OF
+from acquisition.simulated.devices.can_device import CanDevice
+from acquisition.simulated.devices.can_server import CanBusServer
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_settings
+from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.simulated.devices.server import DaqServer
+from acquisition.simulated.feed import SampleFeed
+from service.settings import can as settings
+from service.settings.core_values import calibration_of
+from service.settings.units import UnitSettings
+
+
+def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSettings:
+    """What the CAN adapter has to be told of a unit."""
+    link = can_link_of(source)
+    others: dict[str, Any] = {
+        "hold_s": source.hold_s,
+        "stale_after_s": source.stale_after_s,
+        "queue_frames": source.receive_buffer,
+        "when_full": source.when_full,
+        "stamps": source.stamps,
+    }
+    units = tuple(UNIT_OF[channel.measurand] for channel in unit.channel)
+    if source.profile is not None:
+        return daq_settings(can_shape_of(unit, source), link, units, **others)
+    return CanSettings(
+        link=link,
+        dbc=source.dbc_path,
+        channels=tuple(
+            CanChannel(channel.id, engineering_unit, _listed(source.signals[channel.id]))
+            for channel, engineering_unit in zip(unit.channel, units, strict=True)
+        ),
+        slow=tuple(CanSlowChannel(s.id, s.unit, source.slow[s.id]) for s in unit.slow_channel),
+        counters=source.counters,
+        counter_counts=source.counter_counts,
+        frame_samples=source.frame_samples,
+        epoch=source.epoch,
+        ok_bits=source.ok_bits,
+        seconds=source.seconds,
+        microseconds=source.microseconds,
+        hold_samples=source.hold_samples,
+        **others,
+    )
+
+
+def can_link_of(source: settings.CanSettings) -> CanLinkSettings:
+    """How a bus is reached."""
+    return CanLinkSettings(
+        interface=source.interface,
+        channel=source.channel,
+        bitrate=source.bitrate,
+        fd=source.fd,
+        data_bitrate=source.data_bitrate,
+        options=source.options,
+    )
+
+
+def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
+    """The messages of the simulated CAN DAQ for a unit's channels.
+
+    Raises
+    ------
+    LookupError
+        If the unit's source does not read those messages.
+    """
+    if source.profile is None:
+        raise LookupError(
+            f"unit {unit.id} reads CAN by its own DBC; a simulated DAQ sends profile"
+            ' "padwatch_int16" or "padwatch_float32"'
+        )
+    floats = source.profile == "padwatch_float32"
+    return CanShape(
+        channels=tuple(
+            DaqSignal(
+                c.id,
+                UNIT_OF[c.measurand] if floats else "V",
+                1.0 if floats else c.scale["full_scale_v"] / COUNTS_FULL_SCALE,
+            )
+            for c in unit.channel
+        ),
+        slow=tuple(DaqSignal(slow.id, slow.unit) for slow in unit.slow_channel),
+        fd=source.fd,
+        floats=floats,
+    )
+
+
+def can_daq_of(
+    unit: UnitSettings,
+    source: settings.CanSettings,
+    feed: SampleFeed,
+    clock: Clock | None,
+    *,
+    patient: bool,
+) -> DaqServer:
+    """A simulated CAN DAQ where the unit's source looks for it.
+
+    Parameters
+    ----------
+    clock
+        Paces the device; without one it produces as fast as its reader reads.
+    patient
+        Whether the device waits for its reader.
+
+    Raises
+    ------
+    ConfigError, LookupError
+        If the unit's source reads something else.
+    """
+    device = CanDevice(feed, can_shape_of(unit, source), unit.id, block_samples=unit.block_samples)
+    waiting: dict[str, Any] = {"on_demand": clock is None, "patient": patient}
+    if source.interface != "slcan":
+        return CanBusServer(
+            device,
+            clock,
+            interface=source.interface,
+            channel=source.channel,
+            options=source.options,
+            **waiting,
+        )
+    if source.channel == "pty" or source.channel.startswith("/"):
+        link = None if source.channel == "pty" else Path(source.channel)
+        return SlcanPtyServer(device, clock, link=link, **waiting)
+    host, _, port = source.channel.removeprefix("socket://").rpartition(":")
+    if not source.channel.startswith("socket://") or not port.isdecimal():
+        raise LookupError(
+            f"unit {unit.id}: channel {source.channel!r} is no place for a simulated DAQ; it can"
+            ' be "socket://127.0.0.1:0", "pty" or the path of a link to a pty'
+        )
+    return SlcanTcpServer(device, clock, host=host, port=int(port), **waiting)
+
+
+def _listed(signals: str | tuple[str, ...]) -> tuple[str, ...]:
+    return (signals,) if isinstance(signals, str) else signals
+
+
+def require_dbc_fits(unit: UnitSettings) -> None:
+    """Look into the DBC file of a unit that reads CAN, without opening a bus.
+
+    Raises
+    ------
+    ConfigError
+        Naming file, key, what was found and what is needed.
+    """
+    if isinstance(unit.source, settings.CanSettings):
+        compile_plan(can_settings_of(unit, unit.source), calibration_of(unit))
