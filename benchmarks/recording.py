@@ -13,7 +13,7 @@ from pathlib import Path
 from acquisition.clock import SystemClock
 from acquisition.delivery.blocks import BlockAssembler
 from core.samples.blocks import SampleBlock
-from service.app.simulations import simulated_feed
+from service.measuring.simulations import simulated_feed
 from service.recordings.continuous.joining import join
 from service.recordings.continuous.pieces import TapeSettings
 from service.recordings.continuous.unit_tape import UnitTape

@@ -4,6 +4,7 @@ import math
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 NS_PER_S = 1_000_000_000
+DAY_NS = 86_400 * NS_PER_S
 
 
 def hz_from_rpm(speed_rpm: float) -> float:

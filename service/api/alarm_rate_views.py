@@ -8,7 +8,8 @@ from core.alarms.statistics import AlarmFigures, ChatterRule, figures_of, stale_
 from core.limits import AlarmLevel
 from service.api.alarm_rate_models import AlarmFiguresModel, AlarmRatesModel, FrequentModel
 from service.api.alarm_views import LEVEL_NAMES, alarm_model
-from service.api.ports import AlarmBoard, FilmBoard
+from service.api.ports import FilmBoard
+from service.live.alarm_board import AlarmBoard
 from service.runtime.times import rfc3339
 from service.store.port import AlarmQuery, Store
 

@@ -17,16 +17,12 @@ from service.api.alarm_models import (
 from service.api.alarm_names import AlarmLevelName
 from service.api.film_conditions import STATE_NAMES, cell_of, condition_model
 from service.api.film_models import FilmConditionModel
-from service.api.ports import AlarmBoard, FilmBoard
+from service.api.ports import FilmBoard
+from service.live.alarm_board import AlarmBoard
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
 from service.settings.origin import Origin
 from service.store.port import StoredEvent
-
-LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {
-    AlarmLevel.ALERT: "alert",
-    AlarmLevel.DANGER: "danger",
-}
 
 
 def alarm_list_model(
@@ -167,3 +163,9 @@ def _urgency(alarm: Alarm) -> tuple[bool, bool, int, int]:
     """What needs somebody first comes first; what is hidden, last."""
     shown = alarm.shelf is None and alarm.outage is None and alarm.suppressed_by is None
     return (not shown, alarm.is_acknowledged, -(alarm.level or 0), -(alarm.raised_ns or 0))
+
+
+LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {
+    AlarmLevel.ALERT: "alert",
+    AlarmLevel.DANGER: "danger",
+}

@@ -1,4 +1,4 @@
-"""The HTTP application: API, health and dashboard."""
+"""The HTTP application: API, health and metrics."""
 
 from importlib.metadata import version
 
@@ -39,9 +39,6 @@ from service.api.revalidation import Revalidation
 from service.api.source_routes import source_router
 from service.api.spectra_routes import spectra_router
 from service.api.trend_routes import trend_router
-from service.dashboard.edition import EditionHeader
-from service.dashboard.routes import dashboard_router
-from service.reports.routes import evidence_router
 
 DESCRIPTION = """
 Oil-film stiffness of hydrogenerator guide bearings, measured while the machine runs.
@@ -52,7 +49,7 @@ Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
 
 
 def create_app(context: Context) -> GuardedApi:
-    """Put the application together."""
+    """Put the API together; pages and evidence are added by whoever has them."""
     app = GuardedApi(
         title="padwatch",
         version=version("padwatch"),
@@ -66,7 +63,6 @@ def create_app(context: Context) -> GuardedApi:
     desk = context.access or AccessDesk(context.store.access, context.clock)
     app.stand_behind(desk)
     app.add_middleware(OriginHeader, origin=context.origin)
-    app.add_middleware(EditionHeader)
     refusals = context.refusals or Refusals(context.store.audit, context.clock)
     app.add_middleware(AuditTrail, refusals=refusals, clock=context.clock)
     install_problem_handlers(app)
@@ -90,7 +86,6 @@ def create_app(context: Context) -> GuardedApi:
         alarm_rate_router(context),
         order1_reference_router(context),
         operation_router(context),
-        evidence_router(context),
         recording_router(context),
         recorded_motion_router(context),
         delivery_router(context),
@@ -103,6 +98,4 @@ def create_app(context: Context) -> GuardedApi:
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     if context.metrics is not None:
         app.include_router(metrics_router(context.metrics))
-    app.include_router(dashboard_router())
-    app.require_declarations()
     return app

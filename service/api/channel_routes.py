@@ -10,8 +10,9 @@ from service.api.channel_views import channels_model, rows_of
 from service.api.context import Context, UnitId
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered
+from service.api.waveform_views import waveform_model
 from service.live.live_view import HELD_S
-from service.live.samples import newest_stretch, waveform_model
+from service.live.samples import newest_stretch
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
 from service.store.access.roles import Permission

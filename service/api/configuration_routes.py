@@ -31,9 +31,9 @@ def configuration_router(context: Context) -> APIRouter:
 
         Its version is the one that evidence of alarms names.
         """
-        if context.evidence is None:
+        if context.configuration is None:
             raise ProblemError(404, "No configuration", "no configuration is kept here")
-        found = context.evidence.configuration
+        found = context.configuration
         document = json.loads(found.text)
         return ConfigurationModel(
             version=found.version,

@@ -12,21 +12,18 @@ from acquisition.clock import Clock
 from service.api.auth.desk import AccessDesk
 from service.api.auth.refusals import Refusals
 from service.api.delivery_look import DeliveryLook
+from service.api.downloads import Downloads
 from service.api.load.watch import LoadWatch
-from service.api.ports import (
-    AlarmBoard,
-    CaptureLook,
-    FilmBoard,
-    LiveLook,
-    Operators,
-)
+from service.api.ports import CaptureLook, FilmBoard, LiveLook, Operators
 from service.api.problems import ProblemError
+from service.live.alarm_board import AlarmBoard
+from service.live.evidence import EvidenceStatus
 from service.measuring.references import ReferencesInForce
 from service.recordings.continuous.tape import Tape
-from service.reports.desk import EvidenceDesk
 from service.runtime.polls import TimedSource
 from service.runtime.space.watch import SpaceWatch
 from service.settings.bearings import BearingSettings
+from service.settings.configuration import Configuration
 from service.settings.origin import Origin
 from service.settings.units import UnitSettings
 from service.store.port import Store
@@ -47,7 +44,9 @@ class Context:
     refresh_s
         Time from one result to the next.
     evidence
-        Of alarms; None where none is kept.
+        How the evidence of alarms is kept; None where none is.
+    configuration
+        What the plant is configured as, without its secrets; None where none is kept.
     metrics
         What is told to Prometheus; None where nobody asks.
     loops
@@ -65,7 +64,7 @@ class Context:
     tape
         Continuous recording; None where this process records nothing.
     recordings
-        Folders of recordings besides that of captures.
+        Folders of recordings, that of captures first; None where none are kept.
     faults
         Why each recording that is known to be damaged is, by name.
     refusals
@@ -88,7 +87,9 @@ class Context:
     deliveries: DeliveryLook
     origin: Origin = Origin.LIVE
     max_shelf_s: float = 86_400.0
-    evidence: EvidenceDesk | None = None
+    evidence: Callable[[], EvidenceStatus] | None = None
+    configuration: Configuration | None = None
+    downloads: Downloads = field(default_factory=Downloads)
     metrics: Callable[[], Awaitable[Collector]] | None = None
     loops: Callable[[], Mapping[str, str | None]] = dict
     checks: Callable[[], Mapping[str, str]] = dict
@@ -99,7 +100,7 @@ class Context:
     space: SpaceWatch | None = None
     load: LoadWatch | None = None
     tape: Tape | None = None
-    recordings: Sequence[pathlib.Path] = ()
+    recordings: Sequence[pathlib.Path] | None = None
     faults: Callable[[], Mapping[str, str]] = dict
 
     def unit(self, unit: str) -> UnitSettings:

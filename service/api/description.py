@@ -2,11 +2,11 @@
 
 from typing import Any
 
+from service.api.edition import HEADER as EDITION_HEADER
 from service.api.examples import Examples
 from service.api.origin_header import HEADER as ORIGIN_HEADER
 from service.api.problems import problem_schemas
 from service.api.revalidation import TIME_HEADER
-from service.dashboard.edition import HEADER as EDITION_HEADER
 
 JSON = "application/json"
 

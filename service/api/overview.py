@@ -206,10 +206,10 @@ def _around_ages(content: bytes) -> list[bytes]:
 def _evidence(context: Context) -> EvidenceStatusModel | None:
     if context.evidence is None:
         return None
-    keeper = context.evidence.keeper
+    status = context.evidence()
     return EvidenceStatusModel(
-        error=keeper.error,
-        n_waiting=keeper.n_pending,
-        n_written=keeper.n_written,
-        n_lost=keeper.n_lost,
+        error=status.error,
+        n_waiting=status.n_waiting,
+        n_written=status.n_written,
+        n_lost=status.n_lost,
     )

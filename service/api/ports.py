@@ -6,17 +6,15 @@ from typing import Protocol
 from core.alarms.alarm import Alarm
 from core.alarms.judgements import VectorReference
 from core.alarms.operation import Action
-from core.alarms.statistics import ChatterRule
 from core.baseline.baseline import BearingBaseline
 from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
 from core.monitor.assessment import Assessment
 from core.quality import Reason
 from core.samples.blocks import SampleBlock
-from service.live.alarm_count import AlarmCount
 from service.live.film_actions import Action as BaselineAction
+from service.live.film_actions import FilmPlace
 from service.live.live_view import CurrentBearing, UnitStatus
-from service.measuring.films.learning import FilmPlace
 from service.settings.film_alarms import FilmAlarmSettings
 
 
@@ -64,41 +62,6 @@ class LiveLook(Protocol):
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:
         """The newest result as it may be shown: nothing old passes for current."""
-        ...
-
-
-class AlarmBoard(Protocol):
-    """All alarms as they are; see :class:`service.measuring.alarms.engine.AlarmEngine`."""
-
-    @property
-    def revision(self) -> int:
-        """Another number as soon as anything is known otherwise of any alarm."""
-        ...
-
-    @property
-    def chatter_rule(self) -> ChatterRule:
-        """What counts as chattering."""
-        ...
-
-    @property
-    def alarms(self) -> Sequence[Alarm]:
-        """All alarms, whatever their state."""
-        ...
-
-    def alarm(self, id_: str) -> Alarm:
-        """Look an alarm up. Raises `LookupError` if there is none."""
-        ...
-
-    def is_judged(self, alarm: Alarm) -> bool:
-        """Whether what an alarm watches is known now."""
-        ...
-
-    def is_chattering(self, alarm: Alarm) -> bool:
-        """Whether an alarm has come and gone too often until a short while ago."""
-        ...
-
-    def count(self) -> AlarmCount:
-        """How many alarms are on the list."""
         ...
 
 

@@ -10,6 +10,7 @@ from fastapi.responses import StreamingResponse
 from acquisition.errors import ConfigError
 from service.api.auth.declared import needs
 from service.api.context import Context
+from service.api.downloads import TooManyDownloadsError
 from service.api.problems import ProblemError, described_problems
 from service.api.recording_models import (
     RecordingInfoModel,
@@ -19,7 +20,6 @@ from service.api.recording_models import (
 from service.api.recording_views import recording_info, recording_model
 from service.api.rendering import rendered, worked
 from service.recordings.shelf import Shelf
-from service.reports.desk import EvidenceDesk, TooManyDownloadsError
 from service.store.access.roles import Permission
 from service.store.waveform_port import WaveformKind
 
@@ -129,11 +129,11 @@ def recording_router(context: Context) -> APIRouter:
 async def _download(
     context: Context, recording: str, make: Callable[[str], Pieces], media_type: str, suffix: str
 ) -> StreamingResponse:
-    desk, shelf = _desk(context), shelf_of(context)
+    shelf = shelf_of(context)
     if await worked(lambda: shelf.one(recording)) is None:
         raise unknown_recording(recording)
     try:
-        pieces = await desk.download(await worked(lambda: make(recording)))
+        pieces = await context.downloads.download(await worked(lambda: make(recording)))
     except TooManyDownloadsError as error:
         raise ProblemError(503, "Busy", f"{error}; try again later") from error
     except (ConfigError, OSError) as error:
@@ -145,17 +145,12 @@ async def _download(
     return StreamingResponse(pieces, media_type=media_type, headers=headers)
 
 
-def _desk(context: Context) -> EvidenceDesk:
-    if context.evidence is None:
-        words = "no recordings are kept here: those of units are where these are analysed"
-        raise ProblemError(404, "No recordings", words)
-    return context.evidence
-
-
 def shelf_of(context: Context) -> Shelf:
     """Where finished recordings are, or answer 404."""
-    captures = _desk(context).archive.folders.captures
-    return Shelf((captures, *context.recordings), context.faults())
+    if context.recordings is None:
+        words = "no recordings are kept here: those of units are where these are analysed"
+        raise ProblemError(404, "No recordings", words)
+    return Shelf(context.recordings, context.faults())
 
 
 def unknown_recording(recording: str) -> ProblemError:

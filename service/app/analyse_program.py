@@ -18,13 +18,13 @@ from service.app.delivery import router_of
 from service.app.ground import Ground, live_view
 from service.app.health.page import Health
 from service.app.health.serving import HealthServer
+from service.app.reporting import reporting_loops
+from service.app.service_health import recording_error
 from service.app.stores import database_path, open_store
 from service.app.supervision import Supervision
-from service.cluster.gone_alarms import SHARED
 from service.cluster.holding import Holds
 from service.cluster.leadership import Leadership
 from service.cluster.partition import Partition
-from service.cluster.reporting import reporting_loops
 from service.cluster.silent_units import SilentUnits
 from service.cluster.stream.consumer import Consumer
 from service.cluster.stream.consumer_metrics import consumer_metrics
@@ -32,7 +32,8 @@ from service.cluster.stream.names import identity_of
 from service.cluster.stream.progress import UnitProgress
 from service.cluster.stream.silence import Silence, silences_s
 from service.cluster.stream.stored import memories_of, usable
-from service.measuring.alarms.health import StreamLook, recording_error
+from service.measuring.alarms.gone_alarms import SHARED
+from service.measuring.alarms.health import StreamLook
 from service.measuring.bus import Bus
 from service.measuring.metrics.kept import store_info
 from service.measuring.metrics.timed import timed_monitors

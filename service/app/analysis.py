@@ -1,24 +1,28 @@
 """`Analysis`: the parts that turn blocks into stored results, alarms, evidence and messages."""
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from core.alarms.alarm import AlarmNews
 from core.monitor.monitor import UnitMonitor
+from core.samples.blocks import SampleBlock
 from service.api.load.strain import LoadLimits
 from service.api.load.watch import LoadWatch
 from service.app.captures import captures_of
 from service.app.delivery import receivers_of
 from service.app.evidence import evidence_of, watch
 from service.app.ground import Ground
+from service.app.pressure import Pressure
 from service.app.retention import retention_limits
+from service.app.service_health import health_of
 from service.app.space import space_watch
 from service.app.tapes import tape_of
 from service.app.waveforms import waveform_keeper
 from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.alarms.health import StreamLook, health_of
-from service.measuring.alarms.start import alarm_engine
+from service.measuring.alarms.health import StreamLook
+from service.measuring.alarms.start import Listener, alarm_engine
 from service.measuring.analysing import Analyser
 from service.measuring.bus import Bus
 from service.measuring.films.keeper import FilmKeeper
@@ -33,7 +37,6 @@ from service.measuring.unit_memory import NO_MEMORIES, UnitMemory
 from service.notifications.deliveries import Deliveries
 from service.notifications.facts import Around
 from service.recordings.capture.captures import Captures
-from service.recordings.continuous.pressure import Pressure
 from service.recordings.continuous.tape import Tape
 from service.recordings.keeping.keeper import WaveformKeeper
 from service.reports.keeper import EvidenceKeeper
@@ -174,10 +177,9 @@ async def analysis_on(
         store,
         recorder.put,
         clock,
-        captures,
+        _listener(captures, tape),
         vector_rows(plant),
         look,
-        tape.take,
         part,
         {unit: memory.alarms for unit, memory in memories.items()},
     )
@@ -209,3 +211,13 @@ async def analysis_on(
         load=load,
         soundness=soundness,
     )
+
+
+def _listener(captures: Captures, tape: Tape) -> Listener:
+    """Both recorders of samples see every block, once the alarms have judged it."""
+
+    def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:
+        captures.take(block, news)
+        tape.take(block)
+
+    return listen

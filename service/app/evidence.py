@@ -4,19 +4,20 @@ from importlib.metadata import version
 from pathlib import Path
 
 from acquisition.clock import Clock
+from service.api.downloads import Downloads
 from service.app.captures import BYTES_PER_GB, CAPTURES
 from service.live.live_view import LiveView
 from service.measuring.alarms.engine import AlarmEngine
 from service.measuring.films.keeper import FilmKeeper
 from service.recordings.capture.captures import Captures
 from service.reports.archive import EvidenceArchive
-from service.reports.configuration import Configuration, built_from, configuration_of
 from service.reports.desk import EvidenceDesk
 from service.reports.keeper import EvidenceFolders, EvidenceKeeper
 from service.reports.maker import Maker
 from service.reports.room import EvidenceLimits, EvidenceRoom
 from service.reports.snapshot import Camera
 from service.reports.writer import EvidenceWriter
+from service.settings.configuration import Configuration, built_from, configuration_of
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.port import Store
@@ -31,12 +32,11 @@ def evidence_folders(plant: PlantFile) -> EvidenceFolders:
 
 
 def evidence_desk(
-    plant: PlantFile, store: Store, keeper: EvidenceKeeper, clock: Clock
+    plant: PlantFile, store: Store, keeper: EvidenceKeeper, clock: Clock, downloads: Downloads
 ) -> EvidenceDesk:
     """Where evidence is asked for."""
     archive = EvidenceArchive(evidence_folders(plant), store)
-    days, configuration = plant.evidence.trend_days, _configuration(plant)
-    return EvidenceDesk(archive, keeper, days, clock, configuration)
+    return EvidenceDesk(archive, keeper, plant.evidence.trend_days, clock, downloads)
 
 
 def evidence_of(
@@ -50,7 +50,7 @@ def evidence_of(
 ) -> EvidenceKeeper:
     """The keeper of all evidence; `watch` lets it see alarms."""
     limits, folders = limits_of(plant), evidence_folders(plant)
-    configuration = _configuration(plant)
+    configuration = built_configuration(plant)
     maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
     writer = EvidenceWriter(folders.evidence, maker, store.films, limits)
     camera = Camera({unit.id: unit for unit in plant.unit}, live, films)
@@ -65,7 +65,8 @@ def watch(keeper: EvidenceKeeper, alarms: AlarmEngine, captures: Captures, origi
         captures.tell(keeper.captured)
 
 
-def _configuration(plant: PlantFile) -> Configuration:
+def built_configuration(plant: PlantFile) -> Configuration:
+    """The plant file as this program was built to read it, without secrets."""
     return configuration_of(plant, version("padwatch"), built_from())
 
 

@@ -11,11 +11,12 @@ from service.app.access import access_desk
 from service.app.analysis import Analysis, analysis_on
 from service.app.audit_trail import ServiceTrail
 from service.app.delivery import router_of
+from service.app.evidence import evidence_desk
 from service.app.ground import Ground, live_view
+from service.app.reporting import reporting_loops
 from service.app.serving import Serving, context_of, serving_of
 from service.app.stores import database_path, open_store
 from service.app.supervision import Supervision
-from service.cluster.reporting import reporting_loops
 from service.measuring.bus import Bus
 from service.measuring.metrics.timed import timed, timed_sources
 from service.measuring.metrics.timings import Timings
@@ -110,7 +111,8 @@ async def _run(
     audit = ServiceTrail(plant, ground.origin, ground.store.audit, clock)
     await audit.begin()
     context = context_of(analysis, desk, audit.refusals, bus, timed_sources(units))
-    serving = serving_of(context, ground, listener, desk, announce)
+    evidence = evidence_desk(plant, ground.store, analysis.evidence, clock, context.downloads)
+    serving = serving_of(context, ground, listener, desk, announce, evidence)
     supervision = Supervision(manager, ground.beats, ground.live, units, clock)
     try:
         await _perform(runner, analysis, audit, serving, supervision, ends=performance.ends)

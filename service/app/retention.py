@@ -1,7 +1,8 @@
 """For how long results are kept, from the plant file."""
 
+from core.units import DAY_NS
 from service.settings.retention import RetentionSettings
-from service.store.retention.limits import DAY_NS, RetentionLimits
+from service.store.retention.limits import RetentionLimits
 
 
 def retention_limits(settings: RetentionSettings) -> RetentionLimits:

@@ -5,18 +5,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 
-from prometheus_client import exposition
 from prometheus_client.metrics_core import Metric
-from prometheus_client.openmetrics import exposition as open_exposition
 from prometheus_client.process_collector import ProcessCollector
-from prometheus_client.registry import Collector
 
 from service.api.load.metrics import load_metrics
 from service.app.watched import Watched
 from service.measuring.metrics.acquired import link_metrics, sample_metrics
 from service.measuring.metrics.judged import alarm_metrics, film_metrics, result_metrics
 from service.measuring.metrics.kept import (
-    evidence_metrics,
+    one,
     queue_metrics,
     soundness_metrics,
     space_metrics,
@@ -24,12 +21,11 @@ from service.measuring.metrics.kept import (
 )
 from service.notifications.deliveries import ReceiverView
 from service.notifications.metrics import delivery_metrics
+from service.recordings.capture.captures import Captures
 from service.recordings.metrics import recording_metrics
-from service.runtime.families import gauge
+from service.reports.keeper import EvidenceKeeper
+from service.runtime.families import counter, gauge
 from service.store.port import StoreError
-
-TEXT = exposition.CONTENT_TYPE_PLAIN_0_0_4
-OPEN_METRICS = "application/openmetrics-text; version=1.0.0; charset=utf-8"
 
 
 @dataclass(frozen=True)
@@ -54,12 +50,16 @@ class Scrape:
             ("version", "python"),
             [((version("padwatch"), platform.python_version()), 1)],
         )
-        for metrics in (
-            *(sample_metrics, link_metrics, queue_metrics, result_metrics),
-            *(store_metrics, space_metrics, evidence_metrics, load_metrics),
-            recording_metrics,
-        ):
-            yield from metrics(watched)
+        live, units = watched.live, watched.bearings
+        yield from sample_metrics(live, units)
+        yield from link_metrics(live, list(units), watched.sources, watched.clock.now_ns())
+        yield from queue_metrics(watched.bus)
+        yield from result_metrics(watched.timings, live, units)
+        yield from store_metrics(watched.recorder, live, watched.timings, watched.store_kind)
+        yield from space_metrics(watched.space)
+        yield from evidence_metrics(watched.captures, watched.evidence)
+        yield from load_metrics(watched.load)
+        yield from recording_metrics(watched.tape, watched.recordings)
         yield from soundness_metrics(watched.soundness)
         yield from alarm_metrics(watched.alarms, watched.bearings)
         yield from film_metrics(watched.films.newest, watched.bearings)
@@ -75,16 +75,16 @@ async def scrape(watched: Watched) -> Scrape:
         return Scrape(watched, None)
 
 
-def rendered(metrics: Collector, accept: str) -> tuple[bytes, str]:
-    """Metrics as text with its media type.
-
-    Parameters
-    ----------
-    accept
-        What the client takes. The library's own choice is not used: it repeats parts of what the
-        client has sent in its answer.
-    """
-    if "application/openmetrics-text" in accept.lower():
-        text: bytes = open_exposition.generate_latest(metrics)  # type: ignore[no-untyped-call]
-        return text, OPEN_METRICS
-    return exposition.generate_latest(metrics), TEXT
+def evidence_metrics(captures: Captures, evidence: EvidenceKeeper) -> Iterator[Metric]:
+    """Samples and evidence around alarms."""
+    counts = (
+        ("captures_written", "Captures of samples around alarms.", captures.n_written),
+        ("captures_failed", "Attempts to write such captures in vain.", captures.n_failed),
+        ("evidence_written", "Bundles of evidence of alarms.", evidence.n_written),
+        ("evidence_failed", "Attempts to write such bundles in vain.", evidence.n_failed),
+        ("evidence_lost", "Occurrences whose evidence was given up.", evidence.n_lost),
+    )
+    for name, meaning, number in counts:
+        yield counter(name, meaning, (), [((), number)])
+    yield one("captures_running", "Captures that are being made.", captures.n_running)
+    yield one("evidence_pending", "Bundles that are still to be written.", evidence.n_pending)

@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
-from service.api.app import create_app
 from service.api.auth.desk import AccessDesk
 from service.api.auth.refusals import Refusals
 from service.api.context import Context
@@ -15,7 +14,8 @@ from service.api.http.listening import url_of
 from service.api.http.server import GuardedServer
 from service.api.load.shedding import Shedding
 from service.app.analysis import Analysis
-from service.app.evidence import evidence_desk
+from service.app.application import application
+from service.app.evidence import evidence_folders
 from service.app.ground import Ground
 from service.app.scrape import scrape
 from service.app.supervision import Supervision
@@ -24,6 +24,7 @@ from service.app.watched import Watched
 from service.app.web import server_of
 from service.measuring.bus import Bus
 from service.measuring.in_process import InProcess
+from service.reports.desk import EvidenceDesk
 from service.runtime.polls import TimedSource
 
 GC_THRESHOLDS = (20_000, 20, 20)
@@ -79,9 +80,10 @@ def serving_of(
     listener: socket.socket,
     desk: AccessDesk,
     announce: Callable[[str], None],
+    evidence: EvidenceDesk | None = None,
 ) -> Serving:
     """What serves a context. Its description is made once, before a client asks for it."""
-    app = create_app(context)
+    app = application(context, evidence)
     asked = app if context.load is None else Shedding(app, context.load)
     server = server_of(asked, ground.plant, ground.clock)
     return Serving(ground, server, listener, desk, announce, afterwards=app.rendered)
@@ -110,7 +112,8 @@ def context_of(
         operators=InProcess(analysis.alarms, analysis.films, analysis.recorder),
         captures=analysis.captures,
         deliveries=analysis.deliveries,
-        evidence=evidence_desk(plant, ground.store, analysis.evidence, ground.clock),
+        evidence=lambda: analysis.evidence.status,
+        configuration=analysis.evidence.configuration,
         metrics=partial(scrape, metrics_of(analysis, bus, sources)),
         origin=ground.origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
@@ -121,7 +124,7 @@ def context_of(
         space=analysis.space,
         load=analysis.load,
         tape=analysis.tape,
-        recordings=(recordings_folder(ground.plant),),
+        recordings=(evidence_folders(plant).captures, recordings_folder(plant)),
         faults=lambda: analysis.recordings.faults,
         stored_trouble=lambda: analysis.soundness.trouble,
     )

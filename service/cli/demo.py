@@ -7,7 +7,6 @@ import typer
 
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
-from service.app.simulated_lives import simulated_history
 from service.app.stores import open_store
 from service.cli.daq_process import RunningDaq, daq_process
 from service.cli.examples import DEMO, DEMO_LIFE, example_path
@@ -15,6 +14,7 @@ from service.cli.offline.demo.past import fill, without_past
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import run_plant
 from service.cli.terminal import terminal_to_itself
+from service.measuring.simulated_lives import simulated_history
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.port import StoreError

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 
 from acquisition.clock import Clock
 from core.alarms.alarm import Alarm
-from service.cluster.gone_alarms import gone_alarms, is_shared, judge
 from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.alarms.gone_alarms import gone_alarms, is_shared, judge
 from service.measuring.alarms.told_alarms import ToldAlarms
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.store.port import Store, StoreError

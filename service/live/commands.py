@@ -9,7 +9,7 @@ from core.alarms import operation
 from core.alarms.operation import Action
 from service.live import film_actions as actions
 from service.live.film_actions import Action as BaselineAction
-from service.measuring.films.learning import FilmPlace
+from service.live.film_actions import FilmPlace
 
 
 class UnreadableCommandError(Exception):

@@ -3,9 +3,18 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from service.measuring.films.learning import FilmPlace
+from core.machine.unit import Estimator
 from service.store.baseline_versions import Versions
 from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
+
+
+@dataclass(frozen=True)
+class FilmPlace:
+    """One bearing of one unit, by one estimator."""
+
+    unit: str
+    bearing: str
+    estimator: Estimator
 
 
 class BaselineRefusedError(ValueError):

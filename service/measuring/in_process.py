@@ -7,9 +7,9 @@ from core.alarms.judgements import VectorReference
 from core.alarms.operation import Action
 from service.live.elsewhere import NotCarriedOutError
 from service.live.film_actions import Action as BaselineAction
+from service.live.film_actions import FilmPlace
 from service.measuring.alarms.engine import AlarmEngine
 from service.measuring.films.keeper import FilmKeeper
-from service.measuring.films.learning import FilmPlace
 from service.measuring.recorder import NotStoredError, Recorder
 from service.store.port import StoreError
 

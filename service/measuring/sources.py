@@ -10,7 +10,6 @@ from acquisition.modbus.ring_source import RingSettings, RingSource
 from acquisition.simulated.feed import SimulatedSource
 from acquisition.source import SampleSource
 from core.monitor.monitor import UnitMonitor
-from service.app.simulations import simulated_feed
 from service.measuring.registers import (
     at_poll_rate,
     fifo_source,
@@ -20,6 +19,7 @@ from service.measuring.registers import (
     vector_source,
     without_channels_of,
 )
+from service.measuring.simulations import simulated_feed
 from service.measuring.watched_unit import WatchedUnit
 from service.runtime.polls import TimedSource
 from service.settings import modbus_sources, sources

@@ -9,7 +9,6 @@ from uuid import uuid4
 
 from core.alarms.alarm import Alarm, AlarmEvent
 from core.alarms.kinds import FILM_KINDS
-from service.api.alarm_views import LEVEL_NAMES
 from service.notifications.facts import Fact, LookAround, Surroundings
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
@@ -100,7 +99,7 @@ def _what(event: AlarmEvent, is_active: bool) -> Message:
         "kind": identity.kind,
         "number": event.number,
         "change": event.change.value,
-        "priority": None if event.level is None else LEVEL_NAMES[event.level],
+        "priority": None if event.level is None else event.level.name.lower(),
         "is_active": is_active,
         "state": event.state_after.value,
         "occurrence": event.occurrence,

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 
 from prometheus_client.metrics_core import Metric
 
-from service.app.watched import Watched
+from service.recordings.continuous.tape import Tape
+from service.recordings.keeping.keeper import WaveformKeeper
 from service.runtime.families import counter, gauge
 
 
-def recording_metrics(watched: Watched) -> Iterator[Metric]:
+def recording_metrics(tape: Tape | None, recordings: WaveformKeeper | None) -> Iterator[Metric]:
     """What is recorded, what is not and why, and what is found of recordings."""
-    tape, recordings = watched.tape, watched.recordings
     if tape is not None:
         yield counter(
             "recording_samples",

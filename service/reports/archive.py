@@ -14,11 +14,11 @@ from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import ANNOUNCED, AlarmEvent
 from service.recordings.capture.span import is_captured
 from service.reports.capture_link import CapturePart, linked
-from service.reports.configuration import canonical
 from service.reports.document import Evidence
 from service.reports.folders import DOCUMENT, Place, kept_since_ns, parsed, places, removed
 from service.reports.keeper import EvidenceFolders
 from service.runtime.times import compact
+from service.settings.configuration import canonical
 from service.store.film_port import FilmStore
 from service.store.port import AlarmQuery, Store
 

@@ -8,10 +8,10 @@ from pydantic import ValidationError
 
 from acquisition.recordings.manifest import MANIFEST
 from service.recordings.capture.folders import ALARM
-from service.reports.document import FilePart
+from service.reports.document import FilePart, file_part
 from service.reports.folders import CAPTURE, places
 from service.reports.part import EvidencePart
-from service.runtime.whole_files import file_part, write_whole
+from service.runtime.whole_files import write_whole
 
 
 class CapturePart(EvidencePart):

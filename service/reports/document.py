@@ -1,5 +1,7 @@
 """`Evidence`: the document of a bundle, strict and with a version."""
 
+import hashlib
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
@@ -7,6 +9,7 @@ from pydantic import Field
 from service.reports.bearing_part import BearingPart, Direction, LevelWord
 from service.reports.comparison_part import ComparisonPart
 from service.reports.part import EvidencePart, Moment, Sha256
+from service.runtime.whole_files import CHUNK
 
 FORMAT = "padwatch-evidence"
 VERSION = 1
@@ -143,3 +146,13 @@ class Evidence(EvidencePart):
 
     sha256: Sha256
     """Of this document without this line: keys sorted, no spaces, UTF-8."""
+
+
+def file_part(path: Path) -> FilePart:
+    """Size and hash of a file."""
+    hashed, size = hashlib.sha256(), 0
+    with path.open("rb") as file:
+        while chunk := file.read(CHUNK):
+            hashed.update(chunk)
+            size += len(chunk)
+    return FilePart(size=size, sha256=hashed.hexdigest())

@@ -1,6 +1,7 @@
 """`EvidenceKeeper`: a bundle for every occurrence of an alarm, without ever being in the way."""
 
 import asyncio
+import os
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -12,15 +13,17 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import ANNOUNCED, AlarmEvent, AlarmNews
+from service.live.evidence import EvidenceStatus
 from service.recordings.capture.captures import Captures
 from service.recordings.capture.outcome import Outcome
 from service.reports.capture_link import link, link_all, note_lost
-from service.reports.configuration import Configuration, keep_configuration
 from service.reports.folders import clear_leftovers, note_beginning, place_of
 from service.reports.room import EvidenceRoom
 from service.reports.snapshot import Camera, Snapshot
 from service.reports.writer import EvidenceWriter
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.whole_files import write_whole
+from service.settings.configuration import Configuration
 from service.store.port import StoreError
 
 log = structlog.get_logger()
@@ -68,7 +71,7 @@ class EvidenceKeeper:
         clock: Clock,
     ) -> None:
         self._folders, self._camera, self._writer, self._room = folders, camera, writer, room
-        self._configuration, self._captures, self._clock = configuration, captures, clock
+        self.configuration, self._captures, self._clock = configuration, captures, clock
         self._pending: deque[Snapshot] = deque()
         self._outcomes: deque[Outcome] = deque()
         self._news = asyncio.Event()
@@ -76,6 +79,11 @@ class EvidenceKeeper:
         self._n_store_attempts = 0
         self.error: str | None = None
         self.n_written = self.n_failed = self.n_lost = 0
+
+    @property
+    def status(self) -> EvidenceStatus:
+        """How the evidence is kept, for people."""
+        return EvidenceStatus(self.error, self.n_pending, self.n_written, self.n_lost)
 
     @property
     def n_pending(self) -> int:
@@ -158,7 +166,7 @@ class EvidenceKeeper:
         return True
 
     def _write(self, snapshot: Snapshot, with_history: bool) -> None:
-        keep_configuration(self._folders.configurations, self._configuration)
+        keep_configuration(self._folders.configurations, self.configuration)
         self._room.note(self._writer.write(snapshot, with_history=with_history))
         self.n_written += 1
 
@@ -176,7 +184,7 @@ class EvidenceKeeper:
 
     def _begin(self) -> None:
         """In the thread: keep the configuration, remove and link what a crash has left."""
-        keep_configuration(self._folders.configurations, self._configuration)
+        keep_configuration(self._folders.configurations, self.configuration)
         note_beginning(self._folders.evidence, self._clock.now_ns())
         for folder in clear_leftovers(self._folders.evidence):
             log.warning("unfinished evidence is removed", folder=folder.name)
@@ -207,3 +215,18 @@ class EvidenceKeeper:
         if error != self.error:
             log.error("evidence of alarms is not written", reason=error)
         self.error = error
+
+
+def keep_configuration(folder: Path, configuration: Configuration) -> None:
+    """Write a configuration under its name, unless it is there already.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses.
+    """
+    path = folder / f"{configuration.version}.json"
+    if path.exists() and path.read_bytes() == configuration.text:
+        return
+    os.makedirs(folder, exist_ok=True)
+    write_whole(path, configuration.text)

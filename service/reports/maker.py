@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from service.reports.configuration import Configuration
+from service.settings.configuration import Configuration
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 

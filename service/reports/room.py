@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition.clock import Clock
-from core.units import NS_PER_S
+from core.units import DAY_NS
 from service.reports.folders import INCOMPLETE, REMOVED, Place, places, removed
 from service.runtime.times import compact
 from service.runtime.whole_files import sync_folder, write_whole
@@ -14,7 +14,6 @@ from service.runtime.whole_files import sync_folder, write_whole
 MAX_REMOVED = 10_000
 """Names that are remembered of each unit."""
 
-DAY_NS = 86_400 * NS_PER_S
 
 SURVEY_S = 3600.0
 """After so long all folders are looked at again: others may have taken some away by hand."""

@@ -14,9 +14,10 @@ from service.api.alarm_views import LEVEL_NAMES
 from service.api.auth.declared import needs
 from service.api.auth.gate import identity_of
 from service.api.context import Context
+from service.api.downloads import TooManyDownloadsError
 from service.api.problems import ProblemError, described_problems
 from service.reports.archive import DamagedEvidenceError, EvidenceState, Occurrence
-from service.reports.desk import EvidenceDesk, Found, TooManyDownloadsError
+from service.reports.desk import EvidenceDesk, Found
 from service.reports.document import Evidence
 from service.reports.models import OccurrenceModel, OccurrencesModel
 from service.reports.report.page import POLICY
@@ -56,8 +57,8 @@ SAFE = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"}
 log = structlog.get_logger()
 
 
-def evidence_router(context: Context) -> APIRouter:
-    """Routes that show evidence; they change nothing."""
+def evidence_router(context: Context, desk: EvidenceDesk | None) -> APIRouter:
+    """Routes that show evidence, if any is kept; they change nothing."""
     router = APIRouter(
         prefix="/api/v1/alarms/{alarm}/evidence",
         tags=["alarms"],
@@ -72,7 +73,7 @@ def evidence_router(context: Context) -> APIRouter:
         ] = 100,
     ) -> OccurrencesModel:
         """The newest occurrences of an alarm, and what evidence there is of each."""
-        found = await _desk(context).occurrences(_known(context, alarm), limit)
+        found = await _there(desk).occurrences(_known(context, alarm), limit)
         return OccurrencesModel(
             alarm=alarm,
             origin=context.origin.value,
@@ -82,13 +83,13 @@ def evidence_router(context: Context) -> APIRouter:
     @router.get("/{occurrence}", summary="All that was known", responses=PROBLEMS)
     async def document(alarm: AlarmId, occurrence: Number) -> Evidence:
         """Everything that was known when the alarm was raised, as it was written down then."""
-        desk = _desk(context)
-        found = await _complete(context, desk, alarm, occurrence)
+        held = _there(desk)
+        found = await _complete(context, held, alarm, occurrence)
         place = found.place
         if place is None:  # complete ones have a place
             raise ProblemError(404, "No evidence", "there is no bundle")
         try:
-            return await asyncio.to_thread(desk.archive.document, place)
+            return await asyncio.to_thread(held.archive.document, place)
         except DamagedEvidenceError as error:
             raise _damaged(error) from error
 
@@ -100,10 +101,10 @@ def evidence_router(context: Context) -> APIRouter:
     )
     async def report(alarm: AlarmId, occurrence: Number) -> Response:
         """HTML made for one sheet of A4, without any script, to read or to print."""
-        desk = _desk(context)
-        found = await _complete(context, desk, alarm, occurrence)
+        held = _there(desk)
+        found = await _complete(context, held, alarm, occurrence)
         try:
-            page = await desk.report(found)
+            page = await held.report(found)
         except (DamagedEvidenceError, TableError, OSError) as error:
             raise _damaged(error) from error
         return HTMLResponse(page, headers={"Content-Security-Policy": POLICY, **SAFE})
@@ -119,10 +120,10 @@ def evidence_router(context: Context) -> APIRouter:
 
         The plant's configuration is in it, too, but not for a key of some units.
         """
-        desk = _desk(context)
-        found = await _complete(context, desk, alarm, occurrence)
+        held = _there(desk)
+        found = await _complete(context, held, alarm, occurrence)
         try:
-            pieces = await desk.bundle(found, has_configuration=not identity_of(request).units)
+            pieces = await held.bundle(found, has_configuration=not identity_of(request).units)
         except TooManyDownloadsError as error:
             raise ProblemError(503, "Busy", f"{error}; try again later") from error
         except (DamagedEvidenceError, TableError, OSError) as error:
@@ -134,10 +135,10 @@ def evidence_router(context: Context) -> APIRouter:
     return router
 
 
-def _desk(context: Context) -> EvidenceDesk:
-    if context.evidence is None:
+def _there(desk: EvidenceDesk | None) -> EvidenceDesk:
+    if desk is None:
         raise ProblemError(404, "No evidence", "no evidence is kept here")
-    return context.evidence
+    return desk
 
 
 def _known(context: Context, alarm: str) -> str:

@@ -1,12 +1,7 @@
 """Files that are on the disk, not only on their way there."""
 
-import fcntl
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-
-from service.store.backup.check import BackupError
 
 PRIVATE = 0o600
 
@@ -26,25 +21,6 @@ def put_in_place(aside: Path, path: Path) -> None:
 def sync_folder(folder: Path) -> None:
     """Have the names in a folder on the disk."""
     _sync(folder)
-
-
-@contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
-    """Keep other backups out of a folder.
-
-    Raises
-    ------
-    BackupError
-        If another one is at work there.
-    """
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
-    except BlockingIOError as error:
-        raise BackupError(f"{folder}: another backup is being written there") from error
-    finally:
-        os.close(descriptor)
 
 
 def _sync(path: Path) -> None:

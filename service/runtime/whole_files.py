@@ -1,10 +1,7 @@
 """Files that are complete under their name, or not there at all."""
 
-import hashlib
 import os
 from pathlib import Path
-
-from service.reports.document import FilePart
 
 CHUNK = 1 << 20
 
@@ -37,13 +34,3 @@ def sync_folder(folder: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def file_part(path: Path) -> FilePart:
-    """Size and hash of a file."""
-    hashed, size = hashlib.sha256(), 0
-    with path.open("rb") as file:
-        while chunk := file.read(CHUNK):
-            hashed.update(chunk)
-            size += len(chunk)
-    return FilePart(size=size, sha256=hashed.hexdigest())

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.quality import Level
+from core.units import DAY_NS
 from service.store.port import Trend, TrendSeries
 from service.store.summaries import IntArray, Summaries
 
@@ -33,7 +34,6 @@ NICE_WIDTHS_NS = tuple(width * 1_000_000_000 for width in NICE_WIDTHS_S)
 LEVEL_OF: dict[int, Level | None] = {-1: None} | {int(level): level for level in Level}
 """What a number stands for; looked up, since thousands are made into words at a time."""
 
-DAY_NS = 86_400_000_000_000
 MAX_DAYS = (2**63 - 1) // DAY_NS
 """Wider than that does not fit the nanoseconds; two of them hold all time since 1970."""
 

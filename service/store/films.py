@@ -7,7 +7,6 @@ from core.baseline.baseline import BearingBaseline
 from core.change.film_judge import FilmNews
 from core.change.shaft_response import ShaftResponse
 from core.machine.unit import Estimator
-from service.cli.offline.simulated_past import insert_past, select_past_end
 from service.store.audit_chain import AuditChain
 from service.store.audit_deeds import step_deeds
 from service.store.baselines import (
@@ -33,6 +32,7 @@ from service.store.film_port import (
 )
 from service.store.film_readings import insert_film_news, select_decisions, select_film_history
 from service.store.series import series_of
+from service.store.simulated_past import insert_past, select_past_end
 
 
 class SqlFilms:

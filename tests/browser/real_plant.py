@@ -15,10 +15,10 @@ from rigs.command_line import OPEN
 
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import People
-from service.app.simulated_lives import simulated_history
 from service.app.stores import open_store
 from service.cli.access import access_of
 from service.cli.offline.demo.past import fill
+from service.measuring.simulated_lives import simulated_history
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.access.roles import Role

@@ -16,13 +16,13 @@ from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import Rejection
 from service.app.recordings import recording_of, recording_source, recording_writer, selection_of
-from service.app.simulations import simulated_feed
 from service.cli.offline.reanalysis import (
     LastAverages,
     assessment_model,
     assessments,
     calibration_differences,
 )
+from service.measuring.simulations import simulated_feed
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.units import UnitSettings
 

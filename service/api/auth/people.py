@@ -2,8 +2,9 @@
 
 from collections.abc import Sequence
 
+from core.units import DAY_NS
 from service.api.auth.passwords import Hashing, new_password
-from service.store.access.keys import MAX_DAYS, NS_PER_DAY, ApiKey
+from service.store.access.keys import MAX_DAYS, ApiKey
 from service.store.access.names import account_name
 from service.store.access.port import AccessRefusedError, AccessStore
 from service.store.access.roles import Role
@@ -111,7 +112,7 @@ def create_key(
         raise AccessRefusedError("accounts belong to no unit: a key for some units is no admin's")
     id_, shown = new_key()
     open_units = tuple(dict.fromkeys(units))
-    expires_ns = now_ns + days * NS_PER_DAY
+    expires_ns = now_ns + days * DAY_NS
     key = ApiKey(id_, account_name(name), digest(shown), role, open_units, now_ns, expires_ns)
     store.keys.add(key)
     return key, shown

@@ -5,15 +5,14 @@ from collections.abc import Iterator
 from prometheus_client.metrics_core import Metric
 
 from service.api.load.strain import Refused
-from service.app.watched import Watched
+from service.api.load.watch import LoadWatch
 from service.runtime.families import counter, gauge
 
 KINDS = (Refused.HISTORY, Refused.VIEWS)
 
 
-def load_metrics(watched: Watched) -> Iterator[Metric]:
+def load_metrics(load: LoadWatch | None) -> Iterator[Metric]:
     """Questions that were not answered; none where nobody looks at the load."""
-    load = watched.load
     if load is None:
         return
     yield counter(

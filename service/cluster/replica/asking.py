@@ -12,8 +12,7 @@ from service.cluster.replica.alarms import ReplicaAlarms
 from service.live.commands import NewReference, OnAlarm, OnBaselines, Task, written
 from service.live.elsewhere import NotCarriedOutError
 from service.live.film_actions import Action as BaselineAction
-from service.live.film_actions import BaselineRefusedError
-from service.measuring.films.learning import FilmPlace
+from service.live.film_actions import BaselineRefusedError, FilmPlace
 from service.store.access.acting import acting
 from service.store.commands_port import OPEN, Answer, Command, CommandState
 from service.store.port import Store

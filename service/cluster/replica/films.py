@@ -6,8 +6,8 @@ from core.baseline.baseline import BearingBaseline
 from core.change.decision import INITIAL_DECISION
 from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
+from service.live.film_actions import FilmPlace
 from service.live.unit_state import UnitState
-from service.measuring.films.learning import FilmPlace
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.film_rules import film_rules_of
 from service.settings.plant import PlantFile

@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from acquisition.clock import Clock
-from service.cluster.gone_alarms import SHARED, is_shared
 from service.live.live_view import LiveView
 from service.live.unit_state import UnitSigns, UnitState, packed_state, written_signs
 from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.alarms.gone_alarms import SHARED, is_shared
 from service.measuring.alarms.service_rules import told_by
 from service.measuring.describing import alarm_state, plant_signs, unit_signs, unit_state
 from service.measuring.films.keeper import FilmKeeper

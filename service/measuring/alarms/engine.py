@@ -17,10 +17,10 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Judgement
 from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
-from service.cluster.stream_alarms import refuse
 from service.live.alarm_count import AlarmCount, count_of
 from service.measuring.alarms.host_time import HostTime
 from service.measuring.alarms.service_alarms import ServiceAlarms
+from service.measuring.alarms.stream_alarms import refuse
 from service.measuring.alarms.told_alarms import ToldAlarms
 from service.measuring.recorder import Findings
 from service.runtime.heartbeats import UNHEARD, Pulse

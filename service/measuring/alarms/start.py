@@ -13,15 +13,14 @@ from core.alarms.statistics import SHOWN_NS
 from core.alarms.unit_alarms import UnitAlarms
 from core.change.settings import FilmRules
 from core.samples.blocks import SampleBlock
-from service.cluster.gone_alarms import is_shared
-from service.cluster.stream_alarms import stream_alarms
 from service.measuring.alarms.engine import NO_MEMORIES, AlarmEngine
+from service.measuring.alarms.gone_alarms import is_shared
 from service.measuring.alarms.health import LookAtHealth
 from service.measuring.alarms.service_alarms import ServiceAlarms
 from service.measuring.alarms.service_rules import service_rules_of, told_by
+from service.measuring.alarms.stream_alarms import stream_alarms
 from service.measuring.plant_part import WHOLE, PlantPart
 from service.measuring.recorder import Findings
-from service.recordings.capture.captures import Captures
 from service.settings.alarm_rules import chatter_rule_of, references_of, rules_of
 from service.settings.core_values import machine_of
 from service.settings.film_rules import film_rules_of
@@ -42,10 +41,9 @@ async def alarm_engine(
     store: Store,
     put: Callable[[Findings], None],
     clock: Clock,
-    captures: Captures | None = None,
+    listener: Listener | None = None,
     rows: Mapping[str, Sequence[str]] = MappingProxyType({}),
     look: LookAtHealth | None = None,
-    tape: Callable[[SampleBlock], None] | None = None,
     part: PlantPart = WHOLE,
     memories: Mapping[str, AlarmMemory] = NO_MEMORIES,
 ) -> AlarmEngine:
@@ -53,14 +51,12 @@ async def alarm_engine(
 
     Parameters
     ----------
-    captures
-        Keeps the samples around an alarm, if they are kept.
+    listener
+        Takes every block with what it means to alarms, where samples are kept.
     rows
         Of units whose blocks do not have a row for each channel: which channel each row is about.
     look
         How the service itself does.
-    tape
-        Takes every block, if all samples are kept.
     part
         What of the plant this process looks after; alarms of the rest are left to others.
     memories
@@ -84,7 +80,6 @@ async def alarm_engine(
     seen = look if origin is Origin.LIVE else None
     service = ServiceAlarms(units, service_rules_of(plant.alarms), seen, leads=part.leads)
     chatter = chatter_rule_of(plant.alarms)
-    listener = _listener(captures, tape)
     is_alone = part == WHOLE
     stream = None if is_alone else stream_alarms(units)
     engine = AlarmEngine(units, put, clock, listener, service, chatter, stream)
@@ -101,21 +96,6 @@ async def alarm_engine(
     events = await asyncio.to_thread(store.alarm_events, lately)
     engine.recall(found.event for found in reversed(events))
     return engine
-
-
-def _listener(
-    captures: Captures | None, tape: Callable[[SampleBlock], None] | None
-) -> Listener | None:
-    take = captures.take if captures else None
-    if tape is None:
-        return take
-
-    def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:
-        if take is not None:
-            take(block, news)
-        tape(block)
-
-    return listen
 
 
 def _rules(plant: PlantFile, unit: UnitSettings, origin: Origin) -> UnitRules:

@@ -17,8 +17,8 @@ from core.change.settings import FilmRules
 from core.limits import Judgement
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
-from service.live.film_actions import Action, step_of
-from service.measuring.films.learning import FilmPlace, Learner
+from service.live.film_actions import Action, FilmPlace, step_of
+from service.measuring.films.learning import Learner
 from service.measuring.films.resume import UnitStart, in_force, unit_start
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.film_alarms import FilmAlarmSettings

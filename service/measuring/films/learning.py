@@ -1,7 +1,6 @@
 """Learning the films of a unit from stored readings, and whether to believe what was learned."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +12,8 @@ from core.baseline.history import StiffnessHistory
 from core.baseline.learning import learn
 from core.change.settings import FilmRules
 from core.change.shaft_response import ShaftResponse, learn_response
-from core.machine.unit import Estimator
-from core.units import NS_PER_S
+from core.units import DAY_NS
+from service.live.film_actions import FilmPlace
 from service.settings.film_alarms import FilmAlarmSettings
 from service.store.baseline_versions import Versions, versions_after
 from service.store.film_port import (
@@ -25,21 +24,11 @@ from service.store.film_port import (
     StoredStep,
 )
 
-DAY_NS = 86_400 * NS_PER_S
 PADWATCH = "padwatch"
 """Who learns, and accepts where engineers leave it to padwatch."""
 
 SURE = 3.0
 """Standard uncertainties of a drift that is none by chance."""
-
-
-@dataclass(frozen=True)
-class FilmPlace:
-    """One bearing of one unit, by one estimator."""
-
-    unit: str
-    bearing: str
-    estimator: Estimator
 
 
 class Learner:

@@ -15,7 +15,8 @@ from core.change.settings import FilmRules
 from core.change.shaft_response import ShaftResponse
 from core.condition.operating_state import OilSettling, Operation
 from core.units import NS_PER_S
-from service.measuring.films.learning import FilmPlace, common_times
+from service.live.film_actions import FilmPlace
+from service.measuring.films.learning import common_times
 from service.store.baseline_versions import versions_after
 from service.store.film_port import FilmHistory, FilmQuery, FilmStore
 

@@ -1,15 +1,15 @@
 """Metrics of links and samples: what each unit's device has offered, and what became of it."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from prometheus_client.metrics_core import Metric
 
 from core.samples.gaps import SampleAccount
 from core.units import NS_PER_S
-from service.app.watched import Watched
-from service.live.live_view import LinkState
+from service.live.live_view import LinkState, LiveView
 from service.runtime.families import counter, gauge, histogram
+from service.runtime.polls import TimedSource
 
 MAX_REASONS = 24
 """Per unit; what is refused for any further reason is counted as `OTHER`."""
@@ -21,9 +21,9 @@ _WORD = re.compile(r"[a-z][a-z0-9_]{0,47}")
 UNIT = ("unit",)
 
 
-def sample_metrics(watched: Watched) -> Iterator[Metric]:
+def sample_metrics(live: LiveView, units: Iterable[str]) -> Iterator[Metric]:
     """The account of samples: offered = received + missing + rejected."""
-    accounts = {unit: watched.live.status(unit).account for unit in watched.bearings}
+    accounts = {unit: live.status(unit).account for unit in units}
     yield counter(
         "samples_offered",
         "Samples per channel that the device has counted since the first one that arrived.",
@@ -66,10 +66,10 @@ def sample_metrics(watched: Watched) -> Iterator[Metric]:
     )
 
 
-def link_metrics(watched: Watched) -> Iterator[Metric]:
+def link_metrics(
+    live: LiveView, units: Sequence[str], sources: Mapping[str, TimedSource], now_ns: int
+) -> Iterator[Metric]:
     """How samples come in."""
-    live, units = watched.live, list(watched.bearings)
-    now_ns = watched.clock.now_ns()
     status = {unit: live.status(unit) for unit in units}
     yield gauge(
         "link_connected",
@@ -106,7 +106,7 @@ def link_metrics(watched: Watched) -> Iterator[Metric]:
     yield histogram(
         "poll_duration_seconds",
         "What a poll took, with decoding and handing over what it brought.",
-        {unit: source.polls for unit, source in watched.sources.items()},
+        {unit: source.polls for unit, source in sources.items()},
     )
     yield counter(
         "frames_refused",
@@ -114,7 +114,7 @@ def link_metrics(watched: Watched) -> Iterator[Metric]:
         ("unit", "reason"),
         (
             ((unit, reason), n)
-            for unit, source in watched.sources.items()
+            for unit, source in sources.items()
             for reason, n in bounded(source.refused_frames).items()
         ),
     )

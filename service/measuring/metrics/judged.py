@@ -10,16 +10,24 @@ from core.change.decision import Verdict
 from core.change.film_judge import FilmNews
 from core.limits import AlarmLevel
 from core.quality import Level
-from service.api.ports import AlarmBoard
-from service.app.watched import Watched
+from service.live.alarm_board import AlarmBoard
+from service.live.live_view import LiveView
+from service.measuring.metrics.timings import Timings
 from service.runtime.families import Rows, gauge, histogram
 
 HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 
-def result_metrics(watched: Watched) -> Iterator[Metric]:
-    """Whether there are results, and how good they are."""
-    timings, live = watched.timings, watched.live
+def result_metrics(
+    timings: Timings, live: LiveView, units: Mapping[str, Sequence[str]]
+) -> Iterator[Metric]:
+    """Whether there are results, and how good they are.
+
+    Parameters
+    ----------
+    units
+        Bearings of each.
+    """
     yield histogram(
         "assessment_duration_seconds",
         "What the analysis took for each result of a bearing.",
@@ -27,7 +35,7 @@ def result_metrics(watched: Watched) -> Iterator[Metric]:
     )
     current = {
         (unit, bearing): live.current(unit, bearing)
-        for unit, bearings in watched.bearings.items()
+        for unit, bearings in units.items()
         for bearing in bearings
     }
     yield gauge(
@@ -41,11 +49,7 @@ def result_metrics(watched: Watched) -> Iterator[Metric]:
         "bearings",
         "Bearings by the quality of what is known of them now; bad without a current result.",
         ("unit", "quality"),
-        (
-            ((unit, level.name.lower()), found[unit, level])
-            for unit in watched.bearings
-            for level in Level
-        ),
+        (((unit, level.name.lower()), found[unit, level]) for unit in units for level in Level),
     )
 
 

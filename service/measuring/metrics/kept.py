@@ -4,36 +4,40 @@ from collections.abc import Iterator
 
 from prometheus_client.metrics_core import Metric
 
-from service.app.watched import Watched
+from service.live.live_view import LiveView
+from service.measuring.bus import Bus
+from service.measuring.metrics.timings import Timings
+from service.measuring.recorder import Recorder
 from service.measuring.soundness import Soundness
 from service.runtime.families import counter, gauge, plain_histogram
 from service.runtime.space.growth import S_PER_DAY
+from service.runtime.space.watch import SpaceWatch
 
 
-def queue_metrics(watched: Watched) -> Iterator[Metric]:
+def queue_metrics(bus: Bus) -> Iterator[Metric]:
     """Blocks on their way from acquisition to analysis."""
-    bus = watched.bus
-    yield _one("queue_blocks", "Blocks that wait for analysis.", bus.depth)
-    yield _one("queue_capacity_blocks", "Most blocks that can wait for it.", bus.capacity)
-    yield _one(
+    yield one("queue_blocks", "Blocks that wait for analysis.", bus.depth)
+    yield one("queue_capacity_blocks", "Most blocks that can wait for it.", bus.capacity)
+    yield one(
         "queue_wait_seconds", "For how long the oldest of them has waited.", bus.oldest_wait_s
     )
 
 
-def store_metrics(watched: Watched) -> Iterator[Metric]:
+def store_metrics(
+    recorder: Recorder, live: LiveView, timings: Timings, kind: str | None
+) -> Iterator[Metric]:
     """Whether results reach the disk."""
-    recorder, live = watched.recorder, watched.live
     yield plain_histogram(
         "store_commit_duration_seconds",
         "What it took to write findings to the disk.",
-        watched.timings.commits,
+        timings.commits,
     )
-    if watched.store_kind is not None:
-        yield store_info(watched.store_kind)
+    if kind is not None:
+        yield store_info(kind)
     failing = live.store_error is not None
-    yield _one("store_failing", "1 while the store refuses what is written.", failing)
-    yield _one("store_waiting_findings", "Findings that wait for the store.", recorder.n_waiting)
-    yield _one(
+    yield one("store_failing", "1 while the store refuses what is written.", failing)
+    yield one("store_waiting_findings", "Findings that wait for the store.", recorder.n_waiting)
+    yield one(
         "store_behind_seconds",
         "For how long findings have waited without any being written.",
         recorder.behind_s,
@@ -55,42 +59,26 @@ def soundness_metrics(found: Soundness | None) -> Iterator[Metric]:
     """Whether what is stored is what was stored; nothing where nobody looks."""
     if found is None:
         return
-    yield _one(
+    yield one(
         "store_damaged_rows",
         "Stored rows that were found damaged or missing since the start.",
         found.n_damaged,
     )
-    yield _one(
+    yield one(
         "store_rolled_back",
         "1 if the database was not the one that was here last when the service started.",
         found.rolled_back is not None,
     )
-    yield _one(
+    yield one(
         "store_mark_failing",
         "1 while it cannot be noted beside the database what the newest transaction is.",
         found.mark_error is not None,
     )
 
 
-def evidence_metrics(watched: Watched) -> Iterator[Metric]:
-    """Samples and evidence around alarms."""
-    captures, evidence = watched.captures, watched.evidence
-    counts = (
-        ("captures_written", "Captures of samples around alarms.", captures.n_written),
-        ("captures_failed", "Attempts to write such captures in vain.", captures.n_failed),
-        ("evidence_written", "Bundles of evidence of alarms.", evidence.n_written),
-        ("evidence_failed", "Attempts to write such bundles in vain.", evidence.n_failed),
-        ("evidence_lost", "Occurrences whose evidence was given up.", evidence.n_lost),
-    )
-    for name, meaning, number in counts:
-        yield counter(name, meaning, (), [((), number)])
-    yield _one("captures_running", "Captures that are being made.", captures.n_running)
-    yield _one("evidence_pending", "Bundles that are still to be written.", evidence.n_pending)
-
-
-def space_metrics(watched: Watched) -> Iterator[Metric]:
+def space_metrics(space: SpaceWatch | None) -> Iterator[Metric]:
     """Room on the disks; that of a disk which nobody has looked at yet is left out."""
-    disks = watched.space.disks if watched.space else ()
+    disks = space.disks if space else ()
     fills = [((disk.name,), disk.days_until_full) for disk in disks]
     rows = (
         ("disk_free_bytes", "Room left on a disk.", [d.space.free_bytes for d in disks]),
@@ -107,5 +95,6 @@ def space_metrics(watched: Watched) -> Iterator[Metric]:
     )
 
 
-def _one(name: str, meaning: str, number: float) -> Metric:
+def one(name: str, meaning: str, number: float) -> Metric:
+    """A gauge without labels."""
     return gauge(name, meaning, (), [((), number)])

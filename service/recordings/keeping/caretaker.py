@@ -10,7 +10,7 @@ from pathlib import Path
 import structlog
 
 from acquisition.clock import Clock
-from core.units import NS_PER_S
+from core.units import DAY_NS, NS_PER_S
 from service.recordings.keeping.folders import (
     being_removed,
     empty,
@@ -36,7 +36,6 @@ MAX_LOOK_S = 2.0
 CHECK_SHARE = 0.02
 """Share of the time that goes into reading recordings once more."""
 
-DAY_NS = 86_400 * NS_PER_S
 CHECK_EVERY_NS = DAY_NS
 REMEMBERED_NS = 90 * DAY_NS
 """How long entries stay of what is gone."""

@@ -5,7 +5,6 @@ from enum import StrEnum
 
 from service.store.access.roles import Role
 
-NS_PER_DAY = 86_400 * 1_000_000_000
 MAX_DAYS = 3650
 SEEN_STEP_NS = 60 * 1_000_000_000
 """How exactly the last use is noted; each note is a write to the disk."""

@@ -1,8 +1,10 @@
 """What a database file holds, and whether it is whole."""
 
+import fcntl
+import os
 import sqlite3
 from collections.abc import Iterator, Mapping
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -109,3 +111,22 @@ def _damage(connection: sqlite3.Connection) -> Iterator[str]:
 
 def _number(connection: sqlite3.Connection, pragma: str) -> int:
     return int(connection.execute(f"PRAGMA {pragma}").fetchone()[0])
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Keep other backups out of a folder.
+
+    Raises
+    ------
+    BackupError
+        If another one is at work there.
+    """
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError as error:
+        raise BackupError(f"{folder}: another backup is being written there") from error
+    finally:
+        os.close(descriptor)

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-DAY_NS = 86_400_000_000_000
-
 
 @dataclass(frozen=True)
 class RetentionLimits:

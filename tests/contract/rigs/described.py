@@ -2,16 +2,17 @@
 
 from typing import Any
 
-from service.api.app import create_app
 from service.api.auth.application import GuardedApi
 from service.api.context import Context
+from service.app.application import application
+from service.reports.desk import EvidenceDesk
 
 _DOCUMENTS: dict[frozenset[str], dict[str, Any]] = {}
 
 
-def described_app(context: Context) -> GuardedApi:
+def described_app(context: Context, evidence: EvidenceDesk | None = None) -> GuardedApi:
     """Build the application of a context, with the description of an earlier one like it."""
-    app = create_app(context)
+    app = application(context, evidence)
     operations = frozenset(app.declared)
     app.openapi_schema = _DOCUMENTS.get(operations)
     _DOCUMENTS[operations] = app.openapi()

@@ -9,10 +9,10 @@ import pytest
 
 from core.alarms.alarm import Alarm
 from core.alarms.operation import Acknowledge
-from service.cluster.gone_alarms import identity_of
 from service.cluster.silent_units import SILENT_AFTER_S, SilentUnits
 from service.live.live_view import LiveView
 from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.alarms.gone_alarms import identity_of
 from service.measuring.parked_rows import ParkedRows
 from service.measuring.recorder import Recorder
 from service.store.sqlite import SqliteStore

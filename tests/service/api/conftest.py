@@ -27,8 +27,13 @@ from core.samples.blocks import SampleBlock
 from service.api.auth.desk import AccessDesk
 from service.api.context import Context
 from service.app.captures import captures_of
-from service.app.evidence import evidence_desk, evidence_of, watch
-from service.app.simulations import simulated_feed
+from service.app.evidence import (
+    built_configuration,
+    evidence_desk,
+    evidence_folders,
+    evidence_of,
+    watch,
+)
 from service.live.live_view import LinkState, LiveView
 from service.measuring.alarms.engine import AlarmEngine
 from service.measuring.alarms.start import alarm_engine
@@ -38,8 +43,10 @@ from service.measuring.in_process import InProcess
 from service.measuring.parked_rows import FILE, ParkedRows
 from service.measuring.recorder import Recorder
 from service.measuring.references import ReferencesInForce
+from service.measuring.simulations import simulated_feed
 from service.notifications.deliveries import Deliveries
 from service.recordings.capture.file import CaptureFile
+from service.reports.desk import EvidenceDesk
 from service.reports.keeper import EvidenceKeeper
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.origin import Origin
@@ -78,11 +85,12 @@ class Service:
     films: FilmKeeper
     loops: dict[str, str | None]
     context: Context
+    desk: EvidenceDesk
 
     @cached_property
     def app(self) -> FastAPI:
         """The application, built for the first test that sends a request to it."""
-        return described_app(self.context)
+        return described_app(self.context, self.desk)
 
     @cached_property
     def client(self) -> httpx2.AsyncClient:
@@ -168,12 +176,15 @@ async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
         captures=captures,
         deliveries=Deliveries([], store.outbox, clock),
         max_shelf_s=7200.0,
-        evidence=evidence_desk(own, store, evidence, clock),
+        evidence=lambda: evidence.status,
+        configuration=built_configuration(own),
+        recordings=[evidence_folders(own).captures],
         loops=lambda: loops,
         access=AccessDesk(store.access, clock, Role.ADMIN),  # as in the demonstration
     )
+    desk = evidence_desk(own, store, evidence, clock, context.downloads)
     return Service(
-        live, store, clock, references, alarms, recorder, evidence, films, loops, context
+        live, store, clock, references, alarms, recorder, evidence, films, loops, context, desk
     )
 
 

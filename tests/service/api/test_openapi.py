@@ -10,8 +10,8 @@ import pytest
 from jsonschema_rs import Draft202012Validator
 from pydantic import BaseModel
 
-from service.api.app import create_app
 from service.api.auth.application import GuardedApi
+from service.app.application import application
 
 Operations = list[tuple[str, dict[str, Any]]]
 
@@ -41,7 +41,7 @@ async def test_the_description_is_rendered_once_and_for_no_other_request(
 ) -> None:
     document, made = read_only.document, []
     monkeypatch.setattr(GuardedApi, "openapi", lambda _: made.append(1) or document)
-    transport = httpx2.ASGITransport(create_app(read_only.context))
+    transport = httpx2.ASGITransport(application(read_only.context, read_only.desk))
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
         for method, path, status in (
             ("GET", "/api/v1/units", 200),

@@ -19,11 +19,12 @@ from core.change.decision import WatchedReadings
 from core.change.settings import ChangeLimits
 from core.change.shaft_response import film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
+from core.units import DAY_NS
 from service.cli.offline.back_test.bearing_run import BackTestRules
 from service.cli.offline.back_test.exporting import export_baselines
 from service.cli.offline.back_test.file_columns import ReadingsError
 from service.cli.offline.back_test.histories import BearingRows, Place
-from service.cli.offline.back_test.periods import DAY_NS, Learning, MachineEvent
+from service.cli.offline.back_test.periods import Learning, MachineEvent
 from service.cli.offline.back_test.reading import read_histories
 from service.cli.offline.back_test.running import Found, run_back_test
 from service.runtime.times import rfc3339

@@ -8,9 +8,9 @@ import pytest
 from rigs.command_line import padwatch
 
 from core.machine.unit import Estimator
-from service.app.simulated_lives import simulated_history
 from service.cli import demo
 from service.cli.daq_process import RunningDaq
+from service.measuring.simulated_lives import simulated_history
 from service.settings.plant import PlantFile
 from service.store.baseline_versions import versions_after
 from service.store.film_port import FilmQuery

@@ -9,11 +9,12 @@ from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.summary import summary_of
+from service.app import pressure
+from service.app.pressure import Pressure
 from service.measuring.bus import Bus
-from service.recordings.continuous import pressure, tape, unit_tape
+from service.recordings.continuous import tape, unit_tape
 from service.recordings.continuous.last import last_end
 from service.recordings.continuous.pieces import Shed
-from service.recordings.continuous.pressure import Pressure
 
 
 async def test_every_sample_is_in_recordings_that_end_at_full_multiples_of_their_length(

@@ -11,10 +11,11 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from starlette.types import Message
 
+from service.api import edition as told
+from service.api.edition import EditionHeader
 from service.api.http.answers import BoundedAnswers
-from service.dashboard import edition as told
 from service.dashboard.assets import Asset, pages, plotly
-from service.dashboard.edition import EditionHeader, edition
+from service.dashboard.edition import edition
 from service.dashboard.routes import dashboard_router
 from service.settings.http_limits import HttpLimitSettings
 
@@ -136,7 +137,7 @@ def test_nothing_else_is_served(client, path) -> None:
 
 def test_every_answer_names_the_edition_even_a_refusal() -> None:
     app = FastAPI()
-    app.add_middleware(EditionHeader)
+    app.add_middleware(EditionHeader, edition=edition())
     answer = TestClient(app).get("/api/v1/nothing-here")
     assert answer.status_code == 404
     assert answer.headers["padwatch-edition"] == edition()

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from service.reports.configuration import configuration_of
+from service.settings.configuration import configuration_of
 from service.settings.loading import load_plant_file
 
 RECEIVERS = """

@@ -15,9 +15,16 @@ from core.change.settings import FilmRules
 from core.condition.cells import CellGrid
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Estimator, Unit
-from service.live.film_actions import Accept, BaselineRefusedError, Freeze, Reject, Renew, Thaw
+from service.live.film_actions import (
+    Accept,
+    BaselineRefusedError,
+    FilmPlace,
+    Freeze,
+    Reject,
+    Renew,
+    Thaw,
+)
 from service.measuring.films.keeper import FilmKeeper
-from service.measuring.films.learning import FilmPlace
 from service.settings.film_alarms import FilmAlarmSettings
 from service.store.film_port import BaselineStep, FilmHistory, FilmQuery
 from service.store.sqlite import SqliteStore

@@ -8,13 +8,14 @@ from argon2 import extract_parameters
 from argon2.low_level import Type
 from harness.places import Place
 
+from core.units import DAY_NS
 from service.api.auth.doors import Doors, LoggedIn, Refusal
 from service.api.auth.passwords import Hashing, PasswordRefusedError, new_password, plant_hasher
 from service.api.auth.people import SET_UP_S, People, create_key
 from service.store.access.acting import Acting, acting_as
 from service.store.access.audit_entry import Source
 from service.store.access.identity import Identity, Means
-from service.store.access.keys import NS_PER_DAY, KeyState
+from service.store.access.keys import KeyState
 from service.store.access.names import NameRefusedError, account_name
 from service.store.access.port import AccessRefusedError, AccessStore
 from service.store.access.roles import Role
@@ -148,7 +149,7 @@ def test_a_key_opens_as_what_it_was_made_for_until_its_day(
     assert doors.machine(shown, T0 + S) == Identity(
         "historian", Role.VIEWER, Means.KEY, ("U1", "U2")
     )
-    end_ns = T0 + 30 * NS_PER_DAY
+    end_ns = T0 + 30 * DAY_NS
     assert isinstance(doors.machine(shown, end_ns - 1), Identity)
     assert doors.machine(shown, end_ns) is Refusal.EXPIRED
     assert access.keys.get(key.id) != key  # its use is noted
@@ -197,7 +198,7 @@ def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
     assert not access.keys.revoke(key.id, T0 + 2 * S)
     assert doors.machine(shown, T0 + S) is Refusal.REVOKED
     (stored,) = access.keys.all()
-    assert (stored.revoked_ns, stored.state(T0 + 99 * NS_PER_DAY)) == (T0 + S, KeyState.REVOKED)
+    assert (stored.revoked_ns, stored.state(T0 + 99 * DAY_NS)) == (T0 + S, KeyState.REVOKED)
     for statement, words in (
         ("UPDATE api_key SET revoked_ns = NULL", "stays revoked"),
         ("UPDATE api_key SET expires_ns = expires_ns + 1", "kept as they were made"),

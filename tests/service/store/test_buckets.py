@@ -6,7 +6,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from core.quality import Level
-from service.store.buckets import DAY_NS, NICE_WIDTHS_NS, bucket_width_ns, bucketed
+from core.units import DAY_NS
+from service.store.buckets import NICE_WIDTHS_NS, bucket_width_ns, bucketed
 from service.store.summaries import Summaries
 
 T0 = 1_767_225_600_000_000_000

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from service.measuring.alarms.health import health_of
+from service.app.service_health import health_of
 from service.recordings.shelf import Shelf
 from service.runtime.space.disk import DiskSpace
 from service.store.port import StoreError

@@ -15,7 +15,6 @@ from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.app.register_daqs import fifo_device, modbus_server, polled_device, vector_device
-from service.app.simulations import simulated_feed
 from service.cli.offline.probes import link_settings_of
 from service.measuring.registers import (
     at_poll_rate,
@@ -25,6 +24,7 @@ from service.measuring.registers import (
     vector_monitor,
     vector_source,
 )
+from service.measuring.simulations import simulated_feed
 from service.measuring.sources import retry_s
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file

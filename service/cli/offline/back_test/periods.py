@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from core.arrays import TimeArray
-
-DAY_NS = 86_400 * 10**9
+from core.units import DAY_NS
 
 
 @dataclass(frozen=True)

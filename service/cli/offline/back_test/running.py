@@ -10,11 +10,11 @@ from core.baseline.baseline import BearingBaseline
 from core.baseline.history import ReadingOutcome, StiffnessHistory
 from core.change.shaft_response import ShaftResponse
 from core.condition.operating_state import STEADY
+from core.units import DAY_NS
 from service.cli.offline.back_test.bearing_run import BackTestRules, BearingRun, run_bearing
 from service.cli.offline.back_test.causes import UnitCauses
 from service.cli.offline.back_test.file_columns import ReadingsError
 from service.cli.offline.back_test.histories import BearingRows, Place
-from service.cli.offline.back_test.periods import DAY_NS
 from service.cli.offline.back_test.report import AlarmReport, FilmReport, RateReport
 from service.cli.offline.back_test.unit_report import alarm_reports, film_reports
 

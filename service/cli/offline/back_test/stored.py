@@ -12,9 +12,9 @@ import pyarrow.parquet as pq
 from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
+from core.units import DAY_NS
 from service.cli.offline.back_test.file_columns import AMPLITUDES, PER_BEARING, SILENT
 from service.cli.offline.back_test.histories import Place
-from service.cli.offline.back_test.periods import DAY_NS
 from service.store.film_port import FilmHistory, FilmQuery, FilmStore
 
 AT_ONCE_NS = 90 * DAY_NS

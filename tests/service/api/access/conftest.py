@@ -86,7 +86,9 @@ def access(service: Any) -> Access:
     )
     hashing = Hashing(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
     desk = AccessDesk(service.store.access, service.clock, local_role=None, hashing=hashing)
-    app = described_app(replace(context, access=desk, metrics=partial(scrape, watched)))
+    app = described_app(
+        replace(context, access=desk, metrics=partial(scrape, watched)), service.desk
+    )
     return Access(desk, app, service)
 
 

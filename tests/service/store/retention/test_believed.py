@@ -7,8 +7,9 @@ from rigs.old_results import HOUR_NS, SECOND_NS, T0, asked
 from rigs.rolled_trends import gather_all
 
 from acquisition.clock import Clock
+from core.units import DAY_NS
 from service.store.retaining import Retaining
-from service.store.retention.limits import DAY_NS, RetentionLimits
+from service.store.retention.limits import RetentionLimits
 from service.store.sql_store import SqlStore
 
 YEAR_NS = 365 * DAY_NS

@@ -2,14 +2,11 @@
 
 import hashlib
 import json
-import os
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, distribution
-from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from service.runtime.whole_files import write_whole
 from service.settings.plant import PlantFile
 
 FORMAT = "padwatch-configuration"
@@ -66,21 +63,6 @@ def without_secrets(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [without_secrets(each) for each in value]
     return value
-
-
-def keep_configuration(folder: Path, configuration: Configuration) -> None:
-    """Write a configuration under its name, unless it is there already.
-
-    Raises
-    ------
-    OSError
-        If the disk refuses.
-    """
-    path = folder / f"{configuration.version}.json"
-    if path.exists() and path.read_bytes() == configuration.text:
-        return
-    os.makedirs(folder, exist_ok=True)
-    write_whole(path, configuration.text)
 
 
 def built_from() -> str | None:
