@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Protocol
 
-from service.notifications.deliveries import ReceiverView
+from service.notifications.sender import ReceiverView
 
 
 class DeliveryLook(Protocol):

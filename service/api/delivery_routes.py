@@ -7,8 +7,7 @@ from service.api.context import Context
 from service.api.delivery_models import DeadLetterModel, DeliveryModel, ReceiverModel
 from service.api.problems import problem_responses
 from service.api.rendering import rendered_now
-from service.notifications.deliveries import ReceiverView
-from service.notifications.sender import SenderStatus
+from service.notifications.sender import ReceiverView, SenderStatus
 from service.runtime.times import rfc3339
 from service.store.access.roles import Permission
 from service.store.outbox_port import Backlog, LetterState, StoredLetter

@@ -40,7 +40,7 @@ from service.measuring.metrics.timed import timed_monitors
 from service.measuring.metrics.timings import Timings
 from service.measuring.runner import BUS_CAPACITY
 from service.measuring.unit_memory import UnitMemory
-from service.notifications.facts import Around
+from service.notifications.message import Around
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.service_manager import NOBODY, ServiceManager
 from service.runtime.stopping import stop_on_signals

@@ -34,8 +34,8 @@ from service.measuring.references import ReferencesInForce
 from service.measuring.soundness import Soundness
 from service.measuring.sources import vector_rows
 from service.measuring.unit_memory import NO_MEMORIES, UnitMemory
-from service.notifications.deliveries import Deliveries
-from service.notifications.facts import Around
+from service.notifications.message import Around
+from service.notifications.sender import Deliveries
 from service.recordings.capture.captures import Captures
 from service.recordings.continuous.tape import Tape
 from service.recordings.keeping.keeper import WaveformKeeper

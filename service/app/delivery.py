@@ -8,13 +8,10 @@ from zoneinfo import ZoneInfo
 
 from acquisition.clock import Clock
 from core.limits import AlarmLevel
-from service.notifications.facts import LookAround
+from service.notifications.channel import Secret, Timeouts, Trust
 from service.notifications.mail import Mail, MailTarget
-from service.notifications.message import Composer, Plant
-from service.notifications.network import Timeouts, Trust
-from service.notifications.quiet import QuietHours
-from service.notifications.routing import Route, Router
-from service.notifications.secret import Secret
+from service.notifications.message import Composer, LookAround, Plant
+from service.notifications.routing import QuietHours, Route, Router
 from service.notifications.sender import Receiver
 from service.notifications.webhook import Webhook, WebhookTarget
 from service.settings.delivery import (

@@ -22,7 +22,7 @@ from service.measuring.metrics.timed import timed, timed_sources
 from service.measuring.metrics.timings import Timings
 from service.measuring.runner import BUS_CAPACITY, Runner
 from service.measuring.watched_unit import WatchedUnit
-from service.notifications.facts import Around
+from service.notifications.message import Around
 from service.runtime.heartbeats import Heartbeats
 from service.runtime.service_manager import NOBODY, ServiceManager
 from service.runtime.stopping import stop_on_signals

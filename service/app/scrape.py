@@ -19,8 +19,8 @@ from service.measuring.metrics.kept import (
     space_metrics,
     store_metrics,
 )
-from service.notifications.deliveries import ReceiverView
 from service.notifications.metrics import delivery_metrics
+from service.notifications.sender import ReceiverView
 from service.recordings.capture.captures import Captures
 from service.recordings.metrics import recording_metrics
 from service.reports.keeper import EvidenceKeeper

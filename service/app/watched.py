@@ -12,7 +12,7 @@ from service.measuring.films.keeper import FilmKeeper
 from service.measuring.metrics.timings import Timings
 from service.measuring.recorder import Recorder
 from service.measuring.soundness import Soundness
-from service.notifications.deliveries import Deliveries
+from service.notifications.sender import Deliveries
 from service.recordings.capture.captures import Captures
 from service.recordings.continuous.tape import Tape
 from service.recordings.keeping.keeper import WaveformKeeper

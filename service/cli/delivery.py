@@ -13,9 +13,8 @@ from acquisition.clock import SystemClock
 from service.app.delivery import composer_of, receivers_of
 from service.app.stores import has_store, open_store, store_name
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.notifications.facts import Surroundings
-from service.notifications.message import dumps
-from service.notifications.outcome import Delivered, Outcome, Refused
+from service.notifications.channel import Delivered, Outcome, Refused
+from service.notifications.message import Surroundings, dumps
 from service.notifications.sender import Receiver
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile

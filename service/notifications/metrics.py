@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from prometheus_client.metrics_core import Metric
 
 from core.units import NS_PER_S
-from service.notifications.deliveries import ReceiverView
+from service.notifications.sender import ReceiverView
 from service.runtime.families import gauge
 
 RECEIVER = ("receiver",)

@@ -1,10 +1,13 @@
-"""Who is told of what: from an event of an alarm to letters for those who want to know."""
+"""From an event of an alarm to letters for the receivers that want it."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime, time
+from zoneinfo import ZoneInfo
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.limits import AlarmLevel
+from core.units import NS_PER_S
 from service.notifications.message import Composer, dumps
 from service.store.outbox_port import Letter
 
@@ -134,3 +137,19 @@ def _shown(event: AlarmEvent) -> Telling | None:
 def _is_urgent(event: AlarmEvent, told: Telling) -> bool:
     begins = told.as_ in (AlarmChange.RAISED, AlarmChange.ESCALATED)
     return begins and event.level is AlarmLevel.DANGER
+
+
+@dataclass(frozen=True)
+class QuietHours:
+    """From start to end every day, over midnight if the end is before the start."""
+
+    start: time
+    end: time
+    zone: ZoneInfo
+
+    def hold_at(self, now_ns: int) -> bool:
+        """Whether a moment lies within them."""
+        moment = datetime.fromtimestamp(now_ns // NS_PER_S, UTC).astimezone(self.zone).time()
+        if self.start < self.end:
+            return self.start <= moment < self.end
+        return moment >= self.start or moment < self.end

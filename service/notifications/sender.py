@@ -1,7 +1,8 @@
-"""`Sender`: one receiver's letters, in order, one at a time, each until it is settled."""
+"""A receiver's letters, in order, one at a time, each until it is settled."""
 
 import asyncio
-from collections.abc import Callable
+import random
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Literal, TypeVar
@@ -11,13 +12,39 @@ import structlog
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
 from core.units import ns_from_s
-from service.notifications.backoff import wait_s
+from service.notifications.channel import Carrier, Delivered, Failed, Outcome
 from service.notifications.message import loads
-from service.notifications.outcome import Carrier, Delivered, Failed, Outcome
-from service.notifications.quiet import QuietHours
-from service.runtime.heartbeats import UNHEARD, Pulse
-from service.store.outbox_port import LetterState, Outbox, StoredLetter
+from service.notifications.routing import QuietHours
+from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
+from service.store.outbox_port import Backlog, LetterState, Outbox, StoredLetter
 from service.store.port import StoreError
+
+FIRST_S = 1.0
+
+
+def wait_s(
+    n_failures: int,
+    retry_after_s: float | None,
+    longest_s: float,
+    share: Callable[[], float] = random.random,
+) -> float:
+    """Twice as long after each failure, up to a limit, less up to half of it by chance.
+
+    Receivers that failed together are so not tried together.
+
+    Parameters
+    ----------
+    n_failures
+        In a row, 1 or more.
+    retry_after_s
+        What the receiver has asked for: waited for in full, up to the limit.
+    share
+        Chance, 0 to 1.
+    """
+    doubled_s = FIRST_S * 2.0 ** min(n_failures - 1, 30)
+    drawn_s = min(doubled_s, longest_s) * (1.0 - 0.5 * share())
+    return max(drawn_s, min(retry_after_s or 0.0, longest_s))
+
 
 log = structlog.get_logger()
 
@@ -240,3 +267,73 @@ async def _finished(work: Callable[[], T]) -> T:
         if not working.cancelled():
             working.exception()  # it is being stopped: the letter is tried again after the restart
         raise
+
+
+@dataclass(frozen=True)
+class ReceiverView:
+    """A receiver as it is shown.
+
+    Parameters
+    ----------
+    receiver, status
+        None of one that is in the plant file no longer; what waits for it goes on waiting.
+    backlog
+        None if there never was anything for it.
+    """
+
+    name: str
+    receiver: Receiver | None
+    status: SenderStatus | None
+    backlog: Backlog | None
+
+
+class Deliveries:
+    """Runs a sender for each receiver; one never waits for another.
+
+    Parameters
+    ----------
+    receivers
+        None in a replay, which tells nobody.
+    """
+
+    def __init__(self, receivers: Sequence[Receiver], outbox: Outbox, clock: Clock) -> None:
+        self._senders = [Sender(receiver, outbox, clock) for receiver in receivers]
+        self._outbox, self._clock = outbox, clock
+
+    async def run(self, beats: Heartbeats | None = None) -> None:
+        """Deliver for ever."""
+        beats = beats or Heartbeats(self._clock)
+        loops = {f"deliver {sender.receiver.name}": sender.run for sender in self._senders}
+        try:
+            async with asyncio.TaskGroup() as tasks:
+                for name, loop in loops.items():
+                    tasks.create_task(beats.tend(name, loop), name=name)
+        except asyncio.CancelledError:
+            beats.release(*loops)  # another process of the plant delivers from now on
+            raise
+
+    def wake(self) -> None:
+        """Say that there may be something new in the outbox."""
+        for sender in self._senders:
+            sender.wake()
+
+    async def look(self) -> list[ReceiverView]:
+        """Look at all receivers.
+
+        Raises
+        ------
+        StoreError
+            If the outbox cannot be read.
+        """
+        backlogs = {b.receiver: b for b in await asyncio.to_thread(self._outbox.backlogs)}
+        senders = {sender.receiver.name: sender for sender in self._senders}
+        return [
+            ReceiverView(
+                name,
+                sender.receiver if sender else None,
+                sender.status if sender else None,
+                backlogs.get(name),
+            )
+            for name in (*senders, *(other for other in backlogs if other not in senders))
+            for sender in [senders.get(name)]
+        ]

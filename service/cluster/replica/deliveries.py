@@ -3,8 +3,7 @@
 import asyncio
 from collections.abc import Sequence
 
-from service.notifications.deliveries import ReceiverView
-from service.notifications.sender import Receiver, SenderState, SenderStatus
+from service.notifications.sender import Receiver, ReceiverView, SenderState, SenderStatus
 from service.store.outbox_port import Backlog, Outbox
 
 

@@ -18,8 +18,8 @@ from service.cluster.replica.live import ReplicaLive
 from service.live.live_view import LinkState
 from service.measuring.metrics.judged import alarm_metrics, film_metrics
 from service.measuring.metrics.kept import store_info
-from service.notifications.deliveries import ReceiverView
 from service.notifications.metrics import delivery_metrics
+from service.notifications.sender import ReceiverView
 from service.runtime.families import gauge
 from service.store.port import StoreError
 

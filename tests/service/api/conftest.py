@@ -44,7 +44,7 @@ from service.measuring.parked_rows import FILE, ParkedRows
 from service.measuring.recorder import Recorder
 from service.measuring.references import ReferencesInForce
 from service.measuring.simulations import simulated_feed
-from service.notifications.deliveries import Deliveries
+from service.notifications.sender import Deliveries
 from service.recordings.capture.file import CaptureFile
 from service.reports.desk import EvidenceDesk
 from service.reports.keeper import EvidenceKeeper

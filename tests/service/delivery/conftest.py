@@ -15,9 +15,8 @@ from rigs.standing_clock import T0, SetClock
 from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
-from service.notifications.facts import Surroundings
-from service.notifications.message import Composer, Plant
-from service.notifications.network import Timeouts, Trust
+from service.notifications.channel import Timeouts, Trust
+from service.notifications.message import Composer, Plant, Surroundings
 from service.notifications.routing import Route, Router
 from service.notifications.sender import Receiver, Sender
 from service.notifications.webhook import Webhook, WebhookTarget

@@ -15,11 +15,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from service.notifications.channel import Delivered, Failed, Refused, Secret, Timeouts, Trust
 from service.notifications.mail import Mail, MailTarget, mail_of
 from service.notifications.message import Message
-from service.notifications.network import Timeouts, Trust
-from service.notifications.outcome import Delivered, Failed, Refused
-from service.notifications.secret import Secret
 
 MESSAGE: Message = {
     "format": 1, "id": "5e4b", "type": "alarm", "plant": "Itaipu",

@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-from service.notifications.network import Trust
-from service.notifications.outcome import Failed
+from service.notifications.channel import Failed, Trust
 from service.notifications.webhook import Webhook, WebhookTarget
 
 

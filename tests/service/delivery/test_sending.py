@@ -15,11 +15,9 @@ from hypothesis import strategies as st
 from rigs.tiers import fast_and_long
 
 from core.limits import AlarmLevel, Judgement
-from service.notifications.backoff import wait_s
-from service.notifications.outcome import Failed
-from service.notifications.quiet import QuietHours
-from service.notifications.secret import Secret, SecretError
-from service.notifications.sender import SenderState
+from service.notifications.channel import Failed, Secret, SecretError
+from service.notifications.routing import QuietHours
+from service.notifications.sender import SenderState, wait_s
 from service.store.outbox_port import LetterState
 
 DANGER = Judgement(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")

@@ -14,9 +14,8 @@ from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from service.measuring.alarms.engine import AlarmEngine
 from service.measuring.metrics.judged import alarm_metrics, film_metrics
-from service.notifications.deliveries import ReceiverView
 from service.notifications.metrics import delivery_metrics
-from service.notifications.sender import Receiver, SenderStatus
+from service.notifications.sender import Receiver, ReceiverView, SenderStatus
 from service.store.outbox_port import Backlog
 
 HOUR_NS = 3_600_000_000_000

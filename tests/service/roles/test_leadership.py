@@ -13,9 +13,8 @@ from acquisition.clock import SystemClock
 from service.cluster.holding import HoldLostError, Holds
 from service.cluster.leadership import Leadership
 from service.cluster.partition import Partition
-from service.notifications.deliveries import Deliveries
-from service.notifications.outcome import Delivered
-from service.notifications.sender import Receiver
+from service.notifications.channel import Delivered
+from service.notifications.sender import Deliveries, Receiver
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
 from service.settings.loading import load_plant_file
 from service.store.database import Hold

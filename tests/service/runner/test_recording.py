@@ -30,7 +30,7 @@ from service.measuring.in_process import InProcess
 from service.measuring.parked_rows import FILE, ParkedRows
 from service.measuring.recorder import Findings, NotStoredError, Recorder
 from service.measuring.references import ReferencesInForce
-from service.notifications.deliveries import Deliveries
+from service.notifications.sender import Deliveries
 from service.store.port import TrendQuery, UnitGap
 
 K = "order1_k_eff_xx_n_per_m"

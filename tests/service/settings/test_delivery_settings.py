@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.clock import SystemClock
 from service.app.delivery import receivers_of, router_of
-from service.notifications.facts import Surroundings
+from service.notifications.message import Surroundings
 from service.settings.loading import load_plant_file
 from service.settings.origin import Origin
 from service.store.outbox_port import nobody

@@ -16,7 +16,7 @@ from service.cluster.stream.progress import UnitProgress
 from service.cluster.stream.stored import memories_of, usable
 from service.measuring.bus import Bus
 from service.measuring.recorder import Findings
-from service.notifications.facts import Around
+from service.notifications.message import Around
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore

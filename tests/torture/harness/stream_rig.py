@@ -31,7 +31,7 @@ from service.measuring.bus import Bus
 from service.measuring.link_news import LinkNews
 from service.measuring.metrics.timings import Timings
 from service.measuring.sources import monitor_of
-from service.notifications.facts import Around
+from service.notifications.message import Around
 from service.runtime.heartbeats import Heartbeats
 from service.settings.loading import load_plant_file
 from service.settings.origin import Origin

@@ -1,12 +1,109 @@
-"""What webhooks and mail have in common below their protocols: TLS, connections, time-outs."""
+"""What every channel shares: outcomes of an attempt, secrets, TLS, connections, time-outs."""
 
 import asyncio
+import os
 import socket
 import ssl
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 from acquisition.delivery.network import NameLookUp
+from service.notifications.message import Message
+
+
+@dataclass(frozen=True)
+class Delivered:
+    """The receiver has taken it."""
+
+    answer: str
+
+
+@dataclass(frozen=True)
+class Refused:
+    """The receiver will never take it."""
+
+    answer: str
+
+
+@dataclass(frozen=True)
+class Failed:
+    """It may take it later.
+
+    Parameters
+    ----------
+    retry_after_s
+        When it has asked to be tried again; None if it has not.
+    """
+
+    answer: str
+    retry_after_s: float | None = None
+
+
+Outcome = Delivered | Refused | Failed
+
+
+class Carrier(Protocol):
+    """Carries messages to one receiver."""
+
+    async def carry(self, message: Message, body: str) -> Outcome:
+        """Try once; ends within its time-outs, whatever the receiver does.
+
+        Parameters
+        ----------
+        body
+            The same message as it was written down.
+        """
+        ...
+
+
+MAX_BYTES = 8192
+
+
+class SecretError(Exception):
+    """A secret cannot be read; the message says from where, never what."""
+
+
+@dataclass(frozen=True)
+class Secret:
+    """Where a secret is: a file, or a variable of the environment.
+
+    Parameters
+    ----------
+    file, env
+        One of them.
+    """
+
+    file: Path | None = None
+    env: str | None = None
+
+    def read(self) -> str:
+        """Read it, without the line's end that editors add.
+
+        Raises
+        ------
+        SecretError
+            If there is none, or it is no printable line.
+        """
+        text = self._text().strip()
+        if not text or not text.isprintable():
+            raise SecretError(f"{self._place} holds no single line of printable text")
+        return text
+
+    @property
+    def _place(self) -> str:
+        return f"file {self.file}" if self.file is not None else f"environment variable {self.env}"
+
+    def _text(self) -> str:
+        if self.file is None:
+            return os.environ.get(self.env or "", "")
+        try:
+            with self.file.open("rb") as file:
+                return file.read(MAX_BYTES).decode()
+        except OSError as error:
+            raise SecretError(f"{self._place}: {error.strerror}") from error
+        except UnicodeDecodeError as error:
+            raise SecretError(f"{self._place} is not UTF-8 text") from error
 
 
 @dataclass(frozen=True)
