@@ -21,7 +21,7 @@ from core.limits import Limits
 from core.quality import GOOD, Reading, Reason, bad
 from core.samples.blocks import DeviceClock, SampleBlock
 from service.app.captures import captures_of
-from service.measuring.simulations import simulated_feed
+from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.origin import Origin

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from service.app.stores import open_store
 from service.cli.offline.demo.past import fill
-from service.measuring.simulated_lives import simulated_history
+from service.measuring.simulated_sources import simulated_history
 from service.settings.loading import load_plant_file
 
 DEMO = Path(__file__).parents[1] / "deploy" / "demo-life.toml"

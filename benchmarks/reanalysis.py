@@ -15,7 +15,7 @@ from pathlib import Path
 from acquisition.clock import SystemClock
 from acquisition.delivery.blocks import BlockAssembler
 from acquisition.recordings.writer import RecordingWriter
-from service.measuring.simulations import simulated_feed
+from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
 from service.settings.recorded_units import recorded_unit

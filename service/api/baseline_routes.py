@@ -26,9 +26,9 @@ from service.api.film_routes import watched_place
 from service.api.parameters import ns_from_datetime
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered, worked
-from service.live.film_actions import (
+from service.live.commands import (
     Accept,
-    Action,
+    BaselineAction,
     BaselineRefusedError,
     Freeze,
     Reject,
@@ -167,7 +167,7 @@ def baseline_action_router(context: Context) -> APIRouter:
 
 
 async def _done(
-    context: Context, unit: str, bearing: str, action: Action, asked: BaselineActionModel
+    context: Context, unit: str, bearing: str, action: BaselineAction, asked: BaselineActionModel
 ) -> BaselinesModel:
     """Do it, and answer when it is on the disk."""
     place = watched_place(context, unit, bearing)

@@ -18,8 +18,8 @@ from service.api.ports import CaptureLook, FilmBoard, LiveLook, Operators
 from service.api.problems import ProblemError
 from service.live.alarm_board import AlarmBoard
 from service.live.evidence import EvidenceStatus
-from service.measuring.references import ReferencesInForce
-from service.recordings.continuous.tape import Tape
+from service.measuring.references_in_force import ReferencesInForce
+from service.recordings.continuous_recorder import Tape
 from service.runtime.polls import TimedSource
 from service.runtime.space.watch import SpaceWatch
 from service.settings.bearings import BearingSettings

@@ -16,7 +16,7 @@ from service.api.film_views import film_model, why_unwatched
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.rendering import rendered, worked
 from service.api.tables import Column, Format, table_content, table_response
-from service.live.film_actions import FilmPlace
+from service.live.commands import FilmPlace
 from service.store.access.roles import Permission
 from service.store.film_port import FilmHistory, FilmQuery
 from service.store.port import QueryTooLargeError

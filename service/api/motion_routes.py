@@ -21,10 +21,9 @@ from service.api.recording_routes import (
 )
 from service.api.rendering import rendered, worked
 from service.live.live_view import HELD_S
-from service.live.shaft_stretch import newest_of, stretch_of
-from service.recordings.motion import channels_for, motion_of
-from service.recordings.recorded_motion import NoMotionError, recorded_motion
-from service.recordings.shelf import Kept
+from service.live.samples import newest_of, stretch_of
+from service.recordings.library import Kept
+from service.recordings.motion import NoMotionError, channels_for, motion_of, recorded_motion
 from service.settings.core_values import machine_of
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings

@@ -13,7 +13,7 @@ from service.api.order1_reference_models import (
     VectorModel,
 )
 from service.api.problems import ProblemError, described_problems, problem_responses
-from service.measuring.alarms.order1_reference import VectorRefusedError, measured_vectors
+from service.measuring.references_in_force import VectorRefusedError, measured_vectors
 from service.runtime.times import rfc3339
 from service.store.access.roles import Permission
 from service.store.vector_reference_port import SetVectorReference

@@ -12,8 +12,7 @@ from core.change.settings import FilmRules
 from core.monitor.assessment import Assessment
 from core.quality import Reason
 from core.samples.blocks import SampleBlock
-from service.live.film_actions import Action as BaselineAction
-from service.live.film_actions import FilmPlace
+from service.live.commands import BaselineAction, FilmPlace
 from service.live.live_view import CurrentBearing, UnitStatus
 from service.settings.film_alarms import FilmAlarmSettings
 

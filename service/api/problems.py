@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from service.api.auth.declared import allowed_methods
-from service.live.elsewhere import NotCarriedOutError, NotHereError
+from service.live.commands import NotCarriedOutError, NotHereError
 from service.store.port import QueryTooLargeError, StoreError
 
 MEDIA_TYPE = "application/problem+json"

@@ -19,7 +19,7 @@ from service.api.recording_models import (
 )
 from service.api.recording_views import recording_info, recording_model
 from service.api.rendering import rendered, worked
-from service.recordings.shelf import Shelf
+from service.recordings.library import Shelf
 from service.store.access.roles import Permission
 from service.store.waveform_port import WaveformKind
 

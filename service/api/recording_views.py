@@ -10,7 +10,7 @@ from service.api.recording_models import (
     RecordingInfoModel,
     RecordingModel,
 )
-from service.recordings.shelf import Kept, Shelf
+from service.recordings.library import Kept, Shelf
 from service.runtime.times import rfc3339
 
 

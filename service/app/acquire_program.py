@@ -13,12 +13,11 @@ from service.app.ground import live_view
 from service.app.health.page import Health
 from service.app.health.serving import HealthServer
 from service.app.supervision import Supervision
-from service.cluster.stream.names import identity_of
-from service.cluster.stream.publisher import Publisher
-from service.cluster.stream.publisher_metrics import publisher_metrics
+from service.cluster.publisher import Publisher, publisher_metrics
+from service.cluster.session import identity_of
 from service.live.live_view import LiveView
-from service.measuring.acquiring import Acquirer
-from service.measuring.watched_unit import WatchedUnit
+from service.measuring.acquirer import Acquirer
+from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import Heartbeats
 from service.runtime.service_manager import NOBODY, ServiceManager
 from service.runtime.stopping import stop_on_signals

@@ -22,24 +22,19 @@ from service.app.reporting import reporting_loops
 from service.app.service_health import recording_error
 from service.app.stores import database_path, open_store
 from service.app.supervision import Supervision
+from service.cluster.consumer import Consumer, consumer_metrics
 from service.cluster.holding import Holds
 from service.cluster.leadership import Leadership
 from service.cluster.partition import Partition
-from service.cluster.silent_units import SilentUnits
-from service.cluster.stream.consumer import Consumer
-from service.cluster.stream.consumer_metrics import consumer_metrics
-from service.cluster.stream.names import identity_of
+from service.cluster.session import identity_of
+from service.cluster.silent_units import Silence, SilentUnits, silences_s
 from service.cluster.stream.progress import UnitProgress
-from service.cluster.stream.silence import Silence, silences_s
 from service.cluster.stream.stored import memories_of, usable
-from service.measuring.alarms.gone_alarms import SHARED
-from service.measuring.alarms.health import StreamLook
-from service.measuring.bus import Bus
-from service.measuring.metrics.kept import store_info
-from service.measuring.metrics.timed import timed_monitors
-from service.measuring.metrics.timings import Timings
-from service.measuring.runner import BUS_CAPACITY
-from service.measuring.unit_memory import UnitMemory
+from service.measuring.acquirer import Bus
+from service.measuring.analyser import BUS_CAPACITY, UnitMemory
+from service.measuring.counters import store_info
+from service.measuring.service_alarms import SHARED, StreamLook
+from service.measuring.timings import Timings, timed_monitors
 from service.notifications.message import Around
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.service_manager import NOBODY, ServiceManager

@@ -20,24 +20,19 @@ from service.app.service_health import health_of
 from service.app.space import space_watch
 from service.app.tapes import tape_of
 from service.app.waveforms import waveform_keeper
-from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.alarms.health import StreamLook
-from service.measuring.alarms.start import Listener, alarm_engine
-from service.measuring.analysing import Analyser
-from service.measuring.bus import Bus
-from service.measuring.films.keeper import FilmKeeper
-from service.measuring.films.start import film_keeper
-from service.measuring.parked_rows import FILE, ParkedRows
-from service.measuring.plant_part import WHOLE, PlantPart
-from service.measuring.recorder import Recorder
-from service.measuring.references import ReferencesInForce
+from service.measuring.acquirer import Bus
+from service.measuring.alarm_engine import WHOLE, AlarmEngine, Listener, PlantPart, alarm_engine
+from service.measuring.analyser import NO_MEMORIES, Analyser, UnitMemory
+from service.measuring.films import FilmKeeper, film_keeper
+from service.measuring.recorder import FILE, ParkedRows, Recorder
+from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.service_alarms import StreamLook
 from service.measuring.soundness import Soundness
 from service.measuring.sources import vector_rows
-from service.measuring.unit_memory import NO_MEMORIES, UnitMemory
 from service.notifications.message import Around
 from service.notifications.sender import Deliveries
-from service.recordings.capture.captures import Captures
-from service.recordings.continuous.tape import Tape
+from service.recordings.around_alarms import Captures
+from service.recordings.continuous_recorder import Tape
 from service.recordings.keeping.keeper import WaveformKeeper
 from service.reports.keeper import EvidenceKeeper
 from service.runtime.heartbeats import Loop

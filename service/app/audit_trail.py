@@ -11,7 +11,7 @@ from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
 from service.api.auth.refusals import Refusals
 from service.app.service_audit import STARTED, Release, start_deeds, step_deed, stop_deed
-from service.measuring.alarms.host_time import STEP_S
+from service.measuring.service_alarms import STEP_S
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.configuration import built_from, configuration_of
 from service.settings.origin import Origin

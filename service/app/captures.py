@@ -6,9 +6,8 @@ from pathlib import Path
 from acquisition.clock import Clock
 from acquisition.recordings.writer import RecordingWriter
 from service.app.recordings import recording_writer
-from service.recordings.capture.captures import Captures
-from service.recordings.capture.file import MakeWriter
-from service.recordings.capture.span import CaptureSettings
+from service.recordings.around_alarms import Captures, CaptureSettings
+from service.recordings.segment import MakeWriter
 from service.settings.core_values import analysis_of
 from service.settings.film_rules import film_rules_of
 from service.settings.modbus_sources import ModbusVectorSettings

@@ -7,9 +7,9 @@ from acquisition.clock import Clock
 from service.api.downloads import Downloads
 from service.app.captures import BYTES_PER_GB, CAPTURES
 from service.live.live_view import LiveView
-from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.films.keeper import FilmKeeper
-from service.recordings.capture.captures import Captures
+from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.films import FilmKeeper
+from service.recordings.around_alarms import Captures
 from service.reports.archive import EvidenceArchive
 from service.reports.desk import EvidenceDesk
 from service.reports.keeper import EvidenceFolders, EvidenceKeeper

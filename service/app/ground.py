@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from service.live.live_view import LiveView
-from service.measuring.metrics.timings import Timings
+from service.measuring.timings import Timings
 from service.runtime.heartbeats import Heartbeats
 from service.settings.core_values import analysis_of
 from service.settings.modbus_sources import ModbusVectorSettings

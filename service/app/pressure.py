@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from service.measuring.bus import Bus
-from service.recordings.continuous.pieces import Shed
+from service.measuring.acquirer import Bus
+from service.recordings.continuous_recorder import Shed
 
 BEHIND_S = 3.0
 """Blocks that wait this long for the analysis put off recording; results come first."""

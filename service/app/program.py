@@ -17,11 +17,10 @@ from service.app.reporting import reporting_loops
 from service.app.serving import Serving, context_of, serving_of
 from service.app.stores import database_path, open_store
 from service.app.supervision import Supervision
-from service.measuring.bus import Bus
-from service.measuring.metrics.timed import timed, timed_sources
-from service.measuring.metrics.timings import Timings
-from service.measuring.runner import BUS_CAPACITY, Runner
-from service.measuring.watched_unit import WatchedUnit
+from service.measuring.acquirer import Bus
+from service.measuring.analyser import BUS_CAPACITY, Runner
+from service.measuring.sources import WatchedUnit
+from service.measuring.timings import Timings, timed, timed_sources
 from service.notifications.message import Around
 from service.runtime.heartbeats import Heartbeats
 from service.runtime.service_manager import NOBODY, ServiceManager

@@ -9,7 +9,6 @@ from service.api.context import Context
 from service.app.delivery import receivers_of
 from service.app.ground import STALE_HOPS, refresh_s
 from service.cluster.replica.alarms import ReplicaAlarms
-from service.cluster.replica.asking import Asking
 from service.cluster.replica.captures import NoCaptures
 from service.cluster.replica.deliveries import ReplicaDeliveries
 from service.cluster.replica.described import Described
@@ -17,7 +16,8 @@ from service.cluster.replica.feed import Feed
 from service.cluster.replica.films import ReplicaFilms
 from service.cluster.replica.live import ReplicaLive
 from service.cluster.replica.metrics import ReplicaMetrics
-from service.measuring.references import ReferencesInForce
+from service.cluster.reported_commands import Asking
+from service.measuring.references_in_force import ReferencesInForce
 from service.runtime.heartbeats import Heartbeats
 from service.settings.alarm_rules import chatter_rule_of
 from service.settings.core_values import machine_of

@@ -10,18 +10,21 @@ from prometheus_client.process_collector import ProcessCollector
 
 from service.api.load.metrics import load_metrics
 from service.app.watched import Watched
-from service.measuring.metrics.acquired import link_metrics, sample_metrics
-from service.measuring.metrics.judged import alarm_metrics, film_metrics, result_metrics
-from service.measuring.metrics.kept import (
+from service.measuring.counters import (
+    alarm_metrics,
+    film_metrics,
+    link_metrics,
     one,
     queue_metrics,
+    result_metrics,
+    sample_metrics,
     soundness_metrics,
     space_metrics,
     store_metrics,
 )
 from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import ReceiverView
-from service.recordings.capture.captures import Captures
+from service.recordings.around_alarms import Captures
 from service.recordings.metrics import recording_metrics
 from service.reports.keeper import EvidenceKeeper
 from service.runtime.families import counter, gauge

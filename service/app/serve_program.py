@@ -13,7 +13,7 @@ from service.app.replica import Replica, replica_context, replica_on
 from service.app.serving import Serving, serving_of
 from service.app.stores import open_store
 from service.app.supervision import Supervision
-from service.measuring.metrics.timings import Timings
+from service.measuring.timings import Timings
 from service.runtime.heartbeats import Heartbeats
 from service.runtime.service_manager import NOBODY, ServiceManager
 from service.runtime.stopping import stop_on_signals

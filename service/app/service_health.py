@@ -4,12 +4,12 @@ from collections.abc import Iterable
 
 from service.api.load.watch import LoadWatch
 from service.live.live_view import LiveView
-from service.measuring.alarms.health import LookAtHealth, ServiceHealth, StreamLook, enough_room
-from service.measuring.bus import Bus
+from service.measuring.acquirer import Bus
 from service.measuring.recorder import Recorder
+from service.measuring.service_alarms import LookAtHealth, ServiceHealth, StreamLook, enough_room
 from service.measuring.soundness import Soundness
-from service.recordings.capture.captures import Captures
-from service.recordings.continuous.tape import Tape
+from service.recordings.around_alarms import Captures
+from service.recordings.continuous_recorder import Tape
 from service.recordings.keeping.keeper import WaveformKeeper
 from service.runtime.space.watch import SpaceWatch
 

@@ -22,8 +22,8 @@ from service.app.supervision import Supervision
 from service.app.tapes import recordings_folder
 from service.app.watched import Watched
 from service.app.web import server_of
-from service.measuring.bus import Bus
-from service.measuring.in_process import InProcess
+from service.measuring.acquirer import Bus
+from service.measuring.commands import InProcess
 from service.reports.desk import EvidenceDesk
 from service.runtime.polls import TimedSource
 

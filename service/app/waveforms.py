@@ -8,11 +8,11 @@ from service.app.captures import BYTES_PER_GB, CAPTURES
 from service.app.evidence import EVIDENCE
 from service.app.space import space_limits
 from service.app.tapes import recordings_folder
+from service.recordings.folders import place_of
+from service.recordings.index import Index
 from service.recordings.keeping.caretaker import Caretaker, Custody
 from service.recordings.keeping.gauge import Gauge
-from service.recordings.keeping.index import Index
 from service.recordings.keeping.keeper import WaveformKeeper
-from service.recordings.keeping.place import place_of
 from service.recordings.keeping.room import RoomLimits
 from service.recordings.keeping.watch_keeping import WatchKeeping
 from service.reports.capture_link import captures_in_use

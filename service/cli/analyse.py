@@ -11,7 +11,7 @@ from service.app.health.serving import HOST
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.stream import stream_settings
 from service.cluster.partition import Partition
-from service.cluster.stream.errors import StreamAnewError
+from service.cluster.session import StreamAnewError
 from service.measuring.sources import monitor_of
 from service.runtime.ending import leave, run_to_its_end
 from service.runtime.service_manager import ServiceManager

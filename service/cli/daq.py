@@ -15,7 +15,7 @@ from service.app.daqs import daq_of
 from service.app.recordings import recorded_feed, recordings_by_unit
 from service.app.wires import Wire, over_wire
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.measuring.simulations import simulated_feed
+from service.measuring.simulated_sources import simulated_feed
 from service.settings.plant import PlantFile
 
 SpeedOption = Annotated[

@@ -14,7 +14,7 @@ from service.cli.offline.demo.past import fill, without_past
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import run_plant
 from service.cli.terminal import terminal_to_itself
-from service.measuring.simulated_lives import simulated_history
+from service.measuring.simulated_sources import simulated_history
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.port import StoreError

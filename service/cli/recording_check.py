@@ -14,8 +14,8 @@ from acquisition.clock import SystemClock
 from service.app.stores import has_store, open_store
 from service.app.waveforms import custody_of
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.recordings.keeping.check import Found, RecordingCheck, Verdict
-from service.recordings.keeping.place import place_of
+from service.recordings.folders import place_of
+from service.recordings.index import Found, RecordingCheck, Verdict
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind

@@ -13,7 +13,7 @@ from service.app.stores import has_store, open_store, store_name
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.reference_listing import BearingReferences, bearing_references, text_lines
 from service.cli.units import UnitOption, one_unit
-from service.measuring.reference_setting import (
+from service.measuring.references_in_force import (
     Gaps,
     ReferenceRefusedError,
     doubts,

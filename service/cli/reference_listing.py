@@ -6,7 +6,7 @@ from core.machine.unit import Bearing
 from service.api.bearing_models import ReferenceModel, SetReferenceModel
 from service.api.bearing_views import reference_model, set_reference_model
 from service.api.models import ApiModel
-from service.measuring.references import with_reference
+from service.measuring.references_in_force import with_reference
 from service.store.gap_reference import GapReference
 
 

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from service.measuring.plant_part import PlantPart
+from service.measuring.alarm_engine import PlantPart
 from service.settings.plant import PlantFile
 
 FORM = re.compile(r"([0-9]{1,4})/([0-9]{1,4})")

@@ -1,4 +1,4 @@
-"""Commands as documents: what is done to an alarm, to baselines, or by a new reference."""
+"""What operators and engineers may ask of the measuring side, and the answers."""
 
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -7,9 +7,129 @@ from pydantic import TypeAdapter, ValidationError
 
 from core.alarms import operation
 from core.alarms.operation import Action
-from service.live import film_actions as actions
-from service.live.film_actions import Action as BaselineAction
-from service.live.film_actions import FilmPlace
+from core.machine.unit import Estimator
+from service.store.baseline_versions import Versions
+from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
+
+
+@dataclass(frozen=True)
+class FilmPlace:
+    """One bearing of one unit, by one estimator."""
+
+    unit: str
+    bearing: str
+    estimator: Estimator
+
+
+class BaselineRefusedError(ValueError):
+    """An action does not fit the baselines as they are now; the message says why."""
+
+
+@dataclass(frozen=True)
+class Accept:
+    """Compare the bearing with a version from now on."""
+
+    version: int
+
+
+@dataclass(frozen=True)
+class Reject:
+    """Compare it with that version no longer, and never by itself again."""
+
+    version: int
+
+
+@dataclass(frozen=True)
+class Freeze:
+    """Learn no further."""
+
+
+@dataclass(frozen=True)
+class Thaw:
+    """Learn again."""
+
+
+@dataclass(frozen=True)
+class Renew:
+    """Begin again after a machine event, as an overhaul: older readings count no longer."""
+
+    from_ns: int
+
+
+BaselineAction: TypeAlias = Accept | Reject | Freeze | Thaw | Renew
+
+
+def step_of(
+    action: BaselineAction,
+    place: FilmPlace,
+    versions: Versions,
+    entries: list[BaselineEntry],
+    actor: str,
+    reason: str,
+    now_ns: int,
+) -> StoredStep:
+    """What is to be written if somebody does this now.
+
+    Parameters
+    ----------
+    entries
+        Every baseline of the bearing.
+
+    Raises
+    ------
+    BaselineRefusedError
+        If it does not fit the baselines as they are.
+    """
+
+    def done(step: BaselineStep, version: int | None, from_ns: int | None = None) -> StoredStep:
+        return StoredStep(place.unit, place.bearing, version, step, now_ns, actor, reason, from_ns)
+
+    match action:
+        case Accept(version):
+            _require_acceptable(version, place, versions, entries)
+            return done(BaselineStep.ACCEPTED, version)
+        case Reject(version):
+            _require_version(version, entries)
+            if version in versions.rejected:
+                raise BaselineRefusedError(f"version {version} is rejected already")
+            is_used = version == versions.in_force
+            return done(BaselineStep.WITHDRAWN if is_used else BaselineStep.REJECTED, version)
+        case Freeze():
+            if versions.in_force is None or versions.is_frozen:
+                why = "is frozen already" if versions.is_frozen else "has no baseline in force"
+                raise BaselineRefusedError(f"{place.bearing} {why}")
+            return done(BaselineStep.FROZEN, versions.in_force)
+        case Thaw():
+            if not versions.is_frozen:
+                raise BaselineRefusedError(f"{place.bearing} is not frozen")
+            return done(BaselineStep.THAWED, versions.in_force)
+        case Renew(from_ns):
+            if from_ns > now_ns:
+                raise BaselineRefusedError("a machine event cannot lie in the future")
+            if versions.renewed_ns is not None and from_ns < versions.renewed_ns:
+                raise BaselineRefusedError("there has been a later machine event already")
+            return done(BaselineStep.RENEWED, None, from_ns)
+
+
+def _require_version(version: int, entries: list[BaselineEntry]) -> BaselineEntry:
+    for entry in entries:
+        if entry.version == version:
+            return entry
+    raise BaselineRefusedError(f"there is no version {version}")
+
+
+def _require_acceptable(
+    version: int, place: FilmPlace, versions: Versions, entries: list[BaselineEntry]
+) -> None:
+    entry = _require_version(version, entries)
+    if version == versions.in_force:
+        raise BaselineRefusedError(f"version {version} is in force already")
+    if entry.estimator is not place.estimator:
+        raise BaselineRefusedError(
+            f"version {version} was learned of {entry.estimator}, watched is {place.estimator}"
+        )
+    if versions.renewed_ns is not None and entry.learned_from_ns < versions.renewed_ns:
+        raise BaselineRefusedError(f"version {version} is of before the last machine event")
 
 
 class UnreadableCommandError(Exception):
@@ -52,8 +172,7 @@ _ALARM_ACTIONS: dict[str, type[Any]] = {
     )
 }
 _BASELINE_ACTIONS: dict[str, type[Any]] = {
-    kind.__name__: kind
-    for kind in (actions.Accept, actions.Reject, actions.Freeze, actions.Thaw, actions.Renew)
+    kind.__name__: kind for kind in (Accept, Reject, Freeze, Thaw, Renew)
 }
 _REFERENCE = NewReference.__name__
 _ON_ALARM = {k: TypeAdapter(tuple[str, c]) for k, c in _ALARM_ACTIONS.items()}  # type: ignore[valid-type]
@@ -93,3 +212,15 @@ def read(kind: str, document: str) -> Task:
     except ValidationError as error:
         raise UnreadableCommandError(f"command {kind} cannot be read: {error}") from error
     raise UnreadableCommandError(f"this padwatch knows no command {kind!r}")
+
+
+class NotHereError(Exception):
+    """It exists only in the process that analyses; the message says so."""
+
+
+class NotCarriedOutError(Exception):
+    """What somebody asked for is not done, or not on the disk; the message says which."""
+
+    def __init__(self, title: str, detail: str) -> None:
+        super().__init__(detail)
+        self.title = title

@@ -10,7 +10,7 @@ from core.monitor.catalogue import CATALOGUE
 from core.quality import Quality, Reading, Reason, bad, missing
 from core.samples.blocks import DeviceClock, SampleBlock, StampFault
 from core.samples.gaps import SampleAccount
-from service.live.block_history import BlockHistory
+from service.live.samples import BlockHistory
 
 HELD_S = 10.0
 """How much of the newest samples is held of each unit."""

@@ -7,9 +7,9 @@ from core.alarms.alarm import Alarm
 from core.monitor.assessment import Assessment
 from service.live.live_view import LiveView, UnitStatus
 from service.live.unit_state import BearingState, FilmState, UnitSigns, UnitState
-from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.alarms.service_rules import told_by
-from service.measuring.films.keeper import FilmKeeper
+from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.films import FilmKeeper
+from service.measuring.service_alarms import told_by
 from service.settings.units import UnitSettings
 
 

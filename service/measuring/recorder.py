@@ -1,14 +1,18 @@
-"""Findings on their way to the disk: in order, in batches, retried, never in the way."""
+"""Findings on their way to the store: in order, in batches, tried again."""
 
 import asyncio
+import json
+import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AbstractContextManager, nullcontext, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import partial
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
+import numpy as np
 import structlog
 
 from acquisition.clock import Clock
@@ -17,10 +21,62 @@ from core.change.film_judge import FilmNews
 from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import NO_SPECTRUM
 from service.live.live_view import LiveView
-from service.measuring.parked_rows import ParkedRows
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.store.port import RefusedRowError, Store, StoreError, UnitGap
 from service.store.positions_port import StreamPosition
+
+FILE = "parked.jsonl"
+
+MAX_BYTES = 16_000_000
+"""Of the file; then it is renamed once, and begun anew: a damaged page refuses every result."""
+
+
+class ParkedRows:
+    """One JSON object a line, with the reason; in the data folder, for padwatch's user alone.
+
+    Parameters
+    ----------
+    path
+        Created when something is parked.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def add(self, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
+        """Append rows and why each was refused; on the disk when this returns.
+
+        Raises
+        ------
+        OSError
+            If the disk refuses.
+        """
+        lines = [
+            json.dumps(
+                {"time_ns": time_ns, "reason": reason, "kind": type(row).__name__, "row": row},
+                default=_plain,
+                skipkeys=True,
+            )
+            for row, reason in refused
+        ]
+        if self.path.exists() and self.path.stat().st_size > MAX_BYTES:
+            self.path.replace(self.path.with_name(self.path.name + ".1"))
+        descriptor = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
+        with os.fdopen(descriptor, "a", encoding="ascii") as file:
+            file.write("".join(f"{line}\n" for line in lines))
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value):
+        return {field.name: getattr(value, field.name) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return str(value)
+
 
 log = structlog.get_logger()
 

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import ANNOUNCED, AlarmEvent
-from service.recordings.capture.span import is_captured
+from service.recordings.around_alarms import is_captured
 from service.reports.capture_link import CapturePart, linked
 from service.reports.document import Evidence
 from service.reports.folders import DOCUMENT, Place, kept_since_ns, parsed, places, removed

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import ValidationError
 
 from acquisition.recordings.manifest import MANIFEST
-from service.recordings.capture.folders import ALARM
+from service.recordings.folders import ALARM
 from service.reports.document import FilePart, file_part
 from service.reports.folders import CAPTURE, places
 from service.reports.part import EvidencePart

@@ -9,7 +9,7 @@ from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
 from core.monitor.assessment import Assessment
 from service.live.live_view import LiveView, UnitStatus
-from service.measuring.films.keeper import FilmKeeper
+from service.measuring.films import FilmKeeper
 from service.settings.units import UnitSettings
 
 

@@ -18,7 +18,7 @@ from service.api.auth.people import People
 from service.app.stores import open_store
 from service.cli.access import access_of
 from service.cli.offline.demo.past import fill
-from service.measuring.simulated_lives import simulated_history
+from service.measuring.simulated_sources import simulated_history
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.access.roles import Role

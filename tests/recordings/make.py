@@ -20,7 +20,7 @@ from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from service.app.recordings import recording_writer, replay_source
 from service.cli.offline.reanalysis import assessments
-from service.measuring.simulations import simulated_feed
+from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile

@@ -5,7 +5,7 @@ import heapq
 
 import numpy as np
 
-from service.measuring.connect_gate import ConnectGate
+from service.measuring.acquirer import ConnectGate
 
 PER_S = 50.0
 POLL_S = 0.5

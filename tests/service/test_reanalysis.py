@@ -22,7 +22,7 @@ from service.cli.offline.reanalysis import (
     assessments,
     calibration_differences,
 )
-from service.measuring.simulations import simulated_feed
+from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.units import UnitSettings
 

@@ -14,13 +14,15 @@ from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.quality import Reading, Reason, missing, uncertain
-from service.measuring.reference_setting import (
+from service.measuring.references_in_force import (
+    LOOK_EVERY_S,
     ReferenceRefusedError,
+    ReferencesInForce,
     doubts,
     given_gaps,
     measured_gaps,
+    with_reference,
 )
-from service.measuring.references import LOOK_EVERY_S, ReferencesInForce, with_reference
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoredReadings, StoreError
 from service.store.sqlite import SqliteStore

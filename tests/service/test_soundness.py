@@ -12,9 +12,8 @@ import pytest
 from core.limits import AlarmLevel
 from core.monitor.assessment import Assessment
 from service.live.live_view import LiveView
-from service.measuring.alarms.health import ServiceHealth
-from service.measuring.alarms.service_alarms import ServiceAlarms
-from service.measuring.metrics.kept import soundness_metrics
+from service.measuring.counters import soundness_metrics
+from service.measuring.service_alarms import ServiceAlarms, ServiceHealth
 from service.measuring.soundness import LOOK_EVERY_S, Soundness
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError, TrendQuery

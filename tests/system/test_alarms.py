@@ -15,7 +15,7 @@ from acquisition.recordings.reader import open_recording
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
 from acquisition.simulated.feed import SampleFeed
-from service.measuring.simulations import simulated_feed
+from service.measuring.simulated_sources import simulated_feed
 from service.settings.loading import load_plant_file
 
 from .conftest import WIRE, Start

@@ -19,7 +19,7 @@ from core.monitor.catalogue import BY_NAME
 from core.monitor.monitor import UnitMonitor
 from core.quality import Level, Reason, bad, missing
 from core.stiffness.estimators import ESTIMATORS, is_reversed
-from service.measuring.simulations import scenario_of
+from service.measuring.simulated_sources import scenario_of
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile

@@ -11,7 +11,7 @@ from harness.recordings_ledger import Recorded, promised, recorded
 from harness.service_rig import ServiceRig, until
 from harness.summary import Torture, planted
 
-from service.recordings.continuous.joining import clear_unfinished, join, unjoined
+from service.recordings.segment import clear_unfinished, join, unjoined
 
 N_CYCLES, N_FEW, N_PLANTED = 50, 2, 4
 SYNC_S = 1.0

@@ -6,7 +6,7 @@ import structlog
 
 from acquisition.clock import Clock
 from service.api.load.strain import Load, LoadLimits, Refused, Strain, advance
-from service.measuring.bus import Bus
+from service.measuring.acquirer import Bus
 from service.runtime.heartbeats import UNHEARD, Pulse
 
 log = structlog.get_logger()

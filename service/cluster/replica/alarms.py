@@ -4,10 +4,9 @@ from collections.abc import Callable, Iterable, Sequence
 
 from core.alarms.alarm import PLANT, Alarm
 from core.alarms.statistics import ChatterRule
-from service.live.alarm_count import AlarmCount, count_of
+from service.live.alarm_board import AlarmCount, count_of
 from service.live.unit_state import UnitState
-from service.measuring.alarms.gone_alarms import SHARED, is_shared
-from service.measuring.alarms.service_rules import told_by
+from service.measuring.service_alarms import SHARED, is_shared, told_by
 
 
 class ReplicaAlarms:

@@ -6,7 +6,7 @@ from core.baseline.baseline import BearingBaseline
 from core.change.decision import INITIAL_DECISION
 from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
-from service.live.film_actions import FilmPlace
+from service.live.commands import FilmPlace
 from service.live.unit_state import UnitState
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.film_rules import film_rules_of

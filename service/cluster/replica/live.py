@@ -11,10 +11,10 @@ from core.quality import Reason, bad, missing
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import NO_SPECTRUM
 from service.cluster.replica.delays import Delays
-from service.live.elsewhere import NotHereError
+from service.live.commands import NotHereError
 from service.live.live_view import CurrentBearing, LinkState, UnitStatus
 from service.live.unit_state import BearingState, UnitSigns
-from service.measuring.alarms.gone_alarms import SHARED
+from service.measuring.service_alarms import SHARED
 
 SILENT_AFTER_S = 5.0
 """Reports come every second: who misses several of them is not there, or not reached."""

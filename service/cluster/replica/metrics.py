@@ -16,8 +16,7 @@ from service.cluster.replica.deliveries import ReplicaDeliveries
 from service.cluster.replica.films import ReplicaFilms
 from service.cluster.replica.live import ReplicaLive
 from service.live.live_view import LinkState
-from service.measuring.metrics.judged import alarm_metrics, film_metrics
-from service.measuring.metrics.kept import store_info
+from service.measuring.counters import alarm_metrics, film_metrics, store_info
 from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import ReceiverView
 from service.runtime.families import gauge

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from acquisition.clock import Clock
 from service.live.live_view import LiveView
 from service.live.unit_state import UnitSigns, UnitState, packed_state, written_signs
-from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.alarms.gone_alarms import SHARED, is_shared
-from service.measuring.alarms.service_rules import told_by
+from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.describing import alarm_state, plant_signs, unit_signs, unit_state
-from service.measuring.films.keeper import FilmKeeper
+from service.measuring.films import FilmKeeper
+from service.measuring.service_alarms import SHARED, is_shared, told_by
 from service.runtime.background import TroubleLog
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.units import UnitSettings

@@ -2,7 +2,7 @@
 
 from pydantic import TypeAdapter, ValidationError
 
-from service.measuring.unit_memory import VERSION, UnitMemory
+from service.measuring.analyser import VERSION, UnitMemory
 
 _MEMORY = TypeAdapter(UnitMemory)
 

@@ -9,17 +9,13 @@ from acquisition.clock import Clock
 from core.samples.blocks import BlockMisfitError, SampleBlock
 from core.samples.gaps import Reach
 from core.units import s_from_ns
-from service.cluster.stream.identity import UnitIdentity
+from service.cluster.frames import Taken, UnitIdentity, WireError, decoded, require_possible
 from service.cluster.stream.memory import written
-from service.cluster.stream.possible import require_possible
 from service.cluster.stream.window import Window
-from service.cluster.stream.wire import Taken, decoded
-from service.cluster.stream.wire_errors import WireError
 from service.live.live_view import LinkState, LiveView
-from service.measuring.analysing import Analyser
-from service.measuring.link_news import LinkNews
+from service.measuring.acquirer import LinkNews
+from service.measuring.analyser import Analyser, UnitMemory
 from service.measuring.recorder import Findings, Recorder
-from service.measuring.unit_memory import UnitMemory
 from service.store.positions_port import StreamPosition
 
 log = structlog.get_logger()

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import structlog
 
 from service.cluster.stream.memory import read
-from service.measuring.unit_memory import UnitMemory
+from service.measuring.analyser import UnitMemory
 from service.store.positions_port import StreamPosition
 
 log = structlog.get_logger()

@@ -11,7 +11,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.units import DAY_NS, NS_PER_S
-from service.recordings.keeping.folders import (
+from service.recordings.folders import (
     being_removed,
     empty,
     finish_removal,
@@ -20,12 +20,10 @@ from service.recordings.keeping.folders import (
     put_out_of_sight,
     set_aside,
 )
+from service.recordings.index import Index, Unread, again, inspected
 from service.recordings.keeping.gauge import Gauge
-from service.recordings.keeping.index import Index
-from service.recordings.keeping.inspection import again, inspected
 from service.recordings.keeping.room import Bound, RoomLimits, make_room
 from service.recordings.keeping.troubles import Troubles
-from service.recordings.keeping.unread import Unread
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
 
 log = structlog.get_logger()

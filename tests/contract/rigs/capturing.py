@@ -18,8 +18,7 @@ from core.machine.channel import Measurand
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
 from rigs.standing_clock import StandingClock
-from service.recordings.capture.captures import Captures
-from service.recordings.capture.span import CaptureSettings
+from service.recordings.around_alarms import Captures, CaptureSettings
 
 RATE_HZ = 50.0
 BLOCK = 10

@@ -37,9 +37,8 @@ from core.limits import AlarmLevel, Judgement, unknown
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
 from service.live.live_view import LiveView
-from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.parked_rows import FILE, ParkedRows
-from service.measuring.recorder import Findings, Recorder
+from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.recorder import FILE, Findings, ParkedRows, Recorder
 from service.store.port import AlarmQuery
 from service.store.sqlite import SqliteStore
 

@@ -15,12 +15,9 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel
 from core.samples.gaps import SampleAccount
 from service.live.live_view import LiveView
-from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.alarms.health import ServiceHealth
-from service.measuring.alarms.service_alarms import ServiceAlarms
-from service.measuring.alarms.service_rules import ServiceRules
-from service.measuring.parked_rows import FILE, ParkedRows
-from service.measuring.recorder import Findings, Recorder
+from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.recorder import FILE, Findings, ParkedRows, Recorder
+from service.measuring.service_alarms import ServiceAlarms, ServiceHealth, ServiceRules
 from service.store.port import AlarmQuery
 from service.store.sqlite import SqliteStore
 

@@ -11,10 +11,9 @@ from core.alarms.alarm import Alarm
 from core.alarms.operation import Acknowledge
 from service.cluster.silent_units import SILENT_AFTER_S, SilentUnits
 from service.live.live_view import LiveView
-from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.alarms.gone_alarms import identity_of
-from service.measuring.parked_rows import ParkedRows
-from service.measuring.recorder import Recorder
+from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.recorder import ParkedRows, Recorder
+from service.measuring.service_alarms import identity_of
 from service.store.sqlite import SqliteStore
 from service.store.unit_states_port import UnitReport
 

@@ -35,17 +35,14 @@ from service.app.evidence import (
     watch,
 )
 from service.live.live_view import LinkState, LiveView
-from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.alarms.start import alarm_engine
-from service.measuring.films.keeper import FilmKeeper
-from service.measuring.films.start import film_keeper
-from service.measuring.in_process import InProcess
-from service.measuring.parked_rows import FILE, ParkedRows
-from service.measuring.recorder import Recorder
-from service.measuring.references import ReferencesInForce
-from service.measuring.simulations import simulated_feed
+from service.measuring.alarm_engine import AlarmEngine, alarm_engine
+from service.measuring.commands import InProcess
+from service.measuring.films import FilmKeeper, film_keeper
+from service.measuring.recorder import FILE, ParkedRows, Recorder
+from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.simulated_sources import simulated_feed
 from service.notifications.sender import Deliveries
-from service.recordings.capture.file import CaptureFile
+from service.recordings.segment import CaptureFile
 from service.reports.desk import EvidenceDesk
 from service.reports.keeper import EvidenceKeeper
 from service.settings.core_values import analysis_of, calibration_of, machine_of

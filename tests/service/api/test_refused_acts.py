@@ -10,7 +10,7 @@ import pytest
 from rigs.probes import ACKNOWLEDGE, ALARMS, ANNA, SHELVE, Probes, post
 
 from core.quality import Reason
-from service.measuring import in_process
+from service.measuring import commands as in_process
 
 WRONG_BODIES: list[tuple[str, Any, str]] = [
     (ACKNOWLEDGE, {"actor": "A. Name"}, "occurrence"),

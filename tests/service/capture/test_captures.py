@@ -9,8 +9,7 @@ import pytest
 from rigs.capturing import SECOND, T0, block, numbers, raised, running, samples
 
 from core.alarms.alarm import AlarmNews
-from service.recordings.capture.outcome import Outcome
-from service.recordings.capture.span import CaptureSettings
+from service.recordings.around_alarms import CaptureSettings, Outcome
 
 
 @pytest.mark.parametrize(

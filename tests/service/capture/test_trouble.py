@@ -6,8 +6,8 @@ import pytest
 from rigs.capturing import BLOCK, SETTINGS, Rig, numbers, raised, running, samples
 
 from acquisition.recordings.writer import RecordingWriter
-from service.recordings.capture import captures as module
-from service.recordings.capture.outcome import Outcome
+from service.recordings import around_alarms as module
+from service.recordings.around_alarms import Outcome
 
 
 async def test_a_link_that_is_lost_leaves_a_finished_capture_after_a_while(root: Path) -> None:

@@ -10,7 +10,7 @@ from rigs.command_line import padwatch
 from core.machine.unit import Estimator
 from service.cli import demo
 from service.cli.daq_process import RunningDaq
-from service.measuring.simulated_lives import simulated_history
+from service.measuring.simulated_sources import simulated_history
 from service.settings.plant import PlantFile
 from service.store.baseline_versions import versions_after
 from service.store.film_port import FilmQuery

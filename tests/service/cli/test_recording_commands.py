@@ -19,7 +19,7 @@ from core.samples.blocks import SampleBlock
 from service.app.recordings import recording_of, recording_source, recording_writer, selection_of
 from service.cli.offline.reanalysis import assessment_model, assessments
 from service.cli.record import Patience, record_blocks
-from service.measuring.simulations import simulated_feed as feed_of
+from service.measuring.simulated_sources import simulated_feed as feed_of
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile

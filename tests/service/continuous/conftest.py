@@ -11,8 +11,7 @@ from rigs.capturing import Rig, block
 from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.manifest import RecordedUnit
-from service.recordings.continuous.pieces import Shed, TapeSettings
-from service.recordings.continuous.tape import Tape
+from service.recordings.continuous_recorder import Shed, Tape, TapeSettings
 
 SETTINGS = TapeSettings(stretch_s=10.0, part_s=2.0)
 

@@ -11,10 +11,10 @@ from acquisition.recordings.reader import open_recording
 from acquisition.recordings.summary import summary_of
 from service.app import pressure
 from service.app.pressure import Pressure
-from service.measuring.bus import Bus
-from service.recordings.continuous import tape, unit_tape
-from service.recordings.continuous.last import last_end
-from service.recordings.continuous.pieces import Shed
+from service.measuring.acquirer import Bus
+from service.recordings import continuous_recorder as tape
+from service.recordings import continuous_recorder as unit_tape
+from service.recordings.continuous_recorder import Shed, last_end
 
 
 async def test_every_sample_is_in_recordings_that_end_at_full_multiples_of_their_length(

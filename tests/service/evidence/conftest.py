@@ -16,8 +16,7 @@ from core.quality import Reading
 from service.app.captures import captures_of
 from service.app.evidence import evidence_folders, evidence_of
 from service.live.live_view import LinkState, LiveView
-from service.measuring.films.keeper import FilmKeeper
-from service.measuring.films.start import film_keeper
+from service.measuring.films import FilmKeeper, film_keeper
 from service.reports.archive import EvidenceArchive
 from service.reports.capture_link import CapturePart, linked
 from service.settings.core_values import machine_of

@@ -12,9 +12,9 @@ import pytest
 from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import AlarmEvent
 from core.quality import Reading
-from service.recordings.capture.file import _write_alarms
-from service.recordings.capture.folders import ALARM
-from service.recordings.capture.outcome import Outcome
+from service.recordings.around_alarms import Outcome
+from service.recordings.folders import ALARM
+from service.recordings.segment import _write_alarms
 from service.reports import keeper as module
 from service.reports.archive import DamagedEvidenceError
 from service.reports.document import Evidence

@@ -15,7 +15,7 @@ from core.change.settings import FilmRules
 from core.condition.cells import CellGrid
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Estimator, Unit
-from service.live.film_actions import (
+from service.live.commands import (
     Accept,
     BaselineRefusedError,
     FilmPlace,
@@ -24,7 +24,7 @@ from service.live.film_actions import (
     Renew,
     Thaw,
 )
-from service.measuring.films.keeper import FilmKeeper
+from service.measuring.films import FilmKeeper
 from service.settings.film_alarms import FilmAlarmSettings
 from service.store.film_port import BaselineStep, FilmHistory, FilmQuery
 from service.store.sqlite import SqliteStore

@@ -12,7 +12,7 @@ from service.api.load.questions import question
 from service.api.load.shedding import Shedding
 from service.api.load.strain import LoadLimits, Refused, Strain, advance
 from service.api.load.watch import N_LOOKS, LoadWatch
-from service.measuring.bus import Bus
+from service.measuring.acquirer import Bus
 
 NOTHING, HISTORY, VIEWS = Refused
 

@@ -21,9 +21,8 @@ from core.samples.blocks import DeviceClock, Rejection, SampleBlock
 from core.samples.gaps import SampleAccount
 from service.api.http.listening import listen
 from service.app.program import Performance, run_service
-from service.measuring.simulations import simulated_feed
-from service.measuring.sources import monitor_of
-from service.measuring.watched_unit import WatchedUnit
+from service.measuring.simulated_sources import simulated_feed
+from service.measuring.sources import WatchedUnit, monitor_of
 from service.runtime.polls import TimedSource
 from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file

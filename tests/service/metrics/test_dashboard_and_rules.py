@@ -12,8 +12,8 @@ import pytest
 import yaml
 from prometheus_client.metrics_core import Metric
 
+from service.cluster.consumer import consumer_metrics
 from service.cluster.replica.metrics import unit_metrics as replica_unit_metrics
-from service.cluster.stream.consumer_metrics import consumer_metrics
 from service.live.live_view import LinkState
 
 DEPLOY = Path(__file__).parents[3] / "deploy"

@@ -10,8 +10,8 @@ import pytest
 
 from acquisition.clock import Clock
 from core.samples.blocks import SampleBlock
-from service.measuring.metrics.acquired import MAX_REASONS, bounded
-from service.measuring.metrics.timings import Timings
+from service.measuring.counters import MAX_REASONS, bounded
+from service.measuring.timings import Timings
 from service.runtime.durations import Durations
 from service.runtime.heartbeats import Unheard
 from service.runtime.polls import PollClock, TimedSource

@@ -10,7 +10,7 @@ from core.arrays import FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from core.quality import Reading
-from service.live.shaft_stretch import ShaftStretch
+from service.live.samples import ShaftStretch
 from service.recordings.motion import ShaftMotion, motion_of
 
 RATE_HZ, TURN_HZ, N = 600.0, 1.5, 6000

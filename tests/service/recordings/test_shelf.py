@@ -7,7 +7,7 @@ import pytest
 from rigs.capturing import block, recorded_unit
 
 from acquisition.recordings.writer import RecordingWriter
-from service.recordings.shelf import Shelf
+from service.recordings.library import Shelf
 from service.store.waveform_port import WaveformKind
 
 FIRST = "U1-20260101T000000.000Z-continuous"

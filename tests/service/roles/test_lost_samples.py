@@ -10,9 +10,8 @@ from core.alarms.statistics import ChatterRule
 from core.limits import AlarmLevel
 from service.cluster.partition import Partition
 from service.cluster.replica.alarms import ReplicaAlarms
-from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.alarms.health import ServiceHealth
-from service.measuring.alarms.start import alarm_engine
+from service.measuring.alarm_engine import AlarmEngine, alarm_engine
+from service.measuring.service_alarms import ServiceHealth
 from service.settings.loading import load_plant_file
 from service.settings.origin import Origin
 from service.store.sqlite import SqliteStore

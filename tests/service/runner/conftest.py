@@ -22,15 +22,13 @@ from core.quality import GOOD
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import Reach
 from service.live.live_view import LiveView
-from service.measuring.alarms.engine import AlarmEngine
-from service.measuring.films.keeper import FilmKeeper
-from service.measuring.parked_rows import FILE, ParkedRows
-from service.measuring.recorder import Recorder
-from service.measuring.runner import Runner
-from service.measuring.watched_unit import WatchedUnit
-from service.recordings.capture.captures import Captures
-from service.recordings.capture.file import MakeWriter
-from service.recordings.capture.span import CaptureSettings
+from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.analyser import Runner
+from service.measuring.films import FilmKeeper
+from service.measuring.recorder import FILE, ParkedRows, Recorder
+from service.measuring.sources import WatchedUnit
+from service.recordings.around_alarms import Captures, CaptureSettings
+from service.recordings.segment import MakeWriter
 from service.settings.film_alarms import FilmAlarmSettings
 from service.store.sqlite import SqliteStore
 

@@ -10,8 +10,7 @@ import structlog
 from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
 from service.live.live_view import LinkState
-from service.measuring.acquiring import CONNECTS_PER_S
-from service.measuring.bus import Bus
+from service.measuring.acquirer import CONNECTS_PER_S, Bus
 
 Make = Callable[..., Any]
 

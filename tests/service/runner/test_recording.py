@@ -26,10 +26,9 @@ from core.samples.gaps import Gap
 from service.api.app import create_app
 from service.api.context import Context
 from service.measuring import recorder as recording
-from service.measuring.in_process import InProcess
-from service.measuring.parked_rows import FILE, ParkedRows
-from service.measuring.recorder import Findings, NotStoredError, Recorder
-from service.measuring.references import ReferencesInForce
+from service.measuring.commands import InProcess
+from service.measuring.recorder import FILE, Findings, NotStoredError, ParkedRows, Recorder
+from service.measuring.references_in_force import ReferencesInForce
 from service.notifications.sender import Deliveries
 from service.store.port import TrendQuery, UnitGap
 

@@ -19,8 +19,7 @@ from core.limits import Limits
 from core.machine.unit import Bearing
 from core.monitor.catalogue import CATALOGUE
 from service.app.captures import captures_of
-from service.measuring.alarms.health import ServiceHealth
-from service.measuring.alarms.service_rules import ServiceRules
+from service.measuring.service_alarms import ServiceHealth, ServiceRules
 from service.settings.alarm_kinds import ALARM_KINDS, SERVICE_KINDS
 from service.settings.alarm_rules import chatter_rule_of, references_of, rules_of
 from service.settings.origin import Origin

@@ -13,7 +13,7 @@ from acquisition.clock import SystemClock
 from acquisition.delivery.calibration import calibrate
 from core.machine.channel import Measurand
 from core.monitor.monitor import UnitMonitor
-from service.measuring.simulations import simulated_feed
+from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import PlantFileError, load_plant_file
 from service.settings.plant import PlantFile

@@ -13,7 +13,7 @@ from rigs.memory_folder import memory_folder, path_in_memory  # noqa: F401 - a f
 
 from core.quality import GOOD, Reading, Reason, missing, uncertain
 from core.samples.blocks import DeviceClock, Rejection, SampleBlock, StampFault
-from service.cluster.stream.identity import UnitIdentity, fingerprint
+from service.cluster.frames import UnitIdentity, fingerprint
 
 SHORT = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)
 T0 = 1_767_225_600_123_456_789

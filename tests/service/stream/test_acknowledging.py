@@ -27,9 +27,9 @@ from nats.aio.msg import Msg
 from nats.js.errors import NotFoundError
 
 from service.app.stores import open_store
-from service.cluster.stream import consumer as consuming
-from service.cluster.stream.consumer import Consumer
-from service.cluster.stream.names import consumer_name, stream_name, subject
+from service.cluster import consumer as consuming
+from service.cluster.consumer import Consumer
+from service.cluster.session import consumer_name, stream_name, subject
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.port import StoreError

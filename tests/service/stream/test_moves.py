@@ -22,9 +22,9 @@ from core.quality import GOOD, Quality, Reading, Reason, bad, uncertain
 from core.samples.axis import RECOUNTED_EPOCHS
 from core.samples.blocks import Rejection, SampleBlock
 from core.units import NS_PER_S
-from service.cluster.stream.wire import encoded_block, encoded_link
+from service.cluster.frames import encoded_block, encoded_link
 from service.live.live_view import LinkState
-from service.measuring.link_news import LinkNews
+from service.measuring.acquirer import LinkNews
 from service.settings.units import UnitSettings
 
 LEDGER = LedgerPlant(n_units=1, load=1.0, segment_samples=1024, n_segments=3)

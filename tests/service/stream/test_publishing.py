@@ -15,13 +15,18 @@ from nats.js.client import JetStreamContext
 from acquisition.clock import SystemClock
 from core.quality import GOOD
 from core.samples.blocks import SampleBlock
-from service.cluster.stream.errors import StreamError, StreamMisfitError
-from service.cluster.stream.names import identity_of, stream_name, subject
-from service.cluster.stream.publisher import Publisher
-from service.cluster.stream.session import session
-from service.cluster.stream.wire import Taken, decoded
+from service.cluster.frames import Taken, decoded
+from service.cluster.publisher import Publisher
+from service.cluster.session import (
+    StreamError,
+    StreamMisfitError,
+    identity_of,
+    session,
+    stream_name,
+    subject,
+)
 from service.live.live_view import LinkState
-from service.measuring.link_news import LinkNews
+from service.measuring.acquirer import LinkNews
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
 

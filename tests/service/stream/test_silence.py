@@ -13,8 +13,8 @@ from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import Life, Message, MovingUnit
 from harness.stream_rig import analysing, blocks
 
-from service.cluster.stream.silence import Silence, silences_s
-from service.cluster.stream.wire import encoded_block
+from service.cluster.frames import encoded_block
+from service.cluster.silent_units import Silence, silences_s
 from service.live.live_view import LinkState
 from service.settings.loading import load_plant_file
 from service.store.port import AlarmQuery

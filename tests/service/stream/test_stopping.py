@@ -8,10 +8,9 @@ import pytest
 from nats.aio.client import Client
 
 from acquisition.clock import SystemClock
-from service.cluster.stream.consumer import Consumer
-from service.cluster.stream.identity import UnitIdentity
-from service.cluster.stream.outbound import Outgoing
-from service.cluster.stream.publisher import Publisher
+from service.cluster.consumer import Consumer
+from service.cluster.frames import UnitIdentity
+from service.cluster.publisher import Outgoing, Publisher
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
 

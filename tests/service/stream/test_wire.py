@@ -10,11 +10,17 @@ from hypothesis import strategies as st
 
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
-from service.cluster.stream.identity import UnitIdentity, fingerprint
-from service.cluster.stream.wire import Taken, decoded, encoded_block, encoded_link
-from service.cluster.stream.wire_errors import WireError
+from service.cluster.frames import (
+    Taken,
+    UnitIdentity,
+    WireError,
+    decoded,
+    encoded_block,
+    encoded_link,
+    fingerprint,
+)
 from service.live.live_view import LinkState
-from service.measuring.link_news import LinkNews
+from service.measuring.acquirer import LinkNews
 
 OWN = UnitIdentity("U1", fingerprint("Plant"), fingerprint("sx"))
 TAKEN_NS = 1_767_225_600_000_000_007

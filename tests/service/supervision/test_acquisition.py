@@ -12,8 +12,8 @@ from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
 from service.app.supervision import Supervision
 from service.live.live_view import LinkState, LiveView
-from service.measuring.acquiring import Acquirer
-from service.measuring.watched_unit import WatchedUnit
+from service.measuring.acquirer import Acquirer
+from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats
 from service.runtime.polls import TimedSource
 from service.runtime.service_manager import ServiceManager

@@ -13,9 +13,9 @@ from acquisition.delivery.calibration import RawBlock
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand
+from service.recordings.index import Index
 from service.recordings.keeping.caretaker import Caretaker, Custody
 from service.recordings.keeping.gauge import Gauge
-from service.recordings.keeping.index import Index
 from service.recordings.keeping.keeper import WaveformKeeper
 from service.recordings.keeping.room import RoomLimits
 from service.recordings.keeping.watch_keeping import WatchKeeping

@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from service.recordings.keeping.folders import put_out_of_sight
-from service.recordings.keeping.inspection import again
-from service.recordings.keeping.place import place_of
+from service.recordings.folders import place_of, put_out_of_sight
+from service.recordings.index import again
 from service.store.waveform_port import WaveformKind, WaveformState
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from service.app.service_health import health_of
-from service.recordings.shelf import Shelf
+from service.recordings.library import Shelf
 from service.runtime.space.disk import DiskSpace
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState

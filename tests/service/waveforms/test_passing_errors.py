@@ -10,10 +10,9 @@ from harness.corruption import CHANGES, corrupted
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.reader import open_recording
-from service.recordings.keeping import inspection
-from service.recordings.keeping.check import Found, RecordingCheck
-from service.recordings.keeping.unread import AGAIN_S
-from service.recordings.shelf import Shelf
+from service.recordings import index as inspection
+from service.recordings.index import AGAIN_S, Found, RecordingCheck
+from service.recordings.library import Shelf
 from service.store.waveform_port import WaveformKind, WaveformState
 
 CONTINUOUS = WaveformKind.CONTINUOUS

@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.can.source import CanSource
 from acquisition.simulated.devices.can_shape import daq_dbc
-from service.measuring.simulations import simulated_feed
+from service.measuring.simulated_sources import simulated_feed
 from service.settings.can import CanSettings
 from service.settings.can_devices import can_daq_of, can_settings_of, can_shape_of
 from service.settings.core_values import calibration_of

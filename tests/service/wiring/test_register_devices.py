@@ -16,16 +16,16 @@ from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.app.register_daqs import fifo_device, modbus_server, polled_device, vector_device
 from service.cli.offline.probes import link_settings_of
-from service.measuring.registers import (
+from service.measuring.simulated_sources import simulated_feed
+from service.measuring.sources import (
     at_poll_rate,
     fifo_source,
     polled_settings,
     polled_source,
+    retry_s,
     vector_monitor,
     vector_source,
 )
-from service.measuring.simulations import simulated_feed
-from service.measuring.sources import retry_s
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file
 from service.settings.modbus_sources import (

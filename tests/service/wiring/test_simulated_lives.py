@@ -17,8 +17,7 @@ from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.units import NS_PER_S
-from service.measuring.simulated_lives import simulated_history
-from service.measuring.simulations import scenario_of, simulated_feed
+from service.measuring.simulated_sources import scenario_of, simulated_feed, simulated_history
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import PlantFileError, load_plant_file
 from service.settings.plant import PlantFile

@@ -22,10 +22,12 @@ from core.samples.ring import Ring
 from core.units import NS_PER_S
 from harness.open_program import main
 from service.live.live_view import LiveView
-from service.measuring.alarms.engine import AlarmEngine
+from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.recorder import Findings, Recorder
-from service.recordings.continuous import joining, tape, unit_tape
-from service.recordings.continuous.stretch import Stretch
+from service.recordings import continuous_recorder as tape
+from service.recordings import continuous_recorder as unit_tape
+from service.recordings import segment as joining
+from service.recordings.segment import Stretch
 from service.store import sql_store
 
 SLOW_S = 1.5

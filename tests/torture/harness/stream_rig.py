@@ -22,15 +22,14 @@ from service.app.analyse_program import Analysing
 from service.app.analysis import analysis_on
 from service.app.ground import Ground, live_view
 from service.app.stores import open_store
+from service.cluster.frames import Taken, decoded
 from service.cluster.partition import Partition
-from service.cluster.stream.names import identity_of, stream_name, subject
-from service.cluster.stream.publisher import Publisher
-from service.cluster.stream.wire import Taken, decoded
+from service.cluster.publisher import Publisher
+from service.cluster.session import identity_of, stream_name, subject
 from service.live.live_view import LinkState
-from service.measuring.bus import Bus
-from service.measuring.link_news import LinkNews
-from service.measuring.metrics.timings import Timings
+from service.measuring.acquirer import Bus, LinkNews
 from service.measuring.sources import monitor_of
+from service.measuring.timings import Timings
 from service.notifications.message import Around
 from service.runtime.heartbeats import Heartbeats
 from service.settings.loading import load_plant_file

@@ -24,7 +24,7 @@ from core.condition.operating_state import OperatingLimits
 from service.cli.offline.back_test.file_columns import ReadingsError
 from service.cli.offline.back_test.histories import BearingRows, Place
 from service.cli.offline.back_test.periods import Learning, MachineEvent, Period, periods_of
-from service.measuring.films.learning import drifted
+from service.measuring.baseline_learning import drifted
 
 _Bools = npt.NDArray[np.bool_]
 

@@ -16,8 +16,8 @@ from service.api.auth.passwords import Hashing
 from service.api.auth.people import create_key
 from service.app.scrape import scrape
 from service.app.watched import Watched
-from service.measuring.bus import Bus
-from service.measuring.metrics.timings import Timings
+from service.measuring.acquirer import Bus
+from service.measuring.timings import Timings
 from service.store.access.roles import Role
 
 PASSWORD = "the river is high in may"  # noqa: S105

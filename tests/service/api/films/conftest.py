@@ -14,9 +14,9 @@ from core.change.film_judge import FilmNews
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Quality, Reading
-from service.live.film_actions import FilmPlace
+from service.live.commands import FilmPlace
 from service.live.live_view import LinkState
-from service.measuring.films.learning import Learner
+from service.measuring.baseline_learning import Learner
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore

@@ -9,7 +9,7 @@ import pytest
 from harness.waiting import at_work
 
 from core.alarms.operation import Comment
-from service.cluster.replica.asking import WAIT_S, Asking
+from service.cluster.reported_commands import WAIT_S, Asking
 from service.live.commands import OnAlarm, read, written
 from service.store.commands_port import Answer, Command, CommandState
 from service.store.port import AlarmQuery
@@ -21,8 +21,8 @@ ANNA = {"actor": "A. Name"}
 @pytest.fixture
 async def answered(pair: Any, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Any]:
     """The process that analyses looks for commands; there is time enough by the set clock."""
-    monkeypatch.setattr("service.cluster.replica.asking.WAIT_S", 1e12)
-    monkeypatch.setattr("service.cluster.replica.asking.EXPIRES_S", 1e9)
+    monkeypatch.setattr("service.cluster.reported_commands.WAIT_S", 1e12)
+    monkeypatch.setattr("service.cluster.reported_commands.EXPIRES_S", 1e9)
     async with at_work(pair.carrying_out.run()):
         yield pair
 

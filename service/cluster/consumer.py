@@ -1,0 +1,250 @@
+"""Blocks from the stream to the analysis, acknowledged once stored."""
+
+import asyncio
+from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+
+import structlog
+from nats.aio.msg import Msg
+from nats.errors import Error
+from nats.errors import TimeoutError as NatsTimeoutError
+from nats.js.api import AckPolicy, ConsumerConfig, DeliverPolicy
+from nats.js.client import JetStreamContext
+from nats.js.errors import NotFoundError
+from prometheus_client.metrics_core import Metric
+
+from acquisition.clock import Clock
+from acquisition.delivery.network import let_stop_through
+from service.cluster.session import (
+    StreamAnewError,
+    StreamError,
+    StreamMisfitError,
+    consumer_name,
+    require,
+    session,
+    stream_name,
+    subject,
+)
+from service.cluster.stream.progress import UnitProgress
+from service.measuring.recorder import Findings, Recorder
+from service.runtime.families import counter, gauge
+from service.runtime.heartbeats import UNHEARD, Pulse
+from service.settings.plant import PlantFile
+from service.settings.stream import StreamSettings
+
+log = structlog.get_logger()
+
+RETRY_S = 1.0
+MISFIT_RETRY_S = 5.0
+
+FETCH_S = 5.0
+REST_S = 1.0
+BATCH = 32
+"""Most messages of a unit that one acknowledgement waits for."""
+
+MAX_UNACKNOWLEDGED = 256
+ACK_WAIT_S = 60.0
+
+Begin = Callable[[str, int], Awaitable[Mapping[str, UnitProgress]]]
+"""Makes the progress of all units on a stream: its name with its birth, its newest message."""
+
+
+class Consumer:
+    """Feeds units from the stream.
+
+    What is taken in is never left half done: connections come and go beside it.
+
+    Parameters
+    ----------
+    begin
+        Called when it is known which stream it is; once, unless the stream was made anew.
+    """
+
+    def __init__(
+        self,
+        plant: PlantFile,
+        settings: StreamSettings,
+        begin: Begin,
+        recorder: Recorder,
+        clock: Clock,
+    ) -> None:
+        self._plant, self._settings, self._clock = plant, settings, clock
+        self._begin, self._recorder = begin, recorder
+        self.units: Mapping[str, UnitProgress] = {}
+        self._stream: str | None = None
+        self._queues: dict[str, asyncio.Queue[Msg]] = {}
+        self._fetched: dict[str, int] = {}
+        self._settled: dict[str, int] = {}
+        self.trouble: str | None = "the servers have not been reached yet"
+        self.n_pending: dict[str, int] = {}
+
+    @property
+    def waiting(self) -> frozenset[str]:
+        """Units of which messages wait here to be taken in, as while nothing can be stored."""
+        return frozenset(unit for unit, queue in self._queues.items() if not queue.empty())
+
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
+        """Feed for ever, over one connection after the other."""
+        async with asyncio.TaskGroup() as tasks:
+            while True:
+                pulse.rest()
+                try:
+                    async with session(self._settings, "padwatch analyse") as stream:
+                        await self._know(stream, tasks)
+                        await self._fetch_all(stream)
+                except StreamError as error:
+                    self._note(str(error))
+                    is_misfit = isinstance(error, StreamMisfitError)
+                    await self._clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
+
+    async def _know(self, stream: JetStreamContext, tasks: asyncio.TaskGroup) -> None:
+        """Find out which stream it is, and where each unit goes on."""
+        found = await require(stream, self._plant)
+        state = (await stream.stream_info(stream_name(self._plant))).state
+        newest = max(self._fetched.values(), default=0)
+        if self._stream not in (None, found) or state.last_seq < newest:
+            raise StreamAnewError(
+                "the stream was made anew, or has lost what it had confirmed, while it was read:"
+                " start `padwatch analyse` again"
+            )
+        if self._stream is None:
+            self.units = await self._begin(found, state.last_seq)
+            self._stream = found
+            self._fetched = {
+                unit: min(its.first_needed - 1, state.last_seq) for unit, its in self.units.items()
+            }
+            for unit in self.units:
+                self._queues[unit] = asyncio.Queue(BATCH)
+                tasks.create_task(self._take_all(unit), name=f"analyse {unit}")
+        for progress in self.units.values():
+            progress.reaches_back(state.first_seq)
+
+    async def _fetch_all(self, stream: JetStreamContext) -> None:
+        async with asyncio.TaskGroup() as tasks:
+            for unit in self.units:
+                tasks.create_task(self._fetch_unit(stream, unit), name=f"fetch {unit}")
+            self._note(None)
+
+    async def _fetch_unit(self, stream: JetStreamContext, unit: str) -> None:
+        name, durable = stream_name(self._plant), consumer_name(unit)
+        with suppress(NotFoundError):
+            await stream.delete_consumer(name, durable)  # whoever still reads by it ends
+        await stream.add_consumer(
+            name,
+            ConsumerConfig(
+                durable_name=durable,
+                filter_subject=subject(self._plant, unit),
+                deliver_policy=DeliverPolicy.BY_START_SEQUENCE,
+                opt_start_seq=self._fetched[unit] + 1,
+                ack_policy=AckPolicy.EXPLICIT,
+                ack_wait=ACK_WAIT_S,
+                max_ack_pending=MAX_UNACKNOWLEDGED,
+            ),
+        )
+        puller = await stream.pull_subscribe_bind(durable, name)
+        while True:
+            messages = await _fetched(puller)
+            let_stop_through()
+            for message in messages:
+                await self._offer(unit, message)
+
+    async def _offer(self, unit: str, message: Msg) -> None:
+        sequence = message.metadata.sequence.stream
+        self.n_pending[unit] = message.metadata.num_pending
+        if sequence <= self._fetched[unit]:  # delivered again: it waits here, or nobody was told
+            if sequence <= self._settled.get(unit, 0):
+                with suppress(Error):
+                    await message.ack()
+            return
+        await self._queues[unit].put(message)
+        self._fetched[unit] = sequence
+
+    async def _take_all(self, unit: str) -> None:
+        """Take a unit's messages in; whole ones, whatever becomes of the connection."""
+        queue, progress = self._queues[unit], self.units[unit]
+        while True:
+            batch = [await queue.get()]
+            while len(batch) < BATCH and not queue.empty():
+                batch.append(queue.get_nowait())
+            refused = [m for m in batch if not await progress.take(_sequence(m), m.data)]
+            await self._stored(progress)
+            for message in batch:
+                with suppress(Error):  # it is stored; who was not told sends it once more
+                    await (message.term() if message in refused else message.ack())
+            self._settled[unit] = _sequence(batch[-1])
+
+    async def _stored(self, progress: UnitProgress) -> None:
+        """Wait until all that was taken in is on the disk, with how far that is."""
+        if progress.is_reliving:
+            return
+        position = progress.position()
+        self._recorder.put(Findings(position=position))
+        await self._recorder.reached(position)
+
+    def _note(self, trouble: str | None) -> None:
+        """Log when reading begins or ceases to fail."""
+        if trouble == self.trouble:
+            return
+        if trouble is None:
+            log.info("blocks are being read from the stream")
+        else:
+            log.warning("blocks are not being read from the stream", reason=trouble)
+        self.trouble = trouble
+
+
+async def _fetched(puller: JetStreamContext.PullSubscription) -> Iterable[Msg]:
+    """What is there; the first as soon as it comes, and the rest with it."""
+    try:
+        messages = await puller.fetch(1, FETCH_S)
+        waiting = messages[-1].metadata.num_pending
+        if waiting:
+            with suppress(NatsTimeoutError):
+                messages += await puller.fetch(min(waiting, BATCH), REST_S)
+    except NatsTimeoutError:
+        return []
+    return messages
+
+
+def _sequence(message: Msg) -> int:
+    return message.metadata.sequence.stream
+
+
+UNIT = ("unit",)
+
+
+def consumer_metrics(consumer: Consumer) -> Iterator[Metric]:
+    """How far behind the stream each unit is, and what was refused."""
+    yield gauge(
+        "stream_connected",
+        "1 while blocks are read from the servers of the stream.",
+        (),
+        [((), consumer.trouble is None)],
+    )
+    yield gauge(
+        "stream_pending",
+        "Messages of the unit that are on the stream and were not fetched yet.",
+        UNIT,
+        (((unit,), n) for unit, n in consumer.n_pending.items()),
+    )
+    yield gauge(
+        "stream_analysis_behind_seconds",
+        "How far behind its device the block of the unit was that was taken in last.",
+        UNIT,
+        (((unit,), its.behind_s) for unit, its in consumer.units.items()),
+    )
+    yield counter(
+        "stream_refused",
+        "Messages of the unit that could not be used, by reason.",
+        ("unit", "reason"),
+        (
+            ((unit, kind), n)
+            for unit, its in consumer.units.items()
+            for kind, n in its.refused.items()
+        ),
+    )
+    yield counter(
+        "stream_redelivered",
+        "Messages of the unit that came a second time, and counted once.",
+        UNIT,
+        (((unit,), its.n_repeated) for unit, its in consumer.units.items()),
+    )

@@ -1,0 +1,323 @@
+"""Blocks and news of links as bytes, and back, bit for bit."""
+
+import hashlib
+import json
+import math
+import struct
+import zlib
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Annotated, TypeVar
+
+import numpy as np
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+
+from core.quality import Quality, Reading
+from core.samples.blocks import DeviceClock, Rejection, SampleBlock, StampFault
+from service.live.live_view import LinkState
+from service.measuring.acquirer import LinkNews
+
+
+class WireError(ValueError):
+    """A message cannot be used; it will be the same the next time.
+
+    Parameters
+    ----------
+    kind
+        Short snake-case word, used as a counter's label.
+    """
+
+    def __init__(self, kind: str, message: str) -> None:
+        super().__init__(message)
+        self.kind = kind
+
+
+def require_possible(block: SampleBlock) -> None:
+    """Refuse what no adapter makes, before anything reckons with it.
+
+    Raises
+    ------
+    WireError
+        If a block has no samples, or one that is no number, which would blind a whole spectrum; a
+        slow value that is none; or less than no rejected samples.
+    """
+    if not block.n_samples:
+        raise WireError("impossible", "a block without samples")
+    if not np.isfinite(block.samples).all():
+        raise WireError("impossible", "a block with samples that are no numbers")
+    if not all(math.isfinite(reading.value or 0.0) for reading in block.slow.values()):
+        raise WireError("impossible", "a block with a slow value that is no number")
+    if any(rejection.n_samples < 0 for rejection in block.rejected):
+        raise WireError("impossible", "a block before which less than no samples were rejected")
+
+
+FINGERPRINT_BYTES = 16
+
+
+@dataclass(frozen=True)
+class UnitIdentity:
+    """A unit as the blocks on a stream must have been made for it.
+
+    Parameters
+    ----------
+    unit
+        Its id.
+    plant
+        Fingerprint of the plant's name.
+    make
+        Fingerprint of rate and channels: samples of another make would be read as something else.
+    """
+
+    unit: str
+    plant: bytes
+    make: bytes
+
+
+def fingerprint(*words: object) -> bytes:
+    """A short mark of some JSON values: equal for equal ones, and for no others that occur."""
+    text = json.dumps(words, ensure_ascii=True, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).digest()[:FINGERPRINT_BYTES]
+
+
+MAGIC = b"PWSM"
+
+VERSION = 1
+READABLE = (1,)
+"""A reader knows the version it writes and the one before: it is upgraded before the writers."""
+
+MAX_HEAD_BYTES = 1 << 18
+MAX_SAMPLE_BYTES = 1 << 26
+
+_START = struct.Struct(f"<4sHH{FINGERPRINT_BYTES}s{FINGERPRINT_BYTES}sII")
+_CRC = struct.Struct("<I")
+
+
+class Kind(IntEnum):
+    """What a message is."""
+
+    BLOCK = 1
+    LINK = 2
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A message taken apart, with nothing read of its head yet."""
+
+    kind: Kind
+    head: bytes
+    samples: memoryview
+
+
+def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b"") -> bytes:
+    """Put a message together.
+
+    Raises
+    ------
+    ValueError
+        If a part is longer than a reader takes.
+    """
+    if len(head) > MAX_HEAD_BYTES or len(samples) > MAX_SAMPLE_BYTES:
+        raise ValueError(
+            f"a message holds at most {MAX_HEAD_BYTES} bytes of head and {MAX_SAMPLE_BYTES} of"
+            f" samples, not {len(head)} and {len(samples)}"
+        )
+    start = _START.pack(
+        MAGIC, VERSION, kind, identity.plant, identity.make, len(head), len(samples)
+    )
+    body = b"".join((start, head, samples))
+    return body + _CRC.pack(zlib.crc32(body))
+
+
+def unframed(message: bytes, identity: UnitIdentity) -> Frame:
+    """Take a message apart.
+
+    Raises
+    ------
+    WireError
+        If it is no message, damaged, of another version, plant or configuration; never anything
+        else, whatever the bytes are.
+    """
+    if len(message) < _START.size + _CRC.size or message[:4] != MAGIC:
+        raise WireError("not_a_message", f"{len(message)} bytes that are no message of padwatch")
+    _, version, kind, plant, make, n_head, n_samples = _START.unpack_from(message)
+    if version not in READABLE:
+        raise WireError("other_version", _other_version(version))
+    whole = _START.size + n_head + n_samples + _CRC.size
+    if n_head > MAX_HEAD_BYTES or n_samples > MAX_SAMPLE_BYTES or whole != len(message):
+        raise WireError("wrong_length", f"a message of {len(message)} bytes that claims {whole}")
+    (crc,) = _CRC.unpack_from(message, whole - _CRC.size)
+    body = memoryview(message)
+    if crc != zlib.crc32(body[: whole - _CRC.size]):
+        raise WireError("damaged", "a message whose checksum does not fit it")
+    if plant != identity.plant:
+        raise WireError("other_plant", "a message of another plant: give each its own stream")
+    if make != identity.make:
+        raise WireError(
+            "other_configuration",
+            f"a block of {identity.unit} made with other channels or another rate: let acquire and"
+            " analyse use the same plant file",
+        )
+    if kind not in Kind.__members__.values():
+        raise WireError("unknown_kind", f"a message of kind {kind}, which is not known")
+    head = bytes(body[_START.size : _START.size + n_head])
+    samples = body[_START.size + n_head : whole - _CRC.size]
+    return Frame(Kind(kind), head, samples)
+
+
+def _other_version(version: int) -> str:
+    known = " and ".join(str(each) for each in READABLE)
+    newer = "upgrade `padwatch analyse`" if version > VERSION else "upgrade `padwatch acquire`"
+    return f"a message of format version {version}, this program reads {known}: {newer}"
+
+
+SAMPLE = np.dtype("<f4")
+
+Epoch = Annotated[int, Field(ge=0, lt=2**63)]
+Index = Annotated[int, Field(ge=0, lt=2**53)]
+"""Exact in recordings, too, where numbers are doubles."""
+
+Ns = Annotated[int, Field(ge=-(2**62), lt=2**62)]
+"""From 1823 to 2116, so that nothing that is worked out from it overflows in a database."""
+
+T = TypeVar("T")
+
+STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="constants")
+
+
+@dataclass(frozen=True)
+class BlockHead:
+    """All of a block but its samples."""
+
+    __pydantic_config__ = STRICT
+
+    unit: str
+    epoch: Epoch
+    first_index: Index
+    start_ns: Ns
+    rate_hz: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    n_samples: Index
+    channel_quality: tuple[Quality, ...]
+    slow: dict[str, Reading]
+    rejected: tuple[Rejection, ...]
+    clock: DeviceClock | None
+    stamp_fault: StampFault | None
+    taken_ns: Ns
+
+
+@dataclass(frozen=True)
+class LinkHead:
+    """News of a link."""
+
+    __pydantic_config__ = STRICT
+
+    unit: str
+    state: LinkState
+    reason: str | None
+
+
+_BLOCK, _LINK = TypeAdapter(BlockHead), TypeAdapter(LinkHead)
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A block with when it was taken from its device.
+
+    Parameters
+    ----------
+    taken_ns
+        When its device had its last sample, by the clock of the host that acquires: how far behind
+        the analysis is.
+    """
+
+    block: SampleBlock
+    taken_ns: int
+
+
+def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> bytes:
+    """A block as a message. Raises `ValueError` if it is longer than a reader takes."""
+    head = BlockHead(
+        unit=block.unit,
+        epoch=block.epoch,
+        first_index=block.first_index,
+        start_ns=block.start_ns,
+        rate_hz=block.rate_hz,
+        n_samples=block.n_samples,
+        channel_quality=block.channel_quality,
+        slow=dict(block.slow),
+        rejected=block.rejected,
+        clock=block.clock,
+        stamp_fault=block.stamp_fault,
+        taken_ns=taken_ns,
+    )
+    samples = np.ascontiguousarray(block.samples, dtype=SAMPLE).tobytes()
+    return framed(Kind.BLOCK, identity, _BLOCK.dump_json(head), samples)
+
+
+def encoded_link(news: LinkNews, identity: UnitIdentity) -> bytes:
+    """News of a link as a message."""
+    head = LinkHead(news.unit, news.state, None if news.reason is None else news.reason[:1000])
+    return framed(Kind.LINK, identity, _LINK.dump_json(head))
+
+
+def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
+    """What a message says.
+
+    Parameters
+    ----------
+    identity
+        Of the unit that it must be of.
+
+    Raises
+    ------
+    WireError
+        If it cannot be used; never anything else, whatever the bytes are.
+    """
+    frame = unframed(message, identity)
+    if frame.kind is Kind.LINK:
+        link = _read(_LINK, frame.head)
+        _require_own(link.unit, identity)
+        return LinkNews(link.unit, link.state, link.reason)
+    return _block(frame, identity)
+
+
+def _block(frame: Frame, identity: UnitIdentity) -> Taken:
+    head = _read(_BLOCK, frame.head)
+    _require_own(head.unit, identity)
+    n_channels = len(head.channel_quality)
+    if n_channels * head.n_samples * SAMPLE.itemsize != len(frame.samples):
+        raise WireError(
+            "wrong_length",
+            f"{len(frame.samples)} bytes of samples for {n_channels} channels of {head.n_samples}",
+        )
+    samples = np.frombuffer(frame.samples, dtype=SAMPLE).reshape(n_channels, head.n_samples)
+    block = SampleBlock(
+        unit=head.unit,
+        epoch=head.epoch,
+        first_index=head.first_index,
+        start_ns=head.start_ns,
+        rate_hz=head.rate_hz,
+        samples=samples.astype(np.float32, copy=False),
+        channel_quality=head.channel_quality,
+        slow=head.slow,
+        rejected=head.rejected,
+        clock=head.clock,
+        stamp_fault=head.stamp_fault,
+    )
+    return Taken(block, head.taken_ns)
+
+
+def _read(adapter: TypeAdapter[T], head: bytes) -> T:
+    try:
+        return adapter.validate_json(head)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        where = ".".join(str(part) for part in first["loc"])
+        message = f"a message whose head is not understood: {where}: {first['msg']}"
+        raise WireError("not_understood", message) from None
+
+
+def _require_own(unit: str, identity: UnitIdentity) -> None:
+    if unit != identity.unit:
+        raise WireError(
+            "other_unit", f"a message of unit {unit!r} among those of {identity.unit!r}"
+        )

@@ -1,1 +1,0 @@
-"""Alarms in the running service: rules from the plant file, the engine that the runner feeds."""

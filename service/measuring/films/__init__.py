@@ -1,1 +1,0 @@
-"""Films in the running service: what is watched, learned, decided, and done by engineers."""

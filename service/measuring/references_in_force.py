@@ -1,0 +1,276 @@
+"""References of the shaft centre and of 1×: set, in force, taken from newest readings."""
+
+import asyncio
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Protocol
+
+import structlog
+
+from acquisition.clock import Clock
+from core.alarms.judgements import OrderVector, VectorReference
+from core.condition.operating_state import OperatingState
+from core.machine.unit import Bearing, Unit
+from core.monitor.assessment import Assessment
+from core.quality import Level, Reading, Reason
+from core.stiffness.order_line import AMPLITUDES
+from core.units import s_from_ns
+from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.times import rfc3339
+from service.store.gap_reference import GapReference, MicrometrePair
+from service.store.port import Store, StoredReadings, StoreError
+
+log = structlog.get_logger()
+
+LOOK_EVERY_S = 2.0
+
+Key = tuple[str, str]
+"""Unit and bearing."""
+
+
+def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:
+    """Whether the gap is also measured across the shaft, in x and in y."""
+    return bearing.opposite_x is not None, bearing.opposite_y is not None
+
+
+def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
+    """The bearing with a stored reference instead of the one in the plant file.
+
+    A reference without gaps of the opposite probes leaves those of the plant file as they are.
+    """
+    opposite = reference.opposite_reference_um
+    if opposite is None or not any(opposite_axes(bearing)):
+        opposite = bearing.opposite_reference_um
+    return replace(
+        bearing,
+        gap_reference_um=reference.gap_reference_um,
+        opposite_reference_um=opposite,
+    )
+
+
+class Adopter(Protocol):
+    """Whatever takes a new description of its unit: a monitor, as a rule."""
+
+    unit: Unit
+
+    def replace_description(self, unit: Unit) -> None:
+        """Take a new description of the same unit."""
+        ...
+
+
+class ReferencesInForce:
+    """Hands the newest stored references to the monitors, at the start and ever after.
+
+    Parameters
+    ----------
+    monitors
+        By unit; as built from the plant file, whose references hold where none is stored.
+    """
+
+    def __init__(self, monitors: Mapping[str, Adopter], store: Store, clock: Clock) -> None:
+        self._monitors, self._store, self._clock = monitors, store, clock
+        self._bearings: dict[Key, Bearing] = {
+            (unit, bearing.id): bearing
+            for unit, monitor in monitors.items()
+            for bearing in monitor.unit.bearings
+        }
+        self._in_force: dict[Key, GapReference] = {}
+        self._unknown: set[Key] = set()
+        self._store_error: str | None = None
+
+    def of(self, unit: str, bearing: str) -> GapReference | None:
+        """The stored reference that a bearing is watched with; None for that of the plant file."""
+        return self._in_force.get((unit, bearing))
+
+    def bearing(self, unit: str, bearing: str) -> Bearing:
+        """The bearing as it is watched now."""
+        described = self._bearings[unit, bearing]
+        reference = self.of(unit, bearing)
+        return described if reference is None else with_reference(described, reference)
+
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
+        """Look for new references for ever."""
+        while True:
+            pulse.beat(LOOK_EVERY_S)
+            await self._clock.sleep(LOOK_EVERY_S)
+            await self.look()
+
+    async def look(self) -> None:
+        """Take over what has been set since the last look; keep what there is if that fails."""
+        try:
+            found = await asyncio.to_thread(self._store.references)
+        except StoreError as error:
+            if self._store_error is None:
+                log.error("references cannot be read", reason=str(error))
+            self._store_error = str(error)
+            return
+        if self._store_error is not None:
+            log.info("references can be read again")
+        self._store_error = None
+        self._take(found)
+
+    def _take(self, found: Iterable[GapReference]) -> None:
+        news = {(r.unit, r.bearing): r for r in found if self._is_news(r)}
+        self._in_force |= news
+        for unit in {unit for unit, _ in news}:
+            monitor = self._monitors[unit]
+            monitor.replace_description(self._described(monitor.unit))
+        for (unit, bearing), reference in news.items():
+            log.info(
+                "reference taken over",
+                unit=unit,
+                bearing=bearing,
+                gap_reference_um=reference.gap_reference_um,
+                author=reference.author,
+            )
+
+    def _is_news(self, reference: GapReference) -> bool:
+        key = (reference.unit, reference.bearing)
+        if key in self._bearings:
+            return self._in_force.get(key) != reference
+        if key not in self._unknown:
+            self._unknown.add(key)
+            log.warning(
+                "reference of a bearing that is not there is ignored", unit=key[0], bearing=key[1]
+            )
+        return False
+
+    def _described(self, unit: Unit) -> Unit:
+        return replace(unit, bearings=tuple(self.bearing(unit.id, b.id) for b in unit.bearings))
+
+
+MAX_AGE_S = 600.0
+"""Older gaps say little of where the shaft is now."""
+
+NEAR_GAPS = ("gap_x_um", "gap_y_um")
+OPPOSITE_GAPS = ("opposite_gap_x_um", "opposite_gap_y_um")
+
+GivenPair = tuple[float | None, float | None]
+Gaps = tuple[MicrometrePair, MicrometrePair | None]
+"""Of the probes on the positive axes, and of those across the shaft if there are any."""
+
+
+class ReferenceRefusedError(Exception):
+    """No reference can be made of this; the message says why."""
+
+
+def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
+    """Gaps in µm as they were given, complete for the probes that the bearing has.
+
+    Raises
+    ------
+    ReferenceRefusedError
+        If some are missing, or given for probes that are not there.
+    """
+    x, y = near
+    if x is None or y is None:
+        raise ReferenceRefusedError("give the gaps of both axes, x and y, or let them be measured")
+    for axis, gap_um, is_there in zip("xy", opposite, opposite_axes(bearing), strict=True):
+        if gap_um is None and is_there:
+            raise ReferenceRefusedError(
+                f"bearing {bearing.id} has an opposite probe in {axis}: give its gap as well"
+            )
+        if gap_um is not None and not is_there:
+            raise ReferenceRefusedError(f"bearing {bearing.id} has no opposite probe in {axis}")
+    return (x, y), _across(bearing, (x, y), opposite)
+
+
+def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) -> Gaps:
+    """Mean gaps in µm of the newest stored result.
+
+    Raises
+    ------
+    ReferenceRefusedError
+        If there is none, it is not of the last ten minutes, or its gaps are not usable.
+    """
+    if newest is None:
+        raise ReferenceRefusedError("there is no stored result yet whose gaps could be taken")
+    _check_age(newest.time_ns, now_ns)
+    near = (_usable(newest, NEAR_GAPS[0]), _usable(newest, NEAR_GAPS[1]))
+    x, y = (
+        _usable(newest, name) if is_there else None
+        for name, is_there in zip(OPPOSITE_GAPS, opposite_axes(bearing), strict=True)
+    )
+    return near, _across(bearing, near, (x, y))
+
+
+def doubts(newest: StoredReadings) -> list[str]:
+    """What should be known of gaps that are usable but not good, in words."""
+    gaps = {name: newest.readings.get(name) for name in (*NEAR_GAPS, *OPPOSITE_GAPS)}
+    return [
+        f"{name} is uncertain: {reading.quality.reason}"
+        for name, reading in gaps.items()
+        if reading is not None and reading.quality.level is Level.UNCERTAIN
+    ]
+
+
+def _across(bearing: Bearing, near: MicrometrePair, found: GivenPair) -> MicrometrePair | None:
+    """Gaps of the opposite probes; an axis without one keeps a number that nobody looks at."""
+    if not any(opposite_axes(bearing)):
+        return None
+    unused = bearing.opposite_reference_um or near
+    x, y = (old if new is None else new for new, old in zip(found, unused, strict=True))
+    return x, y
+
+
+def _check_age(time_ns: int, now_ns: int) -> None:
+    age_s = s_from_ns(now_ns - time_ns)
+    if abs(age_s) > MAX_AGE_S:
+        side = "ago" if age_s > 0.0 else "ahead of this computer's clock"
+        raise ReferenceRefusedError(
+            f"the newest stored result is of {rfc3339(time_ns)}, {abs(age_s) / 60:.0f} min {side};"
+            f" it may be at most {MAX_AGE_S / 60:.0f} min old"
+        )
+
+
+def _usable(newest: StoredReadings, name: str) -> float:
+    reading = newest.readings.get(name)
+    if reading is None:
+        raise ReferenceRefusedError(f"the newest stored result has no {name}")
+    if reading.value is None:
+        raise ReferenceRefusedError(
+            f"{name} of the newest stored result has no value: {reading.quality.reason}"
+        )
+    return reading.value
+
+
+NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMENTS)
+"""Doubts with which an amplitude is no reference."""
+
+
+class VectorRefusedError(Exception):
+    """No reference can be made of this; the message says why."""
+
+
+def measured_vectors(assessment: Assessment | None) -> VectorReference:
+    """The 1× vectors of a current result, in the operating state that it was found in.
+
+    Raises
+    ------
+    VectorRefusedError
+        If there is no result, an amplitude has no number, or the machine did not run steadily.
+    """
+    if assessment is None:
+        raise VectorRefusedError("there is no current result whose vectors could be taken")
+    condition = assessment.condition
+    return VectorReference(
+        unit=assessment.unit,
+        bearing=assessment.bearing,
+        state=OperatingState.UNKNOWN if condition is None else condition.state,
+        vectors={place: _vector(assessment, place) for place in AMPLITUDES},
+    )
+
+
+def _vector(assessment: Assessment, place: str) -> OrderVector:
+    amplitude = _steady(f"order1_{place}_um_pk", assessment.readings[f"order1_{place}_um_pk"])
+    phase = assessment.readings[f"order1_{place}_phase_deg"]
+    return OrderVector(amplitude, phase.value)
+
+
+def _steady(name: str, reading: Reading) -> float:
+    reason = reading.quality.reason
+    if reading.value is None:
+        raise VectorRefusedError(f"{name} has no value: {reason}")
+    if reading.quality.level is not Level.GOOD and reason in NOT_STEADY:
+        raise VectorRefusedError(f"{name} is uncertain: {reason}")
+    return reading.value

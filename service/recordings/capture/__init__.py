@@ -1,1 +1,0 @@
-"""Samples around an alarm, kept as recordings in the data folder."""
