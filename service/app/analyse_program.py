@@ -23,13 +23,10 @@ from service.app.service_health import recording_error
 from service.app.stores import database_path, open_store
 from service.app.supervision import Supervision
 from service.cluster.consumer import Consumer, consumer_metrics
-from service.cluster.holding import Holds
-from service.cluster.leadership import Leadership
-from service.cluster.partition import Partition
+from service.cluster.ownership import Holds, Leadership, Partition
+from service.cluster.progress import UnitProgress, memories_of, usable
 from service.cluster.session import identity_of
 from service.cluster.silent_units import Silence, SilentUnits, silences_s
-from service.cluster.stream.progress import UnitProgress
-from service.cluster.stream.stored import memories_of, usable
 from service.measuring.acquirer import Bus
 from service.measuring.analyser import BUS_CAPACITY, UnitMemory
 from service.measuring.counters import store_info

@@ -33,7 +33,7 @@ from service.notifications.message import Around
 from service.notifications.sender import Deliveries
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import Tape
-from service.recordings.keeping.keeper import WaveformKeeper
+from service.recordings.keeper import WaveformKeeper
 from service.reports.keeper import EvidenceKeeper
 from service.runtime.heartbeats import Loop
 from service.runtime.space.watch import SpaceWatch

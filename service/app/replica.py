@@ -8,15 +8,16 @@ from service.api.auth.refusals import Refusals
 from service.api.context import Context
 from service.app.delivery import receivers_of
 from service.app.ground import STALE_HOPS, refresh_s
-from service.cluster.replica.alarms import ReplicaAlarms
-from service.cluster.replica.captures import NoCaptures
-from service.cluster.replica.deliveries import ReplicaDeliveries
-from service.cluster.replica.described import Described
-from service.cluster.replica.feed import Feed
-from service.cluster.replica.films import ReplicaFilms
-from service.cluster.replica.live import ReplicaLive
-from service.cluster.replica.metrics import ReplicaMetrics
+from service.cluster.replica_state import (
+    NoCaptures,
+    ReplicaAlarms,
+    ReplicaDeliveries,
+    ReplicaFilms,
+    ReplicaLive,
+    ReplicaMetrics,
+)
 from service.cluster.reported_commands import Asking
+from service.cluster.reported_state import Described, Feed
 from service.measuring.references_in_force import ReferencesInForce
 from service.runtime.heartbeats import Heartbeats
 from service.settings.alarm_rules import chatter_rule_of

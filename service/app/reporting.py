@@ -3,9 +3,8 @@
 from collections.abc import Callable, Collection, Mapping
 
 from service.app.analysis import Analysis
-from service.cluster.replica.process import process_name
-from service.cluster.replica.reporter import Reporter
 from service.cluster.reported_commands import CarryingOut
+from service.cluster.reported_state import Reporter, process_name
 from service.runtime.heartbeats import Loop
 
 

@@ -10,7 +10,7 @@ from service.measuring.service_alarms import LookAtHealth, ServiceHealth, Stream
 from service.measuring.soundness import Soundness
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import Tape
-from service.recordings.keeping.keeper import WaveformKeeper
+from service.recordings.keeper import WaveformKeeper
 from service.runtime.space.watch import SpaceWatch
 
 

@@ -15,7 +15,7 @@ from service.measuring.timings import Timings
 from service.notifications.sender import Deliveries
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import Tape
-from service.recordings.keeping.keeper import WaveformKeeper
+from service.recordings.keeper import WaveformKeeper
 from service.reports.keeper import EvidenceKeeper
 from service.runtime.polls import TimedSource
 from service.runtime.space.watch import SpaceWatch

@@ -10,11 +10,8 @@ from service.app.space import space_limits
 from service.app.tapes import recordings_folder
 from service.recordings.folders import place_of
 from service.recordings.index import Index
-from service.recordings.keeping.caretaker import Caretaker, Custody
-from service.recordings.keeping.gauge import Gauge
-from service.recordings.keeping.keeper import WaveformKeeper
-from service.recordings.keeping.room import RoomLimits
-from service.recordings.keeping.watch_keeping import WatchKeeping
+from service.recordings.keeper import WatchKeeping, WaveformKeeper
+from service.recordings.retention import Caretaker, Custody, Gauge, RoomLimits
 from service.reports.capture_link import captures_in_use
 from service.runtime.space.disk import measure_disk
 from service.settings.plant import PlantFile

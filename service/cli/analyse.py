@@ -10,7 +10,7 @@ from service.api.http.listening import PortInUseError, listen
 from service.app.health.serving import HOST
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.stream import stream_settings
-from service.cluster.partition import Partition
+from service.cluster.ownership import Partition
 from service.cluster.session import StreamAnewError
 from service.measuring.sources import monitor_of
 from service.runtime.ending import leave, run_to_its_end

@@ -15,6 +15,7 @@ from prometheus_client.metrics_core import Metric
 
 from acquisition.clock import Clock
 from acquisition.delivery.network import let_stop_through
+from service.cluster.progress import UnitProgress
 from service.cluster.session import (
     StreamAnewError,
     StreamError,
@@ -25,7 +26,6 @@ from service.cluster.session import (
     stream_name,
     subject,
 )
-from service.cluster.stream.progress import UnitProgress
 from service.measuring.recorder import Findings, Recorder
 from service.runtime.families import counter, gauge
 from service.runtime.heartbeats import UNHEARD, Pulse

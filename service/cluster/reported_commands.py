@@ -9,7 +9,7 @@ from core.alarms.alarm import Alarm
 from core.alarms.judgements import VectorReference
 from core.alarms.operation import Action, ActionRefusedError
 from core.units import ns_from_s
-from service.cluster.replica.alarms import ReplicaAlarms
+from service.cluster.replica_state import ReplicaAlarms
 from service.live.commands import (
     BaselineAction,
     BaselineRefusedError,

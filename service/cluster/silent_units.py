@@ -7,7 +7,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import Alarm
-from service.cluster.stream.progress import UnitProgress
+from service.cluster.progress import UnitProgress
 from service.live.live_view import LinkState, LiveView
 from service.measuring.acquirer import LinkNews
 from service.measuring.alarm_engine import AlarmEngine

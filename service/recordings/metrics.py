@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from prometheus_client.metrics_core import Metric
 
 from service.recordings.continuous_recorder import Tape
-from service.recordings.keeping.keeper import WaveformKeeper
+from service.recordings.keeper import WaveformKeeper
 from service.runtime.families import counter, gauge
 
 

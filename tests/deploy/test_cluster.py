@@ -13,7 +13,7 @@ import yaml
 from typer.testing import CliRunner
 
 from service.cli.commands import app
-from service.cluster.partition import Partition
+from service.cluster.ownership import Partition
 from service.settings.loading import load_plant_file
 
 FOLDER = Path(__file__).parents[2] / "deploy" / "cluster"

@@ -13,7 +13,7 @@ import yaml
 from prometheus_client.metrics_core import Metric
 
 from service.cluster.consumer import consumer_metrics
-from service.cluster.replica.metrics import unit_metrics as replica_unit_metrics
+from service.cluster.replica_state import unit_metrics as replica_unit_metrics
 from service.live.live_view import LinkState
 
 DEPLOY = Path(__file__).parents[3] / "deploy"

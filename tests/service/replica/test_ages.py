@@ -12,7 +12,7 @@ from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reason
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount
-from service.cluster.replica.live import SILENT_AFTER_S, ReplicaLive
+from service.cluster.replica_state import SILENT_AFTER_S, ReplicaLive
 from service.live.live_view import LinkState, LiveView, UnitStatus
 from service.live.unit_state import UnitSigns, read_signs, written_signs
 from service.measuring.describing import bearing_state, unit_signs

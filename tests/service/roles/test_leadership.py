@@ -10,9 +10,7 @@ from harness.waiting import at_work, until
 from rigs.standing_clock import StandingClock
 
 from acquisition.clock import SystemClock
-from service.cluster.holding import HoldLostError, Holds
-from service.cluster.leadership import Leadership
-from service.cluster.partition import Partition
+from service.cluster.ownership import HoldLostError, Holds, Leadership, Partition
 from service.notifications.channel import Delivered
 from service.notifications.sender import Deliveries, Receiver
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse

@@ -8,8 +8,8 @@ from typing import Any
 from core.alarms.alarm import PLANT, Alarm, AlarmChange, AlarmIdentity, AlarmNews, changed
 from core.alarms.statistics import ChatterRule
 from core.limits import AlarmLevel
-from service.cluster.partition import Partition
-from service.cluster.replica.alarms import ReplicaAlarms
+from service.cluster.ownership import Partition
+from service.cluster.replica_state import ReplicaAlarms
 from service.measuring.alarm_engine import AlarmEngine, alarm_engine
 from service.measuring.service_alarms import ServiceHealth
 from service.settings.loading import load_plant_file

@@ -14,11 +14,8 @@ from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand
 from service.recordings.index import Index
-from service.recordings.keeping.caretaker import Caretaker, Custody
-from service.recordings.keeping.gauge import Gauge
-from service.recordings.keeping.keeper import WaveformKeeper
-from service.recordings.keeping.room import RoomLimits
-from service.recordings.keeping.watch_keeping import WatchKeeping
+from service.recordings.keeper import WatchKeeping, WaveformKeeper
+from service.recordings.retention import Caretaker, Custody, Gauge, RoomLimits
 from service.runtime.space.disk import DiskSpace
 from service.runtime.space.limits import SpaceLimits
 from service.store.sqlite import SqliteStore

@@ -119,7 +119,7 @@ def test_what_is_read_once_more_takes_a_small_share_of_the_time(
     for hour in range(3):
         rig.make(hour)
     rig.caretaker.look()
-    monkeypatch.setattr("service.recordings.keeping.caretaker.again", slow)
+    monkeypatch.setattr("service.recordings.retention.again", slow)
     rig.clock.s = DAY_S + 1.0
     for _ in range(100):
         rig.caretaker.look()

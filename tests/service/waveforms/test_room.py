@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from service.recordings.keeping.ages import NotOldFrom
+from service.recordings.retention import NotOldFrom
 from service.runtime.space.disk import DiskSpace
 from service.store.waveform_port import WaveformFile, WaveformKind
 

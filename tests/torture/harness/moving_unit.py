@@ -11,9 +11,8 @@ import numpy as np
 from acquisition.clock import Clock, SystemClock
 from harness.stream_rig import ground_of
 from service.app.analysis import Analysis, analysis_on
+from service.cluster.progress import UnitProgress, memories_of, usable
 from service.cluster.session import identity_of
-from service.cluster.stream.progress import UnitProgress
-from service.cluster.stream.stored import memories_of, usable
 from service.measuring.acquirer import Bus
 from service.measuring.recorder import Findings
 from service.notifications.message import Around

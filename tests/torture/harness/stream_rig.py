@@ -23,7 +23,7 @@ from service.app.analysis import analysis_on
 from service.app.ground import Ground, live_view
 from service.app.stores import open_store
 from service.cluster.frames import Taken, decoded
-from service.cluster.partition import Partition
+from service.cluster.ownership import Partition
 from service.cluster.publisher import Publisher
 from service.cluster.session import identity_of, stream_name, subject
 from service.live.live_view import LinkState

@@ -10,8 +10,8 @@ from rigs.described import described_app
 
 from core.alarms.alarm import PLANT
 from service.app.replica import Replica, replica_context, replica_on
-from service.cluster.replica.reporter import Reporter
 from service.cluster.reported_commands import CarryingOut
+from service.cluster.reported_state import Reporter
 from service.runtime.heartbeats import Heartbeats
 from service.settings.plant import PlantFile
 

@@ -7,7 +7,7 @@ import pytest
 from core.alarms.alarm import AlarmState
 from core.limits import AlarmLevel
 from service.app.replica import replica_on
-from service.cluster.replica.live import NOBODY, SILENT_AFTER_S
+from service.cluster.replica_state import NOBODY, SILENT_AFTER_S
 from service.live.live_view import LinkState
 from service.store.port import StoreError
 
@@ -129,7 +129,7 @@ async def test_a_report_of_another_version_is_no_sign_of_life(
 ) -> None:
     pair.service.clock.s += SILENT_AFTER_S + 0.1
     monkeypatch.setattr(
-        "service.cluster.replica.reporter.written_signs", lambda _: '[{"version": 9}]'
+        "service.cluster.reported_state.written_signs", lambda _: '[{"version": 9}]'
     )
     await pair.told()
 

@@ -1,22 +1,98 @@
-"""`UnitProgress`: one unit on its way along the stream, whatever connections come and go."""
+"""One unit on its way along the stream, and where it resumes."""
 
-from collections import Counter
-from dataclasses import replace
+from collections import Counter, deque
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import structlog
+from pydantic import TypeAdapter, ValidationError
 
 from acquisition.clock import Clock
+from core.monitor.monitor import MonitorState
 from core.samples.blocks import BlockMisfitError, SampleBlock
 from core.samples.gaps import Reach
 from core.units import s_from_ns
 from service.cluster.frames import Taken, UnitIdentity, WireError, decoded, require_possible
-from service.cluster.stream.memory import written
-from service.cluster.stream.window import Window
 from service.live.live_view import LinkState, LiveView
 from service.measuring.acquirer import LinkNews
-from service.measuring.analyser import Analyser, UnitMemory
+from service.measuring.analyser import VERSION, Analyser, UnitMemory
 from service.measuring.recorder import Findings, Recorder
 from service.store.positions_port import StreamPosition
+
+_MEMORY = TypeAdapter(UnitMemory)
+
+
+def written(memory: UnitMemory) -> bytes:
+    """The memory as a document; floats come back to the last bit."""
+    return _MEMORY.dump_json(memory)
+
+
+def read(document: bytes) -> UnitMemory | None:
+    """The memory that a document holds; None if it is not one of this version."""
+    try:
+        memory = _MEMORY.validate_json(document)
+    except ValidationError:
+        return None
+    return memory if memory.version == VERSION else None
+
+
+def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
+    """What is known of units, as far as it can be read."""
+    found = {position.unit: read(position.memory) for position in stored}
+    for unit, memory in found.items():
+        if memory is None:
+            log.error(
+                "what was known of a unit is of another version: alarms begin anew", unit=unit
+            )
+    return {unit: memory for unit, memory in found.items() if memory is not None}
+
+
+def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPosition | None:
+    """A stored position, if it is one on this stream as the stream is."""
+    if stored is None:
+        return None
+    if stored.stream != stream:
+        log.error("the stream was made anew: results go on with what is on it", unit=stored.unit)
+        return None
+    if stored.sequence > newest:
+        log.error("the stream has lost what it had confirmed", unit=stored.unit)
+        return None
+    return stored
+
+
+@dataclass(frozen=True)
+class _Seen:
+    sequence: int
+    epoch: int | None
+    stop_index: int
+
+
+class Window:
+    """The newest messages of a unit, by what they hold."""
+
+    def __init__(self) -> None:
+        self._seen: deque[_Seen] = deque()
+
+    def note(self, sequence: int, block: SampleBlock, state: MonitorState) -> None:
+        """Take note of a block that was taken in, and let go of what is needed no more.
+
+        Parameters
+        ----------
+        state
+            Behind the block; its epoch is that of the block for the analysis.
+        """
+        self._seen.append(_Seen(sequence, state.epoch, block.stop_index))
+        while len(self._seen) > 1 and not self._is_needed(self._seen[0], state):
+            self._seen.popleft()
+
+    def first(self, otherwise: int) -> int:
+        """The first message that is needed."""
+        return self._seen[0].sequence if self._seen else otherwise
+
+    @staticmethod
+    def _is_needed(seen: _Seen, state: MonitorState) -> bool:
+        return seen.epoch == state.epoch and seen.stop_index > state.start
+
 
 log = structlog.get_logger()
 

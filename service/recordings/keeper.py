@@ -1,21 +1,58 @@
-"""`WaveformKeeper`: lets a caretaker look through the recordings for ever, in a thread."""
+"""The loop that looks after the recordings of a folder, in one process."""
 
 import asyncio
+import fcntl
+import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from types import MappingProxyType
 
 import structlog
 
 from acquisition.clock import Clock
-from service.recordings.keeping.caretaker import Caretaker, Findings
-from service.recordings.keeping.gauge import Gauge
-from service.recordings.keeping.troubles import Troubles
-from service.recordings.keeping.watch_keeping import WatchKeeping
+from service.recordings.retention import Caretaker, Findings, Gauge, Troubles
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.store.waveform_port import WaveformFile, WaveformKind
 
 log = structlog.get_logger()
+
+LOCK = "recordings.lock"
+
+
+class WatchKeeping:
+    """Held until the process ends, however that happens; the file means nothing by itself."""
+
+    def __init__(self, data_folder: Path) -> None:
+        self._path = data_folder / LOCK
+        self._descriptor: int | None = None
+
+    def take(self) -> bool:
+        """Whether this process is the one; asks anew each time until it is.
+
+        Raises
+        ------
+        OSError
+            If the folder cannot be written to.
+        """
+        if self._descriptor is not None:
+            return True
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            os.close(descriptor)
+            return False
+        self._descriptor = descriptor
+        return True
+
+    def release(self) -> None:
+        """Let another process do it."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
 
 LOOK_EVERY_S = 5.0
 

@@ -1,1 +1,0 @@
-"""Several processes for one plant: those that analyse write down what those that serve read."""

@@ -1,1 +1,0 @@
-"""Blocks between processes: a wire format, and a JetStream stream that carries it."""

@@ -1,1 +1,0 @@
-"""The waveform store: which recordings there are, whether they are whole, how long they stay."""
