@@ -14,8 +14,8 @@ from acquisition.clock import SystemClock
 from acquisition.delivery.blocks import BlockAssembler
 from core.samples.blocks import SampleBlock
 from service.measuring.simulated_sources import simulated_feed
-from service.recordings.continuous_recorder import TapeSettings, UnitTape
-from service.recordings.segment import join
+from service.recordings.continuous_recorder import UnitTape
+from service.recordings.segment import TapeSettings, join
 from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
 from service.settings.recorded_units import recorded_unit

@@ -4,7 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from acquisition.clock import Clock
-from service.recordings.continuous_recorder import Shed, Tape, TapeSettings
+from service.recordings.continuous_recorder import Shed, Tape
+from service.recordings.segment import TapeSettings
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile

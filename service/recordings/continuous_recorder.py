@@ -18,7 +18,7 @@ from acquisition.recordings.manifest import RecordedUnit, read_manifest
 from acquisition.recordings.reader import open_recording
 from core.samples.blocks import Rejection, SampleBlock
 from service.recordings.folders import KIND, unit_of
-from service.recordings.segment import Stretch, clear_unfinished, join, unjoined
+from service.recordings.segment import Stretch, TapeSettings, clear_unfinished, join, unjoined
 from service.runtime.heartbeats import UNHEARD, Pulse
 
 
@@ -32,22 +32,6 @@ class Shed(StrEnum):
     NOT_RUNNING = "not_running"
     GAP_BEFORE = "gap_before"
     """A gap of the device itself, where one recording ends and the next begins."""
-
-
-@dataclass(frozen=True)
-class TapeSettings:
-    """How a continuous recording is cut.
-
-    Parameters
-    ----------
-    stretch_s
-        Length of a finished recording.
-    part_s
-        What is written and synced at once: a kill costs no more than this, and what waits.
-    """
-
-    stretch_s: float = 600.0
-    part_s: float = 30.0
 
 
 @dataclass

@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,6 @@ from acquisition.recordings.writer import INCOMPLETE, RecordingWriter
 from core.alarms.alarm import AlarmEvent
 from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
-from service.recordings.continuous_recorder import TapeSettings
 from service.recordings.folders import (
     ALARM,
     PARTS,
@@ -31,6 +31,23 @@ from service.recordings.folders import (
     unit_of,
 )
 from service.runtime.times import rfc3339
+
+
+@dataclass(frozen=True)
+class TapeSettings:
+    """How a continuous recording is cut.
+
+    Parameters
+    ----------
+    stretch_s
+        Length of a finished recording.
+    part_s
+        What is written and synced at once: a kill costs no more than this, and what waits.
+    """
+
+    stretch_s: float = 600.0
+    part_s: float = 30.0
+
 
 MakeWriter = Callable[[Path, str], RecordingWriter]
 """Opens a recording of the unit: folder and who made it."""

@@ -11,7 +11,8 @@ from rigs.capturing import Rig, block
 from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.manifest import RecordedUnit
-from service.recordings.continuous_recorder import Shed, Tape, TapeSettings
+from service.recordings.continuous_recorder import Shed, Tape
+from service.recordings.segment import TapeSettings
 
 SETTINGS = TapeSettings(stretch_s=10.0, part_s=2.0)
 

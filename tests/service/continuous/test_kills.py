@@ -12,8 +12,8 @@ from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.summary import summary_of
 from core.samples.blocks import SampleBlock
-from service.recordings.continuous_recorder import TapeSettings, UnitTape, last_end
-from service.recordings.segment import clear_unfinished, join, unjoined
+from service.recordings.continuous_recorder import UnitTape, last_end
+from service.recordings.segment import TapeSettings, clear_unfinished, join, unjoined
 
 SETTINGS = TapeSettings(stretch_s=4.0, part_s=2.0)
 N_BLOCKS = 30
