@@ -20,15 +20,13 @@ from core.condition.operating_state import OperatingState
 from core.monitor.catalogue import CATALOGUE
 from service.api.trend_groups import trend_groups
 from service.api.trend_views import trend_columns, trend_model
-from service.store.codec import Layout, columns_of, remember_layout
+from service.store.buckets import Summaries
 from service.store.port import TrendQuery
-from service.store.rollups.cells import Cells, Conditions
 from service.store.rollups.making import insert_cells
 from service.store.rollups.rolling import SET_MARK
-from service.store.rollups.widths import HOUR_NS, NS_PER_S, WIDTHS_NS
-from service.store.series import series_of
+from service.store.rollups.rows import HOUR_NS, NS_PER_S, WIDTHS_NS, Cells, Conditions
+from service.store.series import Layout, columns_of, remember_layout, series_of
 from service.store.sqlite import SqliteStore
-from service.store.summaries import Summaries
 from service.store.value_range import ValueRange
 
 N_BEARINGS = 60

@@ -14,7 +14,7 @@ from service.api.bearing_routes import Moment
 from service.api.context import Context
 from service.api.parameters import ns_from_datetime, require_order
 from service.api.problems import ProblemError, described_problems
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 from service.store.port import AlarmQuery
 
 DEFAULT_DAYS, MAX_DAYS = 7, 400

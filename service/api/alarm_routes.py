@@ -50,7 +50,7 @@ from service.api.rendering import rendered, worked
 from service.api.shared import SharedAnswer
 from service.api.tables import Format, table_content, table_response
 from service.settings.alarm_kinds import AlarmKindName
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 from service.store.port import AlarmQuery
 from service.store.value_range import ValueRange
 

@@ -6,7 +6,7 @@ from dataclasses import astuple, fields
 from typing import TextIO
 
 from service.runtime.times import rfc3339
-from service.store.access.audit_entry import AuditEntry
+from service.store.access.audit_entries import AuditEntry
 
 HEADER = ("time", *(field.name for field in fields(AuditEntry)))
 

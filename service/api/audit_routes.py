@@ -16,8 +16,8 @@ from service.api.problems import described_problems
 from service.api.rendering import rendered, worked
 from service.api.tables import Format, table_content, table_response
 from service.runtime.times import rfc3339
-from service.store.access.audit_entry import MAX_NAME, AuditEntry
-from service.store.access.roles import Permission
+from service.store.access.audit_entries import MAX_NAME, AuditEntry
+from service.store.access.identities import Permission
 from service.store.audit_port import AuditQuery
 
 MAX_ENTRIES = 1000

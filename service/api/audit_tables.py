@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from service.api.tables import Column
-from service.store.access.audit_entry import AuditEntry
+from service.store.access.audit_entries import AuditEntry
 
 TEXTS = (
     *("actor", "source", "peer", "action", "object", "before", "after", "reason"),

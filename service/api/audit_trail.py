@@ -6,8 +6,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
 from service.api.auth.refusals import Refusals
-from service.store.access.acting import Acting, acting, acting_as
-from service.store.access.audit_entry import Deed, Source
+from service.store.access.audit_entries import Acting, Deed, Source, acting, acting_as
 
 SAFE = ("GET", "HEAD", "OPTIONS")
 

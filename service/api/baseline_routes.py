@@ -37,8 +37,8 @@ from service.live.commands import (
 )
 from service.live.learning_progress import learning_progress
 from service.runtime.times import rfc3339
-from service.store.access.roles import Permission
-from service.store.baseline_versions import versions_after
+from service.store.access.identities import Permission
+from service.store.baselines import versions_after
 from service.store.documents import BASELINE, FORMAT_VERSION, to_json
 
 Version = Annotated[int, Path(ge=1, le=10**15, description="Version of a baseline.", examples=[3])]

@@ -24,7 +24,7 @@ from service.api.film_conditions import bounds
 from service.api.models import EstimatorName
 from service.live.learning_progress import RECENT_DAYS, LearningProgress
 from service.runtime.times import rfc3339
-from service.store.baseline_versions import Versions
+from service.store.baselines import Versions
 from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
 
 

@@ -29,7 +29,7 @@ from service.api.views import (
 )
 from service.live.live_view import CurrentBearing
 from service.runtime.times import rfc3339
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 from service.store.value_range import ValueRange
 
 Moment = Annotated[datetime, BeforeValidator(written_as_date)]

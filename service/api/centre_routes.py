@@ -19,9 +19,9 @@ from service.api.trend_tables import trend_table
 from service.api.trend_views import bucket_s, simulated_until, times_s, trend_columns
 from service.api.views import LEVEL_NAMES
 from service.runtime.times import rfc3339
-from service.store.access.roles import Permission
-from service.store.codec import U_RANDOM, U_SYSTEMATIC
+from service.store.access.identities import Permission
 from service.store.port import Trend, TrendQuery
+from service.store.series import U_RANDOM, U_SYSTEMATIC
 from service.store.value_range import ValueRange
 
 COLUMNS = {

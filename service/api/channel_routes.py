@@ -15,7 +15,7 @@ from service.live.live_view import HELD_S
 from service.live.samples import newest_stretch
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 
 MAX_NUMBERS = 200_000
 """Samples of all channels together in one answer."""

@@ -9,8 +9,8 @@ from service.api.problems import problem_responses
 from service.api.rendering import rendered_now
 from service.notifications.sender import ReceiverView, SenderStatus
 from service.runtime.times import rfc3339
-from service.store.access.roles import Permission
-from service.store.outbox_port import Backlog, LetterState, StoredLetter
+from service.store.access.identities import Permission
+from service.store.outbox import Backlog, LetterState, StoredLetter
 
 NO_BACKLOG = Backlog("", 0, None, 0, None, None)
 

@@ -17,7 +17,7 @@ from service.api.problems import ProblemError, described_problems, problem_respo
 from service.api.rendering import rendered, worked
 from service.api.tables import Column, Format, table_content, table_response
 from service.live.commands import FilmPlace
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 from service.store.film_port import FilmHistory, FilmQuery
 from service.store.port import QueryTooLargeError
 from service.store.value_range import ValueRange

@@ -8,7 +8,7 @@ from prometheus_client.registry import Collector
 
 from service.api.auth.declared import needs
 from service.runtime.families import OPEN_METRICS, rendered
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 
 EXAMPLE = """\
 # HELP padwatch_link_connected 1 while the device is connected.

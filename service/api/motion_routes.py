@@ -27,7 +27,7 @@ from service.recordings.motion import NoMotionError, channels_for, motion_of, re
 from service.settings.core_values import machine_of
 from service.settings.modbus_sources import ModbusVectorSettings
 from service.settings.units import UnitSettings
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 
 MAX_SAMPLES = 60_000
 """Of each direction in one answer: a hundred seconds at 600 Hz, and 2 MB."""

@@ -15,7 +15,7 @@ from service.api.order1_reference_models import (
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.measuring.references_in_force import VectorRefusedError, measured_vectors
 from service.runtime.times import rfc3339
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 from service.store.vector_reference_port import SetVectorReference
 
 TAKE_PROBLEMS = described_problems(

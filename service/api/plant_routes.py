@@ -9,7 +9,7 @@ from service.api.overview import Overview
 from service.api.plant_models import OverviewModel, QuantityModel, UnitModel
 from service.api.problems import problem_responses
 from service.api.views import source_model
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 
 
 def plant_router(context: Context) -> APIRouter:

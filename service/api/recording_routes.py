@@ -20,7 +20,7 @@ from service.api.recording_models import (
 from service.api.recording_views import recording_info, recording_model
 from service.api.rendering import rendered, worked
 from service.recordings.library import Shelf
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 from service.store.waveform_port import WaveformKind
 
 RecordingId = Annotated[

@@ -9,7 +9,7 @@ from service.api.bearing_models import SetReferenceModel
 from service.api.bearing_views import set_reference_model
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import problem_responses
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 
 
 def reference_router(context: Context) -> APIRouter:

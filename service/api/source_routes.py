@@ -8,7 +8,7 @@ from service.api.source_models import PollsModel, SourceHealthModel
 from service.api.views import source_model
 from service.runtime.durations import Seen
 from service.settings.units import UnitSettings
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 
 
 def source_router(context: Context) -> APIRouter:

@@ -14,7 +14,7 @@ from service.api.series_models import PlaceName
 from service.api.spectra_models import SpectraModel
 from service.api.spectra_views import spectra_model
 from service.api.views import PLACES
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 from service.store.spectra_port import SpectraQuery
 
 MAX_SPECTRA = 1000

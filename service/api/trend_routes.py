@@ -20,7 +20,7 @@ from service.api.tables import Format, table_content, table_response
 from service.api.trend_groups import GroupName, TooManyGroupsError, TrendGroup, trend_groups
 from service.api.trend_tables import trend_table
 from service.api.trend_views import trend_columns, trend_model
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 from service.store.port import Trend, TrendQuery
 from service.store.value_range import ValueRange
 

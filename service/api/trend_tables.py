@@ -7,8 +7,8 @@ from core.monitor.catalogue import BY_NAME
 from service.api.tables import Column
 from service.api.trend_groups import TrendGroup
 from service.api.views import LEVEL_NAMES
-from service.store.codec import U_RANDOM, U_SYSTEMATIC
 from service.store.port import Trend, TrendSeries
+from service.store.series import U_RANDOM, U_SYSTEMATIC
 
 T = TypeVar("T")
 

@@ -8,8 +8,8 @@ from service.api.series_models import TrendGroupModel, TrendModel, TrendSeriesMo
 from service.api.trend_groups import TrendGroup
 from service.api.views import LEVEL_NAMES
 from service.runtime.times import rfc3339
-from service.store.codec import U_RANDOM, U_SYSTEMATIC, columns_of
 from service.store.port import Trend, TrendQuery, TrendSeries
+from service.store.series import U_RANDOM, U_SYSTEMATIC, columns_of
 
 
 def trend_model(

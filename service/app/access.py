@@ -4,9 +4,8 @@ from acquisition.clock import Clock
 from service.api.auth.desk import AccessDesk
 from service.settings.addresses import Doorway, is_loopback, why_closed
 from service.settings.plant import PlantFile
+from service.store.access.identities import Role, SessionLimits
 from service.store.access.port import AccessStore
-from service.store.access.roles import Role
-from service.store.access.sessions import SessionLimits
 
 
 class ClosedError(Exception):

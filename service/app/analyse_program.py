@@ -39,8 +39,8 @@ from service.runtime.stopping import stop_on_signals
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
-from service.store.instance import only_one
-from service.store.positions_port import StreamPosition
+from service.store.holds import only_one
+from service.store.sharing import StreamPosition
 
 WATCH_EVERY_S = 1.0
 

@@ -38,9 +38,7 @@ from service.reports.keeper import EvidenceKeeper
 from service.runtime.heartbeats import Loop
 from service.runtime.space.watch import SpaceWatch
 from service.settings.origin import Origin
-from service.store.retaining import Retaining
-from service.store.rolling import Rolling
-from service.store.scrubbing import Scrubbing
+from service.store.loops import Retaining, Rolling, Scrubbing
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from service.settings.delivery import (
 )
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
-from service.store.outbox_port import Address, nobody
+from service.store.outbox import Address, nobody
 
 LEVELS = {"alert": AlarmLevel.ALERT, "danger": AlarmLevel.DANGER}
 

@@ -27,7 +27,7 @@ from service.runtime.service_manager import NOBODY, ServiceManager
 from service.runtime.stopping import stop_on_signals
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
-from service.store.instance import only_one
+from service.store.holds import only_one
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import json
 from dataclasses import dataclass
 
-from service.store.access.audit_entry import AuditEntry, Deed
+from service.store.access.audit_entries import AuditEntry, Deed
 
 PADWATCH, SERVICE, CONFIGURATION, CLOCK = "padwatch", "service", "configuration", "clock"
 STARTED, STOPPED, CHANGED = "service.started", "service.stopped", "configuration.changed"

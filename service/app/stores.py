@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.settings.spectra import SpectraSettings
-from service.store.access.audit_head import head_path
+from service.store.access.audit_verification import head_path
 from service.store.audit import Trail
-from service.store.outbox_port import Address, nobody
+from service.store.outbox import Address, nobody
 from service.store.port import Store
 from service.store.spectra_port import SpectraLimits, TierLimits
 from service.store.sqlite import SqliteStore

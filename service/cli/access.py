@@ -11,9 +11,8 @@ from service.app.stores import has_store, open_store, store_name
 from service.cli.plant_file import fail
 from service.runtime.made_by import made_by
 from service.settings.plant import PlantFile
-from service.store.access.acting import Acting, acting_as
-from service.store.access.audit_entry import Source
-from service.store.access.names import NameRefusedError
+from service.store.access.audit_entries import Acting, Source, acting_as
+from service.store.access.identities import NameRefusedError
 from service.store.access.port import AccessRefusedError, AccessStore
 from service.store.port import StoreError
 

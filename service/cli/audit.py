@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 from service.api.audit_csv import write_csv
 from service.app.stores import open_trail
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.store.access.audit_walk import Verdict
+from service.store.access.audit_verification import Verdict
 from service.store.port import StoreError
 
 app = typer.Typer(no_args_is_help=True, help="The audit trail: who did what to what.")

@@ -13,10 +13,8 @@ from service.app.stores import database_path, store_name
 from service.cli.access import access_of
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.settings.plant import PlantFile
-from service.store.backup.backing_up import back_up
-from service.store.backup.check import BackupError
-from service.store.backup.restoring import restore as put_back
-from service.store.backup.taken_back import AccessAfter, access_before, take_back
+from service.store.backup import AccessAfter, BackupError, access_before, back_up, take_back
+from service.store.backup import restore as put_back
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 

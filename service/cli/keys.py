@@ -9,8 +9,7 @@ from acquisition.clock import SystemClock
 from service.api.auth.people import create_key
 from service.cli.access import access_of, time_text
 from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.store.access.keys import MAX_DAYS, ApiKey
-from service.store.access.roles import Role
+from service.store.access.identities import MAX_DAYS, ApiKey, Role
 
 app = typer.Typer(no_args_is_help=True, help="Keys of machines: create, list, revoke.")
 

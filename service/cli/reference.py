@@ -23,8 +23,7 @@ from service.measuring.references_in_force import (
 from service.runtime.made_by import person
 from service.settings.core_values import machine_of
 from service.settings.plant import PlantFile
-from service.store.access.acting import Acting, acting_as
-from service.store.access.audit_entry import Source
+from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import Store, StoreError
 

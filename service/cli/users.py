@@ -11,8 +11,7 @@ from service.api.auth.people import People
 from service.cli.access import access_of, time_text
 from service.cli.passwords import PasswordFd, password_from
 from service.cli.plant_file import PlantPath, read_plant_file
-from service.store.access.names import account_name
-from service.store.access.roles import Role
+from service.store.access.identities import Role, account_name
 
 app = typer.Typer(no_args_is_help=True, help="Accounts of people: add, list, change, remove.")
 

@@ -17,7 +17,7 @@ from service.live.live_view import LinkState, LiveView
 from service.measuring.acquirer import LinkNews
 from service.measuring.analyser import VERSION, Analyser, UnitMemory
 from service.measuring.recorder import Findings, Recorder
-from service.store.positions_port import StreamPosition
+from service.store.sharing import StreamPosition
 
 _MEMORY = TypeAdapter(UnitMemory)
 

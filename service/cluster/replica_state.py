@@ -35,7 +35,7 @@ from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.film_rules import film_rules_of
 from service.settings.plant import PlantFile
 from service.store.film_port import FilmStore
-from service.store.outbox_port import Backlog, Outbox
+from service.store.outbox import Backlog, Outbox
 from service.store.port import StoreError
 
 DRIFT = 1e-3

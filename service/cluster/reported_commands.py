@@ -28,10 +28,9 @@ from service.measuring.films import FilmKeeper
 from service.measuring.recorder import NotStoredError, Recorder
 from service.runtime.background import TroubleLog
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.store.access.acting import Acting, acting, acting_as
-from service.store.access.audit_entry import Source
-from service.store.commands_port import DONE, OPEN, Answer, Command, CommandState, OpenCommand
+from service.store.access.audit_entries import Acting, Source, acting, acting_as
 from service.store.port import Store, StoreError
+from service.store.sharing import DONE, OPEN, Answer, Command, CommandState, OpenCommand
 
 WAIT_S = 5.0
 """How long an operator waits for whoever analyses the unit."""

@@ -31,7 +31,7 @@ from service.runtime.background import TroubleLog
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.units import UnitSettings
 from service.store.port import Store, StoreError
-from service.store.unit_states_port import UnitBeat, UnitReport, UnitStates
+from service.store.sharing import UnitBeat, UnitReport, UnitStates
 
 EVERY_S = 1.0
 

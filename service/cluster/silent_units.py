@@ -16,7 +16,7 @@ from service.measuring.service_alarms import ToldAlarms, gone_alarms, is_shared,
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.units import UnitSettings
 from service.store.port import Store, StoreError
-from service.store.unit_states_port import UnitBeat
+from service.store.sharing import UnitBeat
 
 SILENT_AFTER_S = 30.0
 """A standby takes over within seconds, a restart within ten: what lasts longer, somebody must see

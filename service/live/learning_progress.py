@@ -11,7 +11,7 @@ from core.condition.operating_state import STEADY
 from core.units import DAY_NS
 from service.live.commands import FilmPlace
 from service.settings.film_alarms import FilmAlarmSettings
-from service.store.baseline_versions import Versions
+from service.store.baselines import Versions
 from service.store.film_port import BaselineEntry, FilmHistory, FilmQuery, FilmStore
 
 RECENT_DAYS = 7.0

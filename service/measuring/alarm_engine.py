@@ -41,7 +41,7 @@ from service.settings.film_rules import film_rules_of
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
-from service.store.access.acting import acting
+from service.store.access.audit_entries import acting
 from service.store.port import AlarmQuery, Store
 
 log = structlog.get_logger()

@@ -17,7 +17,7 @@ from core.condition.operating_state import OilSettling, Operation
 from core.units import NS_PER_S
 from service.live.commands import FilmPlace
 from service.measuring.baseline_learning import common_times
-from service.store.baseline_versions import versions_after
+from service.store.baselines import versions_after
 from service.store.film_port import FilmHistory, FilmQuery, FilmStore
 
 TAIL_NS = 2 * 86_400 * NS_PER_S

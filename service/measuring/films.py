@@ -24,7 +24,7 @@ from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.film_rules import film_rules_of
 from service.settings.plant import PlantFile
-from service.store.baseline_versions import Versions
+from service.store.baselines import Versions
 from service.store.film_port import FilmStore, StoredStep
 from service.store.port import StoreError
 

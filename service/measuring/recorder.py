@@ -23,7 +23,7 @@ from core.spectra.cross_spectrum import NO_SPECTRUM
 from service.live.live_view import LiveView
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.store.port import RefusedRowError, Store, StoreError, UnitGap
-from service.store.positions_port import StreamPosition
+from service.store.sharing import StreamPosition
 
 FILE = "parked.jsonl"
 

@@ -7,9 +7,9 @@ import structlog
 from acquisition.clock import Clock
 from service.live.live_view import LiveView
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.store.access.audit_entry import Deed
+from service.store.access.audit_entries import Deed
 from service.store.port import Store, StoreError
-from service.store.seals.damage import Place
+from service.store.seals import Place
 
 log = structlog.get_logger()
 

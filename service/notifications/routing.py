@@ -9,7 +9,7 @@ from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.limits import AlarmLevel
 from core.units import NS_PER_S
 from service.notifications.message import Composer, dumps
-from service.store.outbox_port import Letter
+from service.store.outbox import Letter
 
 ACTIVE = (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED)
 HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)

@@ -16,7 +16,7 @@ from service.notifications.channel import Carrier, Delivered, Failed, Outcome
 from service.notifications.message import loads
 from service.notifications.routing import QuietHours
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
-from service.store.outbox_port import Backlog, LetterState, Outbox, StoredLetter
+from service.store.outbox import Backlog, LetterState, Outbox, StoredLetter
 from service.store.port import StoreError
 
 FIRST_S = 1.0

@@ -24,7 +24,7 @@ from service.reports.report.page import POLICY
 from service.reports.tables import TableError
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import ALARM_KINDS
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 
 ID = re.compile(r"([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([a-z0-9_]+)")
 

@@ -16,21 +16,13 @@ from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
 from service.settings.alarm_kinds import ALARM_KINDS
-from service.store.access.audit_entry import Deed
+from service.store.access.audit_entries import Deed
 from service.store.audit_deeds import alarm_deeds
-from service.store.commands import answer_command
-from service.store.commands_port import DONE
-from service.store.conditions import (
-    BETWEEN_BOUNDS,
-    IN_STATES,
-    at_least,
-    at_most,
-    condition_arguments,
-)
 from service.store.database import Connection
-from service.store.outbox import insert_letters
-from service.store.outbox_port import Address, nobody
+from service.store.outbox import Address, insert_letters, nobody
 from service.store.port import AlarmQuery, StoredEvent, StoreError
+from service.store.sharing import DONE, answer_command
+from service.store.trends import BETWEEN_BOUNDS, IN_STATES, at_least, at_most, condition_arguments
 
 POINT_COLUMNS = "operating_state, eccentricity_ratio, attitude_deg, oil_temperature_c"
 

@@ -5,9 +5,15 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from service.store.access.audit_entry import AuditEntry, Deed
-from service.store.access.audit_head import AuditHead, HeadError, read_head
-from service.store.access.audit_walk import Verdict, place_of, walk
+from service.store.access.audit_entries import AuditEntry, Deed
+from service.store.access.audit_verification import (
+    AuditHead,
+    HeadError,
+    Verdict,
+    place_of,
+    read_head,
+    walk,
+)
 from service.store.audit_chain import COLUMNS, AuditChain, entry_of, newest_of
 from service.store.audit_port import AuditQuery
 from service.store.database import Connect, Connection, Reading

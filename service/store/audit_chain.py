@@ -1,4 +1,4 @@
-"""`AuditChain`: entries are added in the transaction of what they tell of, the head after it."""
+"""The audit trail in the database: its table, and the chain that entries are added to."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -6,10 +6,14 @@ from dataclasses import asdict, astuple
 from pathlib import Path
 from threading import Lock
 
-from service.store.access.audit_entry import AuditEntry, Deed
-from service.store.access.audit_hashing import FIRST, chained
-from service.store.access.audit_head import AuditHead, HeadError, read_head, write_head
-from service.store.access.audit_walk import HEAD_DIFFERED
+from service.store.access.audit_entries import FIRST, AuditEntry, Deed, chained
+from service.store.access.audit_verification import (
+    HEAD_DIFFERED,
+    AuditHead,
+    HeadError,
+    read_head,
+    write_head,
+)
 from service.store.database import Connection, Database
 from service.store.port import StoreError
 
@@ -135,3 +139,32 @@ def _told(deed: Deed, newest: AuditHead, why: str) -> Deed:
 def entry_of(row: tuple[object, ...]) -> AuditEntry:
     """A row as an entry, whatever it holds: what is wrong with it shows in its hash."""
     return AuditEntry(*row)  # type: ignore[arg-type]
+
+
+AUDIT_TABLES = """
+    CREATE TABLE audit (
+        number INTEGER PRIMARY KEY AUTOINCREMENT,
+        time_ns INTEGER NOT NULL,
+        actor TEXT NOT NULL,
+        source TEXT NOT NULL CHECK (source IN ('api', 'command_line', 'padwatch')),
+        peer TEXT,
+        action TEXT NOT NULL,
+        object TEXT NOT NULL,
+        before TEXT,
+        after TEXT,
+        reason TEXT NOT NULL,
+        previous_hash TEXT NOT NULL,
+        hash TEXT NOT NULL
+    ) STRICT;
+    CREATE INDEX audit_of_actor ON audit (actor, number);
+    CREATE INDEX audit_of_action ON audit (action, number);
+    CREATE INDEX audit_of_object ON audit (object, number);
+    CREATE TRIGGER audit_follows BEFORE INSERT ON audit
+    WHEN NEW.number IS NOT (SELECT coalesce(max(number), 0) + 1 FROM audit)
+    BEGIN SELECT RAISE(ABORT, 'entries of the audit trail follow one another'); END;
+    CREATE TRIGGER audit_kept_as_told BEFORE UPDATE ON audit
+    BEGIN SELECT RAISE(ABORT, 'entries of the audit trail are kept as they were told'); END;
+    CREATE TRIGGER audit_kept BEFORE DELETE ON audit
+    BEGIN SELECT RAISE(ABORT, 'entries of the audit trail are kept'); END;
+"""
+"""Statements of the migration that brings it."""

@@ -4,10 +4,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmNews, Hold
-from service.store.access.acting import acting
-from service.store.access.audit_entry import Deed, Source
-from service.store.baseline_versions import Versions, versions_after
-from service.store.baselines import select_steps
+from service.store.access.audit_entries import Deed, Source, acting
+from service.store.baselines import Versions, select_steps, versions_after
 from service.store.database import Connection
 from service.store.film_port import BaselineStep, StoredStep
 from service.store.gap_reference import GapReference

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from service.store.access.audit_entry import AuditEntry, Deed
+from service.store.access.audit_entries import AuditEntry, Deed
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,13 @@ from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmValue
 from core.machine.unit import Estimator
-from service.store.conditions import BETWEEN_BOUNDS, IN_STATES, condition_arguments
 from service.store.database import Connection
 from service.store.documents import decision_from_json, to_json
 from service.store.film_port import FilmHistory, FilmQuery, Provenance, StoredDecision
 from service.store.moments import free_moment
 from service.store.port import StoreError
 from service.store.series import series_of
+from service.store.trends import BETWEEN_BOUNDS, IN_STATES, condition_arguments
 
 CONDITION_COLUMNS = (
     *("speed_rpm", "power_mw", "eccentricity_ratio", "u_eccentricity"),

@@ -3,12 +3,12 @@
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
-from service.store.access.audit_entry import Deed
+from service.store.access.audit_entries import Deed
 from service.store.audit_chain import AuditChain
 from service.store.database import Connection
 from service.store.highwater.commits import CommitMarks
 from service.store.highwater.comparison import MarkFinding
-from service.store.seals.damage import DamageLog, Place
+from service.store.seals import DamageLog, Place
 
 
 class Marked:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from service.store.highwater.comparison import MarkFinding
-from service.store.seals.damage import Place
+from service.store.seals import Place
 
 
 class Integrity(Protocol):

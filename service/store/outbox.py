@@ -1,11 +1,148 @@
-"""The outbox: letters are queued in the transaction that stores what they tell."""
+"""Letters queued in the transaction of what they report."""
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any, Protocol
 
-from core.alarms.alarm import AlarmEvent
+from core.alarms.alarm import Alarm, AlarmEvent
 from service.store.database import Connect, Connection
-from service.store.outbox_port import DEAD, Backlog, Letter, LetterState, StoredLetter
+
+
+class LetterState(StrEnum):
+    """What has become of a letter; all but the first are for ever."""
+
+    WAITING = "waiting"
+    DELIVERED = "delivered"
+    REFUSED = "refused"
+    EXPIRED = "expired"
+
+
+DEAD = (LetterState.REFUSED, LetterState.EXPIRED)
+"""Letters that will never be delivered."""
+
+
+@dataclass(frozen=True)
+class Letter:
+    """An event of an alarm, to be told to one receiver.
+
+    Parameters
+    ----------
+    event_id
+        The same for all receivers and all attempts.
+    body
+        The message as JSON.
+    queued_ns
+        When it was written, by the host's clock.
+    is_urgent
+        Whether it ends quiet hours.
+    is_active
+        Whether the receiver takes the alarm for active once it has been told.
+    closes
+        Whether it is only for a receiver that takes the alarm for active.
+    """
+
+    receiver: str
+    event_id: str
+    body: str
+    queued_ns: int
+    is_urgent: bool
+    is_active: bool
+    closes: bool
+
+
+Address = Callable[[Alarm, AlarmEvent], Iterable[Letter]]
+"""Who is to be told of an event of an alarm."""
+
+
+def nobody(alarm: Alarm, event: AlarmEvent) -> Iterable[Letter]:  # noqa: ARG001
+    """Tell nobody."""
+    return ()
+
+
+@dataclass(frozen=True)
+class StoredLetter:
+    """A letter in the outbox.
+
+    Parameters
+    ----------
+    id
+        Higher than that of all letters that were queued before it.
+    n_attempts
+        How often it was tried in vain.
+    answer
+        What came of the newest attempt, in words.
+    done_ns
+        When it was delivered or given up; None while it waits.
+    """
+
+    id: int
+    receiver: str
+    event_id: str
+    body: str
+    queued_ns: int
+    is_urgent: bool
+    state: LetterState
+    n_attempts: int
+    answer: str
+    done_ns: int | None
+
+
+@dataclass(frozen=True)
+class Backlog:
+    """What an outbox holds for one receiver.
+
+    Parameters
+    ----------
+    oldest_ns
+        Since when the first of those that wait does; None if none does.
+    n_dead
+        How many were refused or given up, ever.
+    last_dead
+        The newest of these.
+    delivered_ns
+        When one was delivered last.
+    """
+
+    receiver: str
+    n_waiting: int
+    oldest_ns: int | None
+    n_dead: int
+    last_dead: StoredLetter | None
+    delivered_ns: int | None
+
+
+class Outbox(Protocol):
+    """Durable letters; each method that changes something is on the disk when it returns."""
+
+    def waiting(self, receiver: str, limit: int) -> Sequence[StoredLetter]:
+        """Read the first of what waits for a receiver, in order."""
+        ...
+
+    def urgent(self, receiver: str) -> bool:
+        """Whether anything that waits for a receiver ends quiet hours."""
+        ...
+
+    def finish(self, letter: int, state: LetterState, answer: str, now_ns: int) -> None:
+        """Note that a letter was delivered or refused."""
+        ...
+
+    def fail(self, letter: int, answer: str) -> None:
+        """Note an attempt in vain; the letter goes on waiting."""
+        ...
+
+    def expire(self, receiver: str, before_ns: int, answer: str, now_ns: int) -> int:
+        """Give up what has waited since before a time, and happened before it; return how many."""
+        ...
+
+    def revive(self, receiver: str, now_ns: int) -> int:
+        """Let what was refused or given up wait again, in its old place; return how many."""
+        ...
+
+    def backlogs(self) -> Sequence[Backlog]:
+        """Look at everyone for whom there ever was a letter."""
+        ...
+
 
 MAX_ANSWER = 500
 """Characters of what a receiver has said that are kept."""
@@ -139,3 +276,32 @@ def _letter(row: tuple[Any, ...]) -> StoredLetter:
         *(id_, receiver, event_id, body, queued_ns, bool(is_urgent), LetterState(state)),
         *(n_attempts, answer, done_ns),
     )
+
+
+OUTBOX_TABLES = """
+    CREATE TABLE outbox (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        receiver TEXT NOT NULL,
+        event_id TEXT NOT NULL,
+        alarm TEXT NOT NULL,
+        number INTEGER NOT NULL,
+        body TEXT NOT NULL,
+        queued_ns INTEGER NOT NULL,
+        is_urgent INTEGER NOT NULL CHECK (is_urgent IN (0, 1)),
+        is_active INTEGER NOT NULL CHECK (is_active IN (0, 1)),
+        state TEXT NOT NULL DEFAULT 'waiting'
+            CHECK (state IN ('waiting', 'delivered', 'refused', 'expired')),
+        n_attempts INTEGER NOT NULL DEFAULT 0,
+        answer TEXT NOT NULL DEFAULT '',
+        done_ns INTEGER,
+        UNIQUE (receiver, alarm, number),
+        FOREIGN KEY (alarm, number) REFERENCES alarm_event (alarm, number)
+    ) STRICT;
+    CREATE INDEX outbox_of_receiver ON outbox (receiver, state, id);
+    CREATE TRIGGER outbox_kept BEFORE DELETE ON outbox
+    BEGIN SELECT RAISE(ABORT, 'what was told is kept'); END;
+    CREATE TRIGGER outbox_kept_as_queued
+    BEFORE UPDATE OF receiver, event_id, alarm, number, body ON outbox
+    BEGIN SELECT RAISE(ABORT, 'what is told is kept as it was queued'); END;
+    """
+"""A letter for each event and receiver; nothing of it is changed but what has come of it."""

@@ -13,17 +13,15 @@ from core.quality import Level, Reading
 from core.samples.gaps import Gap, Reach
 from service.store.access.port import AccessStore
 from service.store.audit_port import AuditStore
-from service.store.commands_port import Commands
 from service.store.database import Hold
 from service.store.film_port import FilmStore
 from service.store.gap_reference import GapReference
 from service.store.integrity_port import Integrity
-from service.store.outbox_port import Outbox
-from service.store.positions_port import StreamPosition
+from service.store.outbox import Outbox
 from service.store.retention.port import RetentionStore
 from service.store.rollups.port import RollupStore
+from service.store.sharing import Commands, StreamPosition, UnitStates
 from service.store.spectra_port import SpectraStore
-from service.store.unit_states_port import UnitStates
 from service.store.value_range import ValueRange
 from service.store.vector_reference_port import VectorReferenceStore
 from service.store.waveform_port import WaveformStore

@@ -7,16 +7,14 @@ triggers; one that it cannot translate is written for PostgreSQL beside it, in
 tests of the store, which go over both.
 """
 
-from service.store.access.schema import ACCESS_TABLES, MUST_CHANGE
-from service.store.audit_schema import AUDIT_TABLES
-from service.store.commands import COMMAND_TABLES
-from service.store.film_schema import FILM_TABLES
-from service.store.outbox_schema import OUTBOX_TABLES
-from service.store.positions import POSITION_TABLES
+from service.store.access.tables import ACCESS_TABLES, MUST_CHANGE
+from service.store.audit_chain import AUDIT_TABLES
+from service.store.films import FILM_TABLES
+from service.store.outbox import OUTBOX_TABLES
 from service.store.retention.schema import RETENTION_TABLES
-from service.store.rollups.schema import ROLLUP_TABLES
-from service.store.spectra_schema import SPECTRA_TABLES
-from service.store.unit_states import UNIT_STATUS_TABLES
+from service.store.rollups.rows import ROLLUP_TABLES
+from service.store.sharing import COMMAND_TABLES, POSITION_TABLES, UNIT_STATUS_TABLES
+from service.store.spectra import SPECTRA_TABLES
 from service.store.vector_references import VECTOR_REFERENCE_TABLES
 from service.store.waveforms import WAVEFORM_TABLES
 

@@ -11,10 +11,10 @@ from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.machine.unit import Estimator
 from core.quality import GOOD, Reason, bad
 from core.spectra.speed import SpeedSource
-from service.store.codec import LEVEL_SHIFT
 from service.store.database import Connection
 from service.store.film_port import FilmHistory, Provenance
 from service.store.film_readings import COLUMNS, CONDITION_COLUMNS, INSERT
+from service.store.series import LEVEL_SHIFT
 
 MEASURED = ("ln_k", "u_random", "shaft_um_pk", "bearing_um_pk")
 SAID = ("verdict", "level", "change", "change_std", "deviation", "deviation_std")

@@ -1,5 +1,7 @@
-"""Spectra over time: one row for each stretch of time, in two densities."""
+"""Spectra over time in the database."""
 
+import hashlib
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -12,7 +14,6 @@ from core.quality import Level, Quality, Reason, worst
 from core.stiffness.order_line import marked_hz
 from service.store.database import Connect, Connection
 from service.store.series import series_of
-from service.store.spectra_codec import checksum, decode, encode
 from service.store.spectra_port import (
     N_CHANNELS,
     Spectra,
@@ -23,6 +24,50 @@ from service.store.spectra_port import (
     TierLimits,
 )
 from service.store.trends import storable
+
+LOWEST_UM, HIGHEST_UM = 1e-6, 1e5
+"""What can be told apart: smaller amplitudes read zero, larger ones this."""
+
+N_STEPS = 65_533
+STEP = math.log(HIGHEST_UM / LOWEST_UM) / N_STEPS
+"""Of the logarithm: amplitudes come back within 0.02 %, which no transducer is worth."""
+
+ZERO, UNUSABLE = 0, 65_535
+
+CHECKSUM_BYTES = 8
+
+
+def encode(amplitude_um_pk: FloatArray) -> bytes:
+    """(N_CHANNELS, n_lines) amplitudes, NaN where a channel is not usable."""
+    usable = np.nan_to_num(amplitude_um_pk, nan=LOWEST_UM)
+    steps = np.log(np.clip(usable, LOWEST_UM, HIGHEST_UM) / LOWEST_UM) / STEP
+    codes = 1 + np.round(steps).astype(np.int64)
+    codes[usable < LOWEST_UM] = ZERO
+    codes[np.isnan(amplitude_um_pk)] = UNUSABLE
+    return codes.astype("<u2").tobytes()
+
+
+def decode(amplitudes: bytes) -> FloatArray:
+    """Invert `encode`."""
+    codes = np.frombuffer(amplitudes, dtype="<u2").reshape(N_CHANNELS, -1)
+    found: FloatArray = LOWEST_UM * np.exp(STEP * (codes.astype(np.float64) - 1.0))
+    found[codes == ZERO] = 0.0
+    found[codes == UNUSABLE] = np.nan
+    return found
+
+
+def checksum(facts: tuple[object, ...], amplitudes: bytes) -> bytes:
+    """Of all that is kept of a spectrum.
+
+    Parameters
+    ----------
+    facts
+        Integers, floats, texts and None, just as they come back from the database.
+    """
+    digest = hashlib.blake2b(repr(facts).encode(), digest_size=CHECKSUM_BYTES)
+    digest.update(amplitudes)
+    return digest.digest()
+
 
 FACTS = (
     *("series", "time_ns", "duration_s", "n_segments", "operating_state"),
@@ -182,3 +227,30 @@ def _spectrum(row: tuple[Any, ...]) -> StoredSpectrum:
         quality=Quality(level, reason),
         amplitude_um_pk=decode(facts["amplitudes"]),
     )
+
+
+SPECTRA_TABLES = """
+    CREATE TABLE spectrum (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        series INTEGER NOT NULL REFERENCES series (id),
+        tier INTEGER NOT NULL CHECK (tier IN (0, 1)),
+        slot INTEGER NOT NULL,
+        time_ns INTEGER NOT NULL,
+        duration_s REAL NOT NULL,
+        n_segments INTEGER NOT NULL,
+        operating_state INTEGER NOT NULL,
+        quality_level INTEGER NOT NULL,
+        quality_reason TEXT NOT NULL,
+        speed_rpm REAL,
+        power_mw REAL,
+        order1_hz REAL,
+        vortex_hz REAL,
+        bin_hz REAL NOT NULL CHECK (bin_hz > 0),
+        amplitudes BLOB NOT NULL,
+        checksum BLOB NOT NULL,
+        UNIQUE (series, tier, slot)
+    ) STRICT;
+    CREATE INDEX spectrum_at ON spectrum (series, time_ns);
+    CREATE INDEX spectrum_of ON spectrum (series, tier);
+"""
+"""Statements of the migration that brings them."""

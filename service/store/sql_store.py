@@ -14,17 +14,13 @@ from service.store.alarms import insert_alarms, select_alarms, select_events
 from service.store.audit import SqlAudit
 from service.store.audit_chain import AuditChain
 from service.store.audit_deeds import reference_deed
-from service.store.codec import Layout, columns_of, remember_layout
-from service.store.commands import StoredCommands
 from service.store.database import Connection, Database, Hold
 from service.store.film_readings import insert_film_news
 from service.store.films import SqlFilms
 from service.store.gap_reference import GapReference
 from service.store.integrity_port import Integrity, Unmarked
 from service.store.moments import free_moment
-from service.store.newest import select_newest
-from service.store.outbox import SqlOutbox
-from service.store.outbox_port import Address, nobody
+from service.store.outbox import Address, SqlOutbox, nobody
 from service.store.port import (
     AlarmQuery,
     QueryTooLargeError,
@@ -34,18 +30,22 @@ from service.store.port import (
     TrendQuery,
     UnitGap,
 )
-from service.store.positions import select_position, write_positions
-from service.store.positions_port import StreamPosition
-from service.store.reach import gap_of, select_reach
 from service.store.references import insert_reference, is_set, select_history, select_in_force
+from service.store.results import gap_of, select_newest, select_reach
 from service.store.retention.sql import SqlRetention
+from service.store.rollups.coverage import read_trend
 from service.store.rollups.gathering import SqlRollups
-from service.store.rollups.reading import read_trend
-from service.store.series import series_of
+from service.store.series import Layout, columns_of, remember_layout, series_of
+from service.store.sharing import (
+    StoredCommands,
+    StoredUnitStates,
+    StreamPosition,
+    select_position,
+    write_positions,
+)
 from service.store.spectra import SqlSpectra, insert_spectra
 from service.store.spectra_port import SpectraLimits
 from service.store.trends import storable
-from service.store.unit_states import StoredUnitStates
 from service.store.vector_references import SqlVectorReferences
 from service.store.waveforms import StoredWaveforms
 

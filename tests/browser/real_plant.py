@@ -21,7 +21,7 @@ from service.cli.offline.demo.past import fill
 from service.measuring.simulated_sources import simulated_history
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
-from service.store.access.roles import Role
+from service.store.access.identities import Role
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
 DEMO, DEMO_LIFE = DEPLOY / "demo.toml", DEPLOY / "demo-life.toml"

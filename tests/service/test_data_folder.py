@@ -7,8 +7,7 @@ import pytest
 from rigs.command_line import padwatch
 from structlog.testing import capture_logs
 
-from service.store.file_system import FileSystem
-from service.store.instance import only_one
+from service.store.holds import FileSystem, only_one
 from service.store.port import StoreError
 
 

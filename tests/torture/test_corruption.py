@@ -20,7 +20,7 @@ from acquisition.recordings.reader import open_recording
 from acquisition.recordings.summary import summary_of
 from acquisition.recordings.writer import RecordingWriter
 from service.store.port import StoreError
-from service.store.seals.table import SealedTable
+from service.store.seals import SealedTable
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.checking import findings
 

@@ -6,7 +6,7 @@ from pydantic import FailFast, Field
 
 from service.api.auth.session_models import LoginName, Password, RoleName
 from service.api.models import ApiModel, RequestModel, Time
-from service.store.access.keys import MAX_DAYS
+from service.store.access.identities import MAX_DAYS
 
 UnitName = Annotated[str, Field(max_length=32, examples=["U1"])]
 

@@ -17,8 +17,7 @@ from service.api.auth.mistakes import told_as_problems
 from service.api.auth.registry import AccessRegistry
 from service.api.auth.views import account_model
 from service.api.problems import ProblemError, described_problems
-from service.store.access.identity import Means
-from service.store.access.roles import Permission, Role
+from service.store.access.identities import Means, Permission, Role
 
 AccountName = Annotated[
     str, Path(description="Name of an account.", max_length=256, examples=["anna"])

@@ -3,8 +3,8 @@
 from fastapi import Request
 
 from service.api.auth.gate import identity_of
-from service.store.access.acting import acting, name_actor
-from service.store.access.identity import LOCAL
+from service.store.access.audit_entries import acting, name_actor
+from service.store.access.identities import LOCAL
 
 
 def actor_or(given: str | None) -> str:

@@ -11,7 +11,7 @@ from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute, iter_route_contexts
 from starlette.routing import BaseRoute, Route
 
-from service.store.access.roles import Permission
+from service.store.access.identities import Permission
 
 
 class Reach(StrEnum):

@@ -15,10 +15,8 @@ from service.api.auth.passwords import Hashing
 from service.api.auth.people import People
 from service.api.auth.registry import AccessRegistry
 from service.api.auth.work import AccessWork
-from service.store.access.identity import LOCAL, Identity, Means
+from service.store.access.identities import LOCAL, Identity, Means, Role, SessionLimits
 from service.store.access.port import AccessStore
-from service.store.access.roles import Role
-from service.store.access.sessions import SessionLimits
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,21 @@ from enum import StrEnum
 
 from service.api.auth.backoff import Backoff
 from service.api.auth.passwords import Hashing
-from service.store.access.identity import Identity, Means
-from service.store.access.keys import KeyState
-from service.store.access.names import NameRefusedError, account_name
+from service.store.access.identities import (
+    Identity,
+    KeyState,
+    Means,
+    NameRefusedError,
+    Session,
+    SessionLimits,
+    account_name,
+    digest,
+    is_token,
+    is_token_of,
+    key_id,
+    new_token,
+)
 from service.store.access.port import AccessStore, Account
-from service.store.access.sessions import Session, SessionLimits
-from service.store.access.tokens import digest, is_token, is_token_of, key_id, new_token
 
 
 def at_once(note: Callable[[], None]) -> None:

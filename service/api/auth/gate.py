@@ -17,8 +17,8 @@ from service.api.auth.refused_requests import (
 )
 from service.api.auth.same_origin import SAFE, is_foreign
 from service.api.problems import ProblemError, problem_answer
-from service.store.access.acting import name_actor
-from service.store.access.identity import Identity
+from service.store.access.audit_entries import name_actor
+from service.store.access.identities import Identity
 from service.store.port import StoreError
 
 CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation

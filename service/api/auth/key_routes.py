@@ -12,7 +12,7 @@ from service.api.auth.registry import AccessRegistry
 from service.api.auth.views import key_model
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
-from service.store.access.roles import Permission, Role
+from service.store.access.identities import Permission, Role
 
 KeyId = Annotated[
     str, Path(description="Public part of a key.", max_length=64, examples=["5f0c6f3a9b1e"])

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from service.api.auth.passwords import PasswordRefusedError
 from service.api.auth.work import TooManyLoginsError
 from service.api.problems import ProblemError
-from service.store.access.names import NameRefusedError
+from service.store.access.identities import NameRefusedError
 from service.store.access.port import AccessRefusedError
 
 

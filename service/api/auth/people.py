@@ -4,11 +4,17 @@ from collections.abc import Sequence
 
 from core.units import DAY_NS
 from service.api.auth.passwords import Hashing, new_password
-from service.store.access.keys import MAX_DAYS, ApiKey
-from service.store.access.names import account_name
+from service.store.access.identities import (
+    MAX_DAYS,
+    ApiKey,
+    Role,
+    account_name,
+    digest,
+    is_token,
+    new_key,
+    new_token,
+)
 from service.store.access.port import AccessRefusedError, AccessStore
-from service.store.access.roles import Role
-from service.store.access.tokens import digest, is_token, new_key, new_token
 
 NS_PER_S = 1_000_000_000
 SET_UP_S = 3600.0

@@ -6,7 +6,7 @@ import structlog
 
 from acquisition.clock import Clock
 from service.api.load.allowance import Allowance
-from service.store.access.audit_entry import Deed
+from service.store.access.audit_entries import Deed
 from service.store.audit_port import AuditStore
 from service.store.port import StoreError
 

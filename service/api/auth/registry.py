@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from acquisition.clock import Clock
 from service.api.auth.people import People, create_key
 from service.api.auth.work import AccessWork
-from service.store.access.keys import ApiKey
+from service.store.access.identities import ApiKey, Role
 from service.store.access.port import AccessStore, Account
-from service.store.access.roles import Role
 
 
 class AccessRegistry:

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from service.api.auth.passwords import MAX_LENGTH
 from service.api.models import ApiModel, RequestModel
-from service.store.access.names import MAX_NAME
+from service.store.access.identities import MAX_NAME
 
 RoleName = Literal["viewer", "operator", "engineer", "admin"]
 

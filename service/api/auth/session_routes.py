@@ -16,8 +16,7 @@ from service.api.auth.told import BEGUN, ENDED, tell
 from service.api.auth.views import session_model
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
-from service.store.access.identity import Identity, Means
-from service.store.access.roles import Permission
+from service.store.access.identities import Identity, Means, Permission
 from service.store.port import StoreError
 
 LOGIN_PROBLEMS = described_problems(

@@ -3,8 +3,7 @@
 import asyncio
 
 from acquisition.clock import Clock
-from service.store.access.acting import acting, name_actor
-from service.store.access.audit_entry import Deed
+from service.store.access.audit_entries import Deed, acting, name_actor
 from service.store.audit_port import AuditStore
 
 BEGUN, ENDED = "session.begun", "session.ended"

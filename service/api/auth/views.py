@@ -6,9 +6,8 @@ from service.api.auth.account_models import AccountModel
 from service.api.auth.desk import AccessDesk, Caller
 from service.api.auth.session_models import SessionModel
 from service.runtime.times import rfc3339
-from service.store.access.keys import ApiKey
+from service.store.access.identities import ApiKey, Permission, Role
 from service.store.access.port import Account
-from service.store.access.roles import Permission, Role
 
 
 async def session_model(caller: Caller, desk: AccessDesk) -> SessionModel:

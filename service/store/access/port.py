@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from service.store.access.keys import ApiKey
-from service.store.access.roles import Role
-from service.store.access.sessions import Session
+from service.store.access.identities import ApiKey, Role, Session
 
 
 class AccessRefusedError(Exception):

@@ -8,8 +8,12 @@ import psycopg
 
 from service.store.port import StoreError
 from service.store.postgres.address import PostgresAddress
-from service.store.postgres.cancelling import cancelled_when_gone
-from service.store.postgres.connection import PostgresConnection, Session, connected
+from service.store.postgres.connection import (
+    PostgresConnection,
+    Session,
+    cancelled_when_gone,
+    connected,
+)
 from service.store.postgres.errors import renamed
 
 N_KEPT = 4

@@ -9,7 +9,7 @@ PostgreSQL needs besides), by the number of the schema it leads to.
 from collections.abc import Mapping
 
 from service.store import schema
-from service.store.postgres.dialect import for_postgres
+from service.store.postgres.statements import for_postgres
 
 WHAT = """
     CREATE TABLE padwatch (

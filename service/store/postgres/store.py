@@ -4,11 +4,10 @@ import time
 from pathlib import Path
 
 from service.settings.origin import Origin
-from service.store.access.acting import acting
-from service.store.access.audit_entry import Deed
-from service.store.access.audit_head import AuditHead, write_head
+from service.store.access.audit_entries import Deed, acting
+from service.store.access.audit_verification import AuditHead, write_head
 from service.store.audit_chain import newest_of
-from service.store.outbox_port import Address, nobody
+from service.store.outbox import Address, nobody
 from service.store.port import StoreError
 from service.store.postgres.address import PostgresAddress
 from service.store.postgres.database import PostgresDatabase

@@ -11,10 +11,8 @@ import numpy as np
 
 from service.store.database import Connection
 from service.store.retention.marks import SINGLE_S, select_gone, set_gone
-from service.store.rollups.cells import Cells
 from service.store.rollups.making import forget_width, minutes_of, rolled_columns, select_mark
-from service.store.rollups.rows import select_cells
-from service.store.rollups.widths import HOUR_NS, NS_PER_S, WIDTHS_NS
+from service.store.rollups.rows import HOUR_NS, NS_PER_S, WIDTHS_NS, Cells, select_cells
 from service.store.trends import Span
 
 MAX_READINGS = 1000

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from service.store.database import Connection
-from service.store.rollups.widths import NS_PER_S, WIDTHS_NS
+from service.store.rollups.rows import NS_PER_S, WIDTHS_NS
 
 SINGLE_S = 0
 """Stands for single readings among the widths."""

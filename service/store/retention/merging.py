@@ -2,10 +2,8 @@
 
 from service.store.database import Connection
 from service.store.retention.marks import Gone
-from service.store.rollups.cells import together
 from service.store.rollups.making import forget_width, insert_cells, minutes_of, rolled_columns
-from service.store.rollups.rows import select_cells
-from service.store.rollups.widths import HOUR_NS
+from service.store.rollups.rows import HOUR_NS, select_cells, together
 
 DELETE_READINGS = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?"
 

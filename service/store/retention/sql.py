@@ -5,7 +5,7 @@ from collections.abc import Callable
 from service.store.database import Connect, Connection
 from service.store.retention.deleting import Piece, delete_readings, delete_rollups
 from service.store.retention.limits import RetentionLimits
-from service.store.rollups.widths import HOUR_NS, NS_PER_S
+from service.store.rollups.rows import HOUR_NS, NS_PER_S
 
 MAX_FILM_READINGS = 5000
 MAX_LETTERS = 500

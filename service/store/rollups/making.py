@@ -3,11 +3,17 @@
 import numpy as np
 
 from core.monitor.catalogue import CATALOGUE
-from service.store.codec import Layout, columns_of, remember_layout
 from service.store.database import Connection
-from service.store.rollups.cells import NO_STATE, Cells, Conditions
-from service.store.rollups.codec import encoded, parts_of
-from service.store.rollups.widths import NS_PER_S, WIDTHS_NS
+from service.store.rollups.rows import (
+    NO_STATE,
+    NS_PER_S,
+    WIDTHS_NS,
+    Cells,
+    Conditions,
+    encoded,
+    parts_of,
+)
+from service.store.series import Layout, columns_of, remember_layout
 from service.store.trends import Span, decoded_rows, select_layouts
 
 MINUTE_NS = WIDTHS_NS[0]

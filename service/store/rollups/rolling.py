@@ -13,8 +13,7 @@ from service.store.rollups.making import (
     rolled_columns,
     select_mark,
 )
-from service.store.rollups.rows import select_cells
-from service.store.rollups.widths import HOUR_NS, WIDTHS_NS
+from service.store.rollups.rows import HOUR_NS, WIDTHS_NS, select_cells
 from service.store.trends import Span
 
 MAX_READINGS = 2000

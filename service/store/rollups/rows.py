@@ -1,19 +1,243 @@
-"""Roll-ups out of their tables: which cells there are in a span of time, and their numbers."""
+"""Roll-ups by condition cell: rows and bytes."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 import numpy.typing as npt
 
+from core.arrays import FloatArray
+from core.condition.cells import CellGrid
 from core.quality import Level
-from service.store.codec import Layout
-from service.store.conditions import IN_STATES, at_least, at_most
+from service.store.buckets import IntArray, Summaries
 from service.store.database import Connection
-from service.store.rollups.cells import NO_STATE, Cells, Conditions
-from service.store.rollups.codec import decoded
-from service.store.rollups.widths import NS_PER_S
-from service.store.summaries import IntArray, Summaries
-from service.store.trends import Span, select_layouts
+from service.store.series import Layout
+from service.store.trends import IN_STATES, Span, at_least, at_most, select_layouts
+
+NO_STATE = -1
+NO_BIN = np.iinfo(np.int64).min
+GRID = CellGrid()
+"""How fine conditions are told apart in roll-ups; a filter may cut through a cell all the same."""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Under which conditions readings were taken.
+
+    Parameters
+    ----------
+    state : (n,)
+        Operating state, `NO_STATE` where it is not known.
+    n_readings : (n,)
+        How many, usable or not.
+    eccentricity_low, eccentricity_high, oil_low_c, oil_high_c : (n,)
+        Extremes, NaN where they are not known.
+    """
+
+    state: IntArray
+    n_readings: IntArray
+    eccentricity_low: FloatArray
+    eccentricity_high: FloatArray
+    oil_low_c: FloatArray
+    oil_high_c: FloatArray
+
+    @classmethod
+    def of(cls, state: IntArray, eccentricity: FloatArray, oil_c: FloatArray) -> "Conditions":
+        """Of single readings."""
+        one = np.ones(state.size, dtype=np.int64)
+        return cls(state, one, eccentricity, eccentricity, oil_c, oil_c)
+
+    def summed(self, order: IntArray, starts: IntArray) -> "Conditions":
+        """One for each run of rows of an order; all rows of a run are of one cell."""
+        return Conditions(
+            self.state[order][starts],
+            np.add.reduceat(self.n_readings[order], starts),
+            np.fmin.reduceat(self.eccentricity_low[order], starts),
+            np.fmax.reduceat(self.eccentricity_high[order], starts),
+            np.fmin.reduceat(self.oil_low_c[order], starts),
+            np.fmax.reduceat(self.oil_high_c[order], starts),
+        )
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Summaries of readings with the conditions that they were taken under, in order of time."""
+
+    conditions: Conditions
+    summaries: Summaries
+
+    def gathered(self, width_ns: int) -> "Cells":
+        """The same in spans of this width: one for each condition of each span."""
+        bucket = self.summaries.time_ns // width_ns
+        keys = np.stack(
+            [
+                bins(self.conditions.oil_low_c, GRID.temperature_width_c),
+                bins(self.conditions.eccentricity_low, GRID.eccentricity_width),
+                self.conditions.state,
+                bucket,
+            ]
+        )
+        order = np.lexsort(keys)  # stable: in order of time within a cell
+        is_first = np.any(np.diff(keys[:, order], axis=1) != 0, axis=0)
+        starts = np.flatnonzero(np.concatenate([[True], is_first]))
+        times = bucket[order][starts] * width_ns
+        return Cells(
+            self.conditions.summed(order, starts), self.summaries.at(order).summed(starts, times)
+        )
+
+    def slots(self) -> IntArray:
+        """Number of each cell within its span."""
+        time_ns = self.summaries.time_ns
+        first = np.flatnonzero(np.concatenate([[True], np.diff(time_ns) != 0]))
+        lengths = np.diff(np.append(first, time_ns.size))
+        return np.arange(time_ns.size) - np.repeat(first, lengths)
+
+
+def together(one: Cells, other: Cells) -> Cells:
+    """Cells of both, the one's first: to be gathered, which puts them in order."""
+    conditions = Conditions(
+        *(
+            np.concatenate([getattr(one.conditions, name), getattr(other.conditions, name)])
+            for name in (field.name for field in fields(Conditions))
+        )
+    )
+    return Cells(conditions, one.summaries.followed_by(other.summaries))
+
+
+def bins(value: FloatArray, width: float) -> IntArray:
+    """Bin of each value, with bounds as people write them; `NO_BIN` where there is no value."""
+    known = np.isfinite(value)
+    safe = np.clip(np.where(known, value, 0.0), -1e9, 1e9)
+    number = np.floor(safe / width).astype(np.int64)
+    number += safe >= np.round((number + 1) * width, 9)
+    number -= safe < np.round(number * width, 9)
+    return np.where(known, number, NO_BIN)
+
+
+PART_COLUMNS = 24
+"""Columns of one part: its bytes fit into a page's share, without a chain of further pages."""
+
+
+def parts_of(columns: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
+    """Columns cut into parts, each with neighbours of the catalogue."""
+    return tuple(
+        columns[first : first + PART_COLUMNS] for first in range(0, len(columns), PART_COLUMNS)
+    )
+
+
+def encoded(summaries: Summaries) -> list[bytes]:
+    """Bytes of each row."""
+    usable = summaries.count > 0
+    packed = np.packbits(usable, axis=1)
+    found: list[bytes] = [b""] * len(packed)
+    for pattern, rows in _alike([bits.tobytes() for bits in packed]):
+        columns = np.flatnonzero(usable[rows[0]])
+        record = np.empty(rows.size, dtype=_record(len(summaries.names), columns.size))
+        record["level"] = summaries.level[rows]
+        record["usable"] = np.frombuffer(pattern, dtype=np.uint8)
+        chosen = np.ix_(rows, columns)
+        record["count"] = np.minimum(summaries.count[chosen], np.iinfo(np.uint32).max)
+        record["mean"], record["minimum"] = summaries.mean[chosen], summaries.minimum[chosen]
+        record["maximum"] = summaries.maximum[chosen]
+        for row, one in zip(rows.tolist(), record, strict=True):
+            found[row] = one.tobytes()
+    return found
+
+
+def decoded(names: tuple[str, ...], time_ns: IntArray, rows: Sequence[bytes]) -> Summaries:
+    """Invert `encoded`."""
+    shape, n_head = (len(rows), len(names)), len(names)
+    count, level = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.uint8)
+    mean, minimum, maximum = (np.full(shape, np.nan) for _ in range(3))
+    n_bits = -(-n_head // 8)
+    for pattern, where in _alike([row[n_head : n_head + n_bits] for row in rows]):
+        usable = np.unpackbits(np.frombuffer(pattern, dtype=np.uint8), count=n_head)
+        columns = np.flatnonzero(usable)
+        record = np.frombuffer(
+            b"".join(rows[row] for row in where.tolist()), dtype=_record(n_head, columns.size)
+        )
+        level[where] = record["level"]
+        chosen = np.ix_(where, columns)
+        count[chosen], mean[chosen] = record["count"], record["mean"]
+        minimum[chosen], maximum[chosen] = record["minimum"], record["maximum"]
+    return Summaries(names, time_ns, count, mean, minimum, maximum, level)
+
+
+def _record(n_columns: int, n_usable: int) -> np.dtype[np.void]:
+    return np.dtype(
+        [
+            ("level", np.uint8, (n_columns,)),
+            ("usable", np.uint8, (-(-n_columns // 8),)),
+            ("count", "<u4", (n_usable,)),
+            ("mean", "<f8", (n_usable,)),
+            ("minimum", "<f8", (n_usable,)),
+            ("maximum", "<f8", (n_usable,)),
+        ]
+    )
+
+
+def _alike(patterns: list[bytes]) -> list[tuple[bytes, npt.NDArray[np.int64]]]:
+    """Rows by the columns in which they have numbers: few patterns, many rows."""
+    rows: dict[bytes, list[int]] = {}
+    for row, pattern in enumerate(patterns):
+        rows.setdefault(pattern, []).append(row)
+    return [(pattern, np.array(found)) for pattern, found in rows.items()]
+
+
+ROLLUP_TABLES = """
+    CREATE TABLE rollup_cell (
+        series INTEGER NOT NULL REFERENCES series (id),
+        width_s INTEGER NOT NULL,
+        start_ns INTEGER NOT NULL,
+        slot INTEGER NOT NULL,
+        operating_state INTEGER,
+        n_readings INTEGER NOT NULL CHECK (n_readings > 0),
+        eccentricity_low REAL,
+        eccentricity_high REAL,
+        oil_low_c REAL,
+        oil_high_c REAL,
+        PRIMARY KEY (series, width_s, start_ns, slot)
+    ) STRICT, WITHOUT ROWID;
+    CREATE TABLE rollup_numbers (
+        series INTEGER NOT NULL REFERENCES series (id),
+        width_s INTEGER NOT NULL,
+        layout INTEGER NOT NULL REFERENCES layout (id),
+        start_ns INTEGER NOT NULL,
+        slot INTEGER NOT NULL,
+        numbers BLOB NOT NULL,
+        PRIMARY KEY (series, width_s, layout, start_ns, slot)
+    ) STRICT, WITHOUT ROWID;
+    CREATE TABLE rollup_mark (
+        series INTEGER PRIMARY KEY REFERENCES series (id),
+        until_ns INTEGER NOT NULL
+    ) STRICT;
+    CREATE TABLE rollup_redo (
+        series INTEGER NOT NULL REFERENCES series (id),
+        start_ns INTEGER NOT NULL,
+        PRIMARY KEY (series, start_ns)
+    ) STRICT, WITHOUT ROWID;
+    CREATE TRIGGER rollup_of_a_late_reading AFTER INSERT ON assessment
+    WHEN NEW.time_ns < (SELECT until_ns FROM rollup_mark WHERE series = NEW.series)
+    BEGIN
+        INSERT INTO rollup_redo
+        VALUES (NEW.series, NEW.time_ns - NEW.time_ns % 3600000000000)
+        ON CONFLICT DO NOTHING;
+    END;
+"""
+"""Statements of the migration that brings them.
+
+Whoever writes a reading into what has been gathered already marks its hour in the same transaction,
+and until that is gathered anew nobody reads its roll-ups.
+"""
+
+
+NS_PER_S = 1_000_000_000
+WIDTHS_S = (60, 600, 3600)
+"""Finest first; each divides the next, and the last one is that of what is redone."""
+
+WIDTHS_NS = tuple(width * NS_PER_S for width in WIDTHS_S)
+HOUR_NS = WIDTHS_NS[-1]
+
 
 ANYTHING: Mapping[str, object] = {
     "eccentricity_low": None,

@@ -12,10 +12,9 @@ from service.store.highwater.file import MarkError, MarkFile, mark_path
 from service.store.highwater.host import host_id
 from service.store.highwater.mark import Mark
 from service.store.port import StoreError
-from service.store.seals.damage import DamageLog
+from service.store.seals import DamageLog
 from service.store.sqlite.readers import BUSY_TIMEOUT_S
-from service.store.sqlite.sealing import Seals
-from service.store.sqlite.walking import Key, walks
+from service.store.sqlite.sealing import Key, Seals, walks
 
 EVERY = 1_000_000
 NULL_QUIRK = "NULL value in "

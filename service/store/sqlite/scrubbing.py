@@ -6,10 +6,9 @@ from typing import Any
 
 from service.store.database import Connection, Database
 from service.store.port import StoreError
-from service.store.seals.damage import DamageLog, Place
-from service.store.sqlite.sealing import Seals
+from service.store.seals import DamageLog, Place
+from service.store.sqlite.sealing import Key, Seals, Walk, walks
 from service.store.sqlite.trouble import is_of_the_data
-from service.store.sqlite.walking import Key, Walk, walks
 
 ROWS_AT_ONCE = 500
 """A few milliseconds, after which the log beside the file may be brought into it."""

@@ -5,10 +5,10 @@ from pathlib import Path
 from threading import Lock
 
 from service.settings.origin import Origin
-from service.store.access.audit_head import head_path
+from service.store.access.audit_verification import head_path
 from service.store.audit_chain import begin_head
 from service.store.integrity import Marked
-from service.store.outbox_port import Address, nobody
+from service.store.outbox import Address, nobody
 from service.store.port import StoreError
 from service.store.retention.sql import SqlRetention
 from service.store.spectra_port import SpectraLimits

@@ -6,8 +6,7 @@ from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
 
-from service.store.access.audit_head import head_path
-from service.store.access.audit_walk import Verdict
+from service.store.access.audit_verification import Verdict, head_path
 from service.store.audit import Trail
 from service.store.port import StoreError
 from service.store.sqlite.readers import BUSY_TIMEOUT_S

@@ -14,8 +14,8 @@ from service.live.live_view import LiveView
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.recorder import ParkedRows, Recorder
 from service.measuring.service_alarms import identity_of
+from service.store.sharing import UnitReport
 from service.store.sqlite import SqliteStore
-from service.store.unit_states_port import UnitReport
 
 SECOND = 1_000_000_000
 REPORT = UnitReport("U1", 1, 0, "connected", None, None, "signs", 1, b"state")

@@ -48,7 +48,7 @@ from service.reports.keeper import EvidenceKeeper
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
-from service.store.access.roles import Role
+from service.store.access.identities import Role
 from service.store.sqlite import SqliteStore
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"

@@ -5,7 +5,7 @@ from typing import Any
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
-from service.store.outbox_port import Letter, LetterState
+from service.store.outbox import Letter, LetterState
 from service.store.sqlite import SqliteStore
 
 ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from rigs.database_copy import copy_database
 
-from service.store.access.audit_entry import Deed, Source
+from service.store.access.audit_entries import Deed, Source
 from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from rigs.tiers import fast_and_long
 
-from service.store.access.audit_entry import Deed
-from service.store.access.audit_head import head_path
+from service.store.access.audit_entries import Deed
+from service.store.access.audit_verification import head_path
 from service.store.audit_chain import COLUMNS
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.trail import verify_trail

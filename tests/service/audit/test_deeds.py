@@ -16,8 +16,7 @@ from core.alarms.operation import Acknowledge, Action, Comment, Shelve, TakeOutO
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
 from service.app.service_audit import Release, start_deeds, stop_deed
-from service.store.access.acting import Acting, acting_as
-from service.store.access.audit_entry import AuditEntry, Source
+from service.store.access.audit_entries import Acting, AuditEntry, Source, acting_as
 from service.store.audit_port import AuditQuery
 from service.store.film_port import BaselineStep, StoredStep
 from service.store.gap_reference import GapReference, ReferenceSource

@@ -12,9 +12,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from core.samples.gaps import Gap
-from service.store.access.audit_entry import MAX_DOCUMENT, MAX_NAME, AuditEntry, Deed
-from service.store.access.audit_head import AuditHead, head_path, read_head
-from service.store.access.audit_walk import HEAD_DIFFERED
+from service.store.access.audit_entries import MAX_DOCUMENT, MAX_NAME, AuditEntry, Deed
+from service.store.access.audit_verification import HEAD_DIFFERED, AuditHead, head_path, read_head
 from service.store.audit import Trail
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError, UnitGap

@@ -13,9 +13,7 @@ from rigs.memory_folder import path_in_memory  # noqa: F401 - a fixture
 
 from core.samples.gaps import Gap
 from service.settings.origin import Origin
-from service.store.backup.backing_up import back_up
-from service.store.backup.check import BackupError, checked
-from service.store.backup.restoring import restore
+from service.store.backup import BackupError, back_up, checked, restore
 from service.store.port import UnitGap
 from service.store.schema import MIGRATIONS
 from service.store.sqlite import SqliteStore

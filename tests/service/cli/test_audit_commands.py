@@ -10,8 +10,8 @@ import pytest
 from rigs.command_line import padwatch
 from typer.testing import Result
 
-from service.store.access.audit_entry import Deed
-from service.store.access.audit_head import head_path
+from service.store.access.audit_entries import Deed
+from service.store.access.audit_verification import head_path
 from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000

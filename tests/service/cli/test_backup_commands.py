@@ -8,9 +8,7 @@ from pathlib import Path
 from rigs.command_line import padwatch
 
 from service.api.auth.people import create_key
-from service.store.access.keys import KeyState
-from service.store.access.roles import Role
-from service.store.access.sessions import Session
+from service.store.access.identities import KeyState, Role, Session
 from service.store.sqlite import SqliteStore
 
 

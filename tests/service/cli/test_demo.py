@@ -12,7 +12,7 @@ from service.cli import demo
 from service.cli.daq_process import RunningDaq
 from service.measuring.simulated_sources import simulated_history
 from service.settings.plant import PlantFile
-from service.store.baseline_versions import versions_after
+from service.store.baselines import versions_after
 from service.store.film_port import FilmQuery
 from service.store.sqlite import SqliteStore
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from service.store.outbox_port import LetterState
+from service.store.outbox import LetterState
 from service.store.port import AlarmQuery, StoreError
 
 ROOT = Path(__file__).parents[3]

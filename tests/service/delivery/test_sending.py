@@ -18,7 +18,7 @@ from core.limits import AlarmLevel, Judgement
 from service.notifications.channel import Failed, Secret, SecretError
 from service.notifications.routing import QuietHours
 from service.notifications.sender import SenderState, wait_s
-from service.store.outbox_port import LetterState
+from service.store.outbox import LetterState
 
 DANGER = Judgement(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
 

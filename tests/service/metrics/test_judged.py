@@ -16,7 +16,7 @@ from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.counters import alarm_metrics, film_metrics
 from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import Receiver, ReceiverView, SenderStatus
-from service.store.outbox_port import Backlog
+from service.store.outbox import Backlog
 
 HOUR_NS = 3_600_000_000_000
 NOW_NS = 1_000 * HOUR_NS

@@ -10,8 +10,8 @@ from acquisition.clock import Clock
 from core.units import DAY_NS
 from service.app.retention import retention_limits
 from service.settings.retention import RetentionSettings
+from service.store.loops import LOOK_S, PERIOD_S, REST_SHARE, Retaining
 from service.store.port import StoreError
-from service.store.retaining import LOOK_S, PERIOD_S, REST_SHARE, Retaining
 from service.store.retention.limits import RetentionLimits
 
 LIMITS = RetentionLimits(readings_ns=DAY_NS)

@@ -14,12 +14,9 @@ from service.api.auth.doors import Doors, LoggedIn, NotLoggedIn, Refusal
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import People, create_key
 from service.settings.addresses import Doorway, why_closed
-from service.store.access.accounts import MAX_SESSIONS
-from service.store.access.identity import Identity, Means
+from service.store.access.identities import Identity, Means, Permission, Role, SessionLimits, digest
 from service.store.access.port import AccessStore
-from service.store.access.roles import Permission, Role
-from service.store.access.sessions import SessionLimits
-from service.store.access.tokens import digest
+from service.store.access.tables import MAX_SESSIONS
 
 T0 = 1_767_225_600_000_000_000
 S = 1_000_000_000

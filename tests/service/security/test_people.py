@@ -12,14 +12,18 @@ from core.units import DAY_NS
 from service.api.auth.doors import Doors, LoggedIn, Refusal
 from service.api.auth.passwords import Hashing, PasswordRefusedError, new_password, plant_hasher
 from service.api.auth.people import SET_UP_S, People, create_key
-from service.store.access.acting import Acting, acting_as
-from service.store.access.audit_entry import Source
-from service.store.access.identity import Identity, Means
-from service.store.access.keys import KeyState
-from service.store.access.names import NameRefusedError, account_name
+from service.store.access.audit_entries import Acting, Source, acting_as
+from service.store.access.identities import (
+    Identity,
+    KeyState,
+    Means,
+    NameRefusedError,
+    Role,
+    account_name,
+    key_id,
+    new_key,
+)
 from service.store.access.port import AccessRefusedError, AccessStore
-from service.store.access.roles import Role
-from service.store.access.tokens import key_id, new_key
 from service.store.audit_port import AuditQuery
 from service.store.sql_store import SqlStore
 

@@ -10,7 +10,7 @@ from service.app.delivery import receivers_of, router_of
 from service.notifications.message import Surroundings
 from service.settings.loading import load_plant_file
 from service.settings.origin import Origin
-from service.store.outbox_port import nobody
+from service.store.outbox import nobody
 
 WEBHOOK = """
 [[delivery.receiver]]

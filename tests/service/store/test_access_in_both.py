@@ -8,13 +8,12 @@ from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.life_cycle import update
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
-from service.store.access.keys import ApiKey
-from service.store.access.roles import Role
+from service.store.access.identities import ApiKey, Role
 from service.store.audit_port import AuditQuery
-from service.store.commands_port import Command, OpenCommand
 from service.store.film_port import BaselineStep, StoredStep
 from service.store.gap_reference import GapReference, ReferenceSource
-from service.store.outbox_port import LetterState
+from service.store.outbox import LetterState
+from service.store.sharing import Command, OpenCommand
 from service.store.sql_store import SqlStore
 from service.store.vector_reference_port import SetVectorReference
 

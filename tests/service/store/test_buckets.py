@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from core.quality import Level
 from core.units import DAY_NS
-from service.store.buckets import NICE_WIDTHS_NS, bucket_width_ns, bucketed
-from service.store.summaries import Summaries
+from service.store.buckets import NICE_WIDTHS_NS, Summaries, bucket_width_ns, bucketed
 
 T0 = 1_767_225_600_000_000_000
 SECOND_NS = 1_000_000_000

@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 
 from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, changed
-from service.store.commands import KEPT_NS
-from service.store.commands_port import DONE, Answer, Command, CommandState, OpenCommand
+from service.store.sharing import DONE, KEPT_NS, Answer, Command, CommandState, OpenCommand
 from service.store.sqlite import SqliteStore
 
 COMMAND = Command("c1", "U1", "alarm", "{}", "vera", "10.0.0.9", 10**18, 10**18 + 10**10)

@@ -11,7 +11,7 @@ from rigs.assessments import assessment
 from rigs.rolled_trends import n_rows
 from rigs.store_fixtures import at
 
-from service.store.file_system import OVER_A_NETWORK, FileSystem, file_system_of
+from service.store.holds import OVER_A_NETWORK, FileSystem, file_system_of
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore, readers, writer
 from service.store.sqlite.readers import Readers

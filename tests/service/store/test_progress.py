@@ -9,9 +9,8 @@ from rigs.store_fixtures import at
 
 from core.samples.gaps import Gap, Reach
 from service.store.port import Store, StoreError, UnitGap
-from service.store.positions_port import StreamPosition
+from service.store.sharing import StreamPosition, UnitBeat, UnitReport
 from service.store.sqlite import SqliteStore
-from service.store.unit_states_port import UnitBeat, UnitReport
 
 HERE = StreamPosition("U1", "plant of today", 10, 3, b'{"a": 0.1}')
 

@@ -16,8 +16,8 @@ from core.monitor.catalogue import CATALOGUE
 from core.quality import Level, Quality, Reading, Reason, missing, uncertain
 from service.runtime.asker import ASKER, Asker
 from service.store import sql_store, trends
-from service.store.codec import Layout
 from service.store.port import QueryTooLargeError, RefusedRowError, StoreError
+from service.store.series import Layout
 from service.store.sqlite import SqliteStore, readers
 from service.store.value_range import ValueRange
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import pytest
 from rigs.standing_clock import StandingClock
 
+from service.store.loops import PERIOD_S, Rolling
 from service.store.port import StoreError
-from service.store.rolling import PERIOD_S, Rolling
 
 
 class Pile:

@@ -14,11 +14,10 @@ from service.live.live_view import LiveView
 from service.measuring.soundness import Soundness
 from service.runtime.background import LOOK_S
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats
-from service.store.access.roles import Role
-from service.store.access.sessions import Session
+from service.store.access.identities import Role, Session
 from service.store.audit_port import AuditQuery
-from service.store.scrubbing import Scrubbing
-from service.store.seals.damage import Place
+from service.store.loops import Scrubbing
+from service.store.seals import Place
 from service.store.sqlite import SqliteStore, scrubbing
 from service.store.sqlite.checking import findings
 

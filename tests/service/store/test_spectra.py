@@ -18,7 +18,7 @@ from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import Level, Reason, missing
 from core.spectra.cross_spectrum import CrossSpectrum
-from service.store.spectra_codec import HIGHEST_UM, LOWEST_UM, decode, encode
+from service.store.spectra import HIGHEST_UM, LOWEST_UM, decode, encode
 from service.store.spectra_port import Spectra, SpectraLimits, SpectraQuery, Tier, TierLimits
 from service.store.sqlite import SqliteStore
 

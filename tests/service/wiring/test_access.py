@@ -10,7 +10,7 @@ from service.app.replay import replayed_plant
 from service.settings.access import AccessSettings, TlsSettings
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
-from service.store.access.roles import Role
+from service.store.access.identities import Role
 from service.store.sqlite import SqliteStore
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"

@@ -11,7 +11,7 @@ from acquisition.clock import SystemClock
 from service.app.audit_trail import ServiceTrail
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
-from service.store.access.audit_entry import AuditEntry
+from service.store.access.audit_entries import AuditEntry
 from service.store.audit_port import AuditQuery
 from service.store.sqlite import SqliteStore
 

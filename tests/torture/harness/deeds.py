@@ -25,7 +25,7 @@ from core.samples.gaps import Gap
 from core.spectra.cross_spectrum import average
 from service.store.audit_port import AuditQuery
 from service.store.film_port import FilmQuery
-from service.store.outbox_port import Letter
+from service.store.outbox import Letter
 from service.store.port import AlarmQuery, Store, TrendQuery, UnitGap
 from service.store.spectra_port import SpectraLimits, SpectraQuery
 

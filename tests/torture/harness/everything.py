@@ -5,9 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from harness.deeds import T0_NS, Build, deed
-from service.store.access.audit_entry import Deed
-from service.store.access.keys import ApiKey
-from service.store.access.roles import Role
+from service.store.access.audit_entries import Deed
+from service.store.access.identities import ApiKey, Role
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore

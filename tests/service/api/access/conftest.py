@@ -18,7 +18,7 @@ from service.app.scrape import scrape
 from service.app.watched import Watched
 from service.measuring.acquirer import Bus
 from service.measuring.timings import Timings
-from service.store.access.roles import Role
+from service.store.access.identities import Role
 
 PASSWORD = "the river is high in may"  # noqa: S105
 OWN = {"Origin": "http://padwatch"}

@@ -6,7 +6,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from service.store.access.roles import Role
+from service.store.access.identities import Role
 
 ACCOUNTS, KEYS = "/api/v1/accounts", "/api/v1/keys"
 PASSWORD = "the river is high in may"  # noqa: S105

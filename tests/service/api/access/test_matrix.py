@@ -14,8 +14,7 @@ from starlette.routing import Mount
 from service.api.auth.application import GuardedApi
 from service.api.auth.declared import OPEN, Reach, UndeclaredRouteError, declared, needs
 from service.dashboard.edition import edition
-from service.store.access.roles import Permission, Role
-from service.store.access.tokens import new_key, new_token
+from service.store.access.identities import Permission, Role, new_key, new_token
 
 ROLES = ("viewer", "operator", "engineer", "admin")
 NO_ROLE = None

@@ -6,7 +6,7 @@ from typing import Any
 import httpx2
 import pytest
 
-from service.store.access.roles import Role
+from service.store.access.identities import Role
 from service.store.port import StoreError
 
 SESSION, UNITS = "/api/v1/session", "/api/v1/units"

@@ -16,7 +16,7 @@ from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, operate
 from core.change.film_judge import alarm_condition
 from service.api.auth.people import create_key
-from service.store.access.roles import Role
+from service.store.access.identities import Role
 
 ALARM = "U1:UJB:stiffness_x"
 PATH = f"/api/v1/alarms/{ALARM}/evidence"

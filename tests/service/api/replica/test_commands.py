@@ -11,8 +11,8 @@ from harness.waiting import at_work
 from core.alarms.operation import Comment
 from service.cluster.reported_commands import WAIT_S, Asking
 from service.live.commands import OnAlarm, read, written
-from service.store.commands_port import Answer, Command, CommandState
 from service.store.port import AlarmQuery
+from service.store.sharing import Answer, Command, CommandState
 
 LINK = "U1:link:link_lost"
 ANNA = {"actor": "A. Name"}

@@ -12,8 +12,7 @@ from rigs.assessments import assessment
 from rigs.tiers import covering
 
 from service.store.audit_port import AuditQuery
-from service.store.backup.backing_up import back_up
-from service.store.backup.restoring import restore
+from service.store.backup import back_up, restore
 from service.store.highwater.comparison import Kind, MarkFinding
 from service.store.highwater.file import MarkFile, mark_path
 from service.store.port import StoreError, TrendQuery

@@ -6,7 +6,7 @@ from harness.places import PostgresPlace
 from rigs.assessments import assessment
 from rigs.store_fixtures import at, query
 
-from service.store.access.audit_entry import Deed
+from service.store.access.audit_entries import Deed
 from service.store.postgres.trail import server_trail
 
 

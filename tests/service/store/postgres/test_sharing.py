@@ -15,7 +15,7 @@ from rigs.store_fixtures import Build
 
 from core.monitor.assessment import Assessment
 from service.settings.origin import Origin
-from service.store.access.audit_entry import Deed
+from service.store.access.audit_entries import Deed
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore

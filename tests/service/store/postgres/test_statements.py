@@ -8,8 +8,7 @@ import pytest
 from harness.places import PostgresPlace
 
 from service.store import schema
-from service.store.postgres.dialect import for_postgres
-from service.store.postgres.statements import translated
+from service.store.postgres.statements import for_postgres, translated
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from rigs.rolled_trends import gather_all
 
 from acquisition.clock import Clock
 from core.units import DAY_NS
-from service.store.retaining import Retaining
+from service.store.loops import Retaining
 from service.store.retention.limits import RetentionLimits
 from service.store.sql_store import SqlStore
 

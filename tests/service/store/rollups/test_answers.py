@@ -14,7 +14,7 @@ from core.condition.operating_state import OperatingState
 from core.quality import Level
 from service.store import trends
 from service.store.port import QueryTooLargeError, TrendQuery
-from service.store.rollups import cover
+from service.store.rollups import coverage as cover
 from service.store.sqlite import SqliteStore
 from service.store.value_range import ValueRange
 

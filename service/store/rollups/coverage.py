@@ -1,20 +1,25 @@
-"""A range of time covered with as few roll-ups as will do, and single readings for the rest."""
+"""A span of time from as few roll-ups as possible."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
+from service.store.buckets import (
+    IntArray,
+    Summaries,
+    bucket_width_ns,
+    bucketed,
+    page,
+    single_points,
+)
 from service.store.database import Connection
-from service.store.port import TrendQuery
-from service.store.retention.marks import Gone
-from service.store.rollups.cells import Cells, Conditions
+from service.store.port import Trend, TrendQuery
+from service.store.retention.marks import Gone, select_gone
 from service.store.rollups.making import select_mark
-from service.store.rollups.rows import ANYTHING, select_cells
-from service.store.rollups.widths import HOUR_NS, WIDTHS_NS
-from service.store.summaries import IntArray, Summaries
-from service.store.trends import Span, arguments, too_large
+from service.store.rollups.rows import ANYTHING, HOUR_NS, WIDTHS_NS, Cells, Conditions, select_cells
+from service.store.trends import Span, arguments, select_page, select_readings, storable, too_large
 
 MAX_SPANS = 4096
 """That many are read at a time, so that no range needs more memory than another."""
@@ -232,3 +237,42 @@ def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
         lasts = np.concatenate([time_ns[breaks], time_ns[-1:]]).tolist()
         for first_ns, last_ns in zip(firsts, lasts, strict=True):
             yield first_ns, last_ns + width_ns
+
+
+def read_trend(reader: Connection, query: TrendQuery) -> Trend:
+    """Read trends of one bearing, gathered into buckets if they are many.
+
+    Raises
+    ------
+    QueryTooLargeError
+        If more single readings would have to be read than can be.
+    """
+    gone = _gone(reader, query)
+    whole = (storable(query.start_ns), storable(query.end_ns))
+    coarse_ns = gone.readings_ns if whole[0] < gone.readings_ns else None
+    if query.is_page:
+        found = page(select_page(reader, query), query.max_points, query.hole_ns)
+    else:
+        finest_ns = gone.finest_ns(whole[0]) or 1
+        width_ns = bucket_width_ns(*whole, query.max_points, finest_ns)
+        found = _read(reader, query, gone, whole, width_ns)
+    return replace(found, coarse_until_ns=coarse_ns)
+
+
+def _gone(reader: Connection, query: TrendQuery) -> Gone:
+    series = select_series(reader, query)
+    return Gone({}) if series is None else select_gone(reader, series)
+
+
+def _read(reader: Connection, query: TrendQuery, gone: Gone, whole: Span, width_ns: int) -> Trend:
+    cover = covered(reader, query, gone, whole, width_ns)
+    n_single, singles = select_readings(reader, query, cover.spans, width_ns)
+    if cover.is_coarse or cover.n_rolled + n_single > query.max_points:
+        return bucketed(Summaries.together([*cover.summaries, singles]), width_ns)
+    if cover.n_rolled:
+        _, singles = select_readings(reader, query, _all_spans(cover), width_ns)
+    return single_points(singles, query.hole_ns)
+
+
+def _all_spans(cover: Cover) -> list[Span]:
+    return sorted([*cover.spans, *cover.rolled_spans])

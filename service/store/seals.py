@@ -1,8 +1,92 @@
-"""`SealedTable`: the SQL by which rows of one table are sealed, and read only with their seal."""
+"""Seals of stored rows, and what differs from them."""
 
+import marshal
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
+
+MAX_PLACES = 1000
+"""Places that are remembered; beyond it they are only counted."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A row that is not what was written, or not there.
+
+    Parameters
+    ----------
+    key
+        What the row is found by, as it can be written down.
+    is_missing
+        Whether nothing is there at all.
+    """
+
+    table: str
+    key: str
+    is_missing: bool = False
+
+
+class DamageLog:
+    """Places that were found damaged since the start, each once; used from several threads.
+
+    Parameters
+    ----------
+    most
+        How many places are remembered.
+    """
+
+    def __init__(self, most: int = MAX_PLACES) -> None:
+        self._most = most
+        self._lock = Lock()
+        self._places: dict[Place, None] = {}
+        self._n_more = 0
+
+    @property
+    def n_damaged(self) -> int:
+        """How many there are; beyond `most` one that is met again may count again."""
+        return len(self._places) + self._n_more
+
+    @property
+    def places(self) -> Sequence[Place]:
+        """Where, in the order in which they were found."""
+        with self._lock:
+            return list(self._places)
+
+    def note(self, place: Place) -> None:
+        """Remember a place."""
+        with self._lock:
+            if place in self._places:
+                return
+            if len(self._places) < self._most:
+                self._places[place] = None
+            else:
+                self._n_more += 1
+
+
+Cell = int | float | bytes | None
+"""Of a stored row; texts as their bytes, for what is damaged need not be text."""
+
+FORMAT = 1
+"""Of seals; what has seals of another one is sealed anew."""
+
+_VERSION = 2
+"""Of Python's own way to write values: kinds, lengths and all bits of numbers, nothing else.
+
+Later ones write what is there twice as a reference, so that equal rows may look different.
+"""
+
+
+def begun(table: str) -> int:
+    """What the seals of a table begin with."""
+    return zlib.crc32(table.encode())
+
+
+def seal_of(begun_with: int, cells: tuple[Cell, ...]) -> int:
+    """CRC-32 of a row of a table, which is given by what its seals begin with."""
+    return zlib.crc32(marshal.dumps(cells, _VERSION), begun_with)
+
 
 SEAL, IS_WHOLE = "padwatch_seal_", "padwatch_is_whole_"
 """Functions that the connections of padwatch know; each table has its own, for speed."""

@@ -1,1 +1,0 @@
-"""Copies of the database: made while the service runs, verified, and put back."""

@@ -1,1 +1,0 @@
-"""Seals: a checksum for each stored row, in a table beside it."""
