@@ -9,8 +9,7 @@ from service.api.edition import EditionHeader
 from service.api.problems import refuse_unknown_parameters
 from service.dashboard.edition import edition
 from service.dashboard.routes import dashboard_router
-from service.reports.desk import EvidenceDesk
-from service.reports.routes import evidence_router
+from service.reports.routes import EvidenceDesk, evidence_router
 
 
 def application(context: Context, evidence: EvidenceDesk | None = None) -> GuardedApi:

@@ -11,10 +11,10 @@ from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmKeeper
 from service.recordings.around_alarms import Captures
 from service.reports.archive import EvidenceArchive
-from service.reports.desk import EvidenceDesk
 from service.reports.keeper import EvidenceFolders, EvidenceKeeper
 from service.reports.maker import Maker
 from service.reports.room import EvidenceLimits, EvidenceRoom
+from service.reports.routes import EvidenceDesk
 from service.reports.snapshot import Camera
 from service.reports.writer import EvidenceWriter
 from service.settings.configuration import Configuration, built_from, configuration_of

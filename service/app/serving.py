@@ -24,7 +24,7 @@ from service.app.watched import Watched
 from service.app.web import server_of
 from service.measuring.acquirer import Bus
 from service.measuring.commands import InProcess
-from service.reports.desk import EvidenceDesk
+from service.reports.routes import EvidenceDesk
 from service.runtime.polls import TimedSource
 
 GC_THRESHOLDS = (20_000, 20, 20)

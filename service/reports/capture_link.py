@@ -10,7 +10,7 @@ from acquisition.recordings.manifest import MANIFEST
 from service.recordings.folders import ALARM
 from service.reports.document import FilePart, file_part
 from service.reports.folders import CAPTURE, places
-from service.reports.part import EvidencePart
+from service.reports.parts import EvidencePart
 from service.runtime.whole_files import write_whole
 
 

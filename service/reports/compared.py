@@ -12,17 +12,19 @@ from core.change.decision import Decision
 from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
 from core.condition.cells import Cell, FilmConditions
-from service.reports.bearing_part import AXES, Direction
-from service.reports.comparison_part import (
+from service.reports.described import cell_bounds
+from service.reports.members import Members
+from service.reports.parts import (
+    AXES,
     BaselinePart,
     CellPart,
     ComparisonPart,
+    Direction,
     ExpectedPart,
     TimeScalePart,
+    finite,
+    rounded,
 )
-from service.reports.described import cell_bounds
-from service.reports.members import Members
-from service.reports.part import finite, rounded
 from service.runtime.times import rfc3339
 
 N_EXPECTED = 60

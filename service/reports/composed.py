@@ -5,11 +5,10 @@ from typing import Any
 
 from core.change.settings import FilmRules
 from service.api.alarm_views import LEVEL_NAMES
-from service.reports.bearing_part import Direction
 from service.reports.described import bearing_part
 from service.reports.document import FORMAT, VERSION, AlarmPart, Evidence, UnitPart
 from service.reports.maker import Maker
-from service.reports.part import finite
+from service.reports.parts import Direction, finite
 from service.reports.snapshot import BearingSnapshot, Snapshot
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit

@@ -14,7 +14,7 @@ from core.quality import Level, Reading
 from core.stiffness.estimators import ESTIMATORS
 from core.uncertainty import Budget
 from service.api.alarm_views import LEVEL_NAMES
-from service.reports.bearing_part import (
+from service.reports.parts import (
     AXES,
     BearingPart,
     BudgetLinePart,
@@ -27,8 +27,8 @@ from service.reports.bearing_part import (
     QualityWord,
     ReadingPart,
     WindowPart,
+    finite,
 )
-from service.reports.part import finite
 from service.runtime.times import rfc3339
 
 LEVEL_WORDS: dict[Level, QualityWord] = {

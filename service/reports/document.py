@@ -6,9 +6,15 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from service.reports.bearing_part import BearingPart, Direction, LevelWord
-from service.reports.comparison_part import ComparisonPart
-from service.reports.part import EvidencePart, Moment, Sha256
+from service.reports.parts import (
+    BearingPart,
+    ComparisonPart,
+    Direction,
+    EvidencePart,
+    LevelWord,
+    Moment,
+    Sha256,
+)
 from service.runtime.whole_files import CHUNK
 
 FORMAT = "padwatch-evidence"

@@ -9,10 +9,8 @@ from core.baseline.history import StiffnessHistory
 from core.change.settings import FilmRules
 from core.condition.cells import Cell
 from core.units import NS_PER_S
-from service.reports.bearing_part import AXES, Direction
-from service.reports.comparison_part import MembersPart
 from service.reports.described import cell_bounds
-from service.reports.part import rounded
+from service.reports.parts import AXES, Direction, MembersPart, rounded
 from service.store.film_port import FilmQuery, FilmStore
 from service.store.value_range import ValueRange
 

@@ -1,30 +1,168 @@
-"""Evidence of alarms: what was known when one was raised, as a document, a page and a bundle."""
+"""Evidence of alarms over HTTP."""
 
 import asyncio
 import re
-from typing import Annotated, Any
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
 from urllib.parse import quote
 
 import structlog
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import HTMLResponse, StreamingResponse
+from pydantic import Field
 
+from acquisition.clock import Clock
 from service.api.alarm_routes import AlarmId
 from service.api.alarm_views import LEVEL_NAMES
 from service.api.auth.declared import needs
 from service.api.auth.gate import identity_of
 from service.api.context import Context
-from service.api.downloads import TooManyDownloadsError
+from service.api.downloads import Downloads, TooManyDownloadsError
+from service.api.models import ApiModel, Time
 from service.api.problems import ProblemError, described_problems
-from service.reports.archive import DamagedEvidenceError, EvidenceState, Occurrence
-from service.reports.desk import EvidenceDesk, Found
+from service.reports.archive import (
+    DamagedEvidenceError,
+    EvidenceArchive,
+    EvidenceState,
+    Occurrence,
+    SamplesState,
+)
+from service.reports.bundle import bundle_files
 from service.reports.document import Evidence
-from service.reports.models import OccurrenceModel, OccurrencesModel
-from service.reports.report.page import POLICY
+from service.reports.keeper import EvidenceKeeper
+from service.reports.report.case import read_case
+from service.reports.report.page import POLICY, report_page
 from service.reports.tables import TableError
 from service.runtime.times import rfc3339
+from service.runtime.zipped import zipped
 from service.settings.alarm_kinds import ALARM_KINDS
 from service.store.access.identities import Permission
+
+
+class OccurrenceModel(ApiModel):
+    """One occurrence of an alarm with what there is of it."""
+
+    occurrence: int
+    """Counts how often the alarm was raised or rose in level."""
+
+    change: Annotated[str, Field(examples=["raised"])]
+    """raised or escalated."""
+
+    level: Literal["alert", "danger"] | None
+    """Level that it had since."""
+
+    time: Time
+    """When."""
+
+    state: Literal["complete", "waiting", "lost", "removed", "not_kept"]
+    """Whether there is evidence: complete, waiting for the disk, lost (by a crash, or a disk that
+    refused for long), removed to make room, or never kept."""
+
+    samples: Literal["complete", "being_made", "lost", "removed", "none"]
+    """Whether the samples around the alarm are there: complete, being recorded, lost, removed to
+    make room, or none for this alarm."""
+
+    evidence: Annotated[
+        str | None, Field(examples=["/api/v1/alarms/U1:UJB:stiffness_x/evidence/3"])
+    ]
+    """Path of the document; null unless complete. Add /report or /bundle.zip to it."""
+
+
+class OccurrencesModel(ApiModel):
+    """Occurrences of an alarm."""
+
+    alarm: Annotated[str, Field(examples=["U1:UJB:stiffness_x"])]
+    """Which alarm."""
+
+    origin: Literal["live", "replay"]
+    """Whether a machine is watched, or a recording played."""
+
+    occurrences: list[OccurrenceModel]
+    """Newest first."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """An occurrence with what there is of its samples."""
+
+    occurrence: Occurrence
+    samples: SamplesState
+
+
+class EvidenceDesk:
+    """Lists evidence, prints reports, hands out bundles."""
+
+    def __init__(
+        self,
+        archive: EvidenceArchive,
+        keeper: EvidenceKeeper,
+        trend_days: float,
+        clock: Clock,
+        downloads: Downloads,
+    ) -> None:
+        self.archive, self.keeper, self._clock = archive, keeper, clock
+        self._downloads = downloads
+        self._trend_days = trend_days
+
+    async def occurrences(self, alarm: str, most: int) -> list[Found]:
+        """The newest occurrences of an alarm, newest first."""
+        pending, capturing = self.keeper.pending, self.keeper.capturing
+
+        def look() -> list[Found]:
+            found = self.archive.occurrences(alarm, pending, most)
+            return [Found(each, self.archive.samples(each, capturing)) for each in found]
+
+        return await self._downloads.worked(look)
+
+    async def occurrence(self, alarm: str, number: int) -> Occurrence | None:
+        """One of them; None if there never was such a one."""
+        pending = self.keeper.pending
+        return await self._downloads.worked(lambda: self.archive.occurrence(alarm, number, pending))
+
+    async def report(self, found: Occurrence) -> str:
+        """The page of an occurrence whose bundle is complete.
+
+        Raises
+        ------
+        DamagedEvidenceError, LookupError
+            If the bundle cannot be read, or is not there.
+        """
+        capturing = self.keeper.capturing
+        return await self._downloads.worked(lambda: self._report(found, capturing))
+
+    async def bundle(self, found: Occurrence, has_configuration: bool) -> AsyncIterator[bytes]:
+        """A bundle as a ZIP file, piece by piece.
+
+        Parameters
+        ----------
+        has_configuration
+            Whether the settings of the whole plant are in it.
+
+        Raises
+        ------
+        DamagedEvidenceError, LookupError, OSError
+            If the bundle cannot be read, or is not there.
+        TooManyDownloadsError
+            If too many are on their way.
+        """
+        self._downloads.require_room()
+        page = await self.report(found)
+        files = await self._downloads.worked(
+            lambda: bundle_files(self.archive, found, page, has_configuration)
+        )
+        return await self._downloads.download(zipped(files))
+
+    def _report(self, found: Occurrence, capturing: frozenset[tuple[str, int]]) -> str:
+        samples = self.archive.samples(found, capturing)
+        case = read_case(self.archive, found, samples, self._trend_days)
+        return report_page(case, self._clock.now_ns())
+
+
+def is_there(found: Occurrence) -> bool:
+    """Whether there is a bundle."""
+    return found.state is EvidenceState.COMPLETE
+
 
 ID = re.compile(r"([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([A-Za-z0-9][A-Za-z0-9_.-]{0,31}):([a-z0-9_]+)")
 

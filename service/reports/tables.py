@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 from core.change.decision import Verdict
 from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import CrossSpectrum
-from service.reports.bearing_part import AXES
+from service.reports.parts import AXES
 from service.store.film_port import FilmHistory
 
 SPECTRA, ORBITS, TREND = "spectra.parquet", "orbits.parquet", "trend.parquet"

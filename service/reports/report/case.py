@@ -7,9 +7,8 @@ from core.alarms.alarm import AlarmEvent
 from core.machine.unit import Estimator
 from core.units import DAY_NS
 from service.reports.archive import EvidenceArchive, Occurrence, SamplesState
-from service.reports.bearing_part import AXES, BearingPart, Direction
-from service.reports.comparison_part import ComparisonPart
 from service.reports.document import Evidence
+from service.reports.parts import AXES, BearingPart, ComparisonPart, Direction
 from service.reports.tables import ORBITS, SPECTRA, TREND, Columns, read_table, trend_columns
 from service.store.film_port import FilmQuery
 

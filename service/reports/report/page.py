@@ -2,8 +2,8 @@
 
 from html import escape
 
+from service.reports.figures import figures
 from service.reports.report.case import Case
-from service.reports.report.figures import figures
 from service.reports.report.style import STYLE
 from service.reports.report.tables import estimators_table, events_table, films_table, footer
 from service.reports.report.words import facts, headline, shortened, story

@@ -5,8 +5,8 @@ from html import escape
 
 from core.alarms.alarm import AlarmEvent
 from core.stiffness.estimators import ESTIMATORS
-from service.reports.bearing_part import AXES, BearingPart, EstimatorPart, FindingPart, ReadingPart
 from service.reports.document import Evidence
+from service.reports.parts import AXES, BearingPart, EstimatorPart, FindingPart, ReadingPart
 from service.reports.report.case import Case
 from service.reports.report.words import CAUSES, change_words, plain, shortened
 from service.runtime.times import day_and_time

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 from core.alarms.alarm import AlarmChange
 from core.alarms.kinds import FILM_KINDS
-from service.reports.bearing_part import BearingPart, FindingPart, ReadingPart
 from service.reports.document import Evidence
+from service.reports.parts import BearingPart, FindingPart, ReadingPart
 from service.reports.report.case import Case
 from service.runtime.times import day_and_time
 from service.settings.alarm_kinds import kind_words

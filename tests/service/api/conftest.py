@@ -43,8 +43,8 @@ from service.measuring.references_in_force import ReferencesInForce
 from service.measuring.simulated_sources import simulated_feed
 from service.notifications.sender import Deliveries
 from service.recordings.segment import CaptureFile
-from service.reports.desk import EvidenceDesk
 from service.reports.keeper import EvidenceKeeper
+from service.reports.routes import EvidenceDesk
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile

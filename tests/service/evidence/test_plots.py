@@ -6,8 +6,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from service.reports.plots.plot import BOTTOM, LEFT, RIGHT, TOP, Plot
-from service.reports.plots.scales import Scale, TimeScale, around
+from service.reports.plots import BOTTOM, LEFT, RIGHT, TOP, Plot, Scale, TimeScale, around
 
 
 def plot(x_label: str = "Time, UTC", **changes: object) -> Plot:

@@ -1,0 +1,341 @@
+"""Figures of the page."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from html import escape
+
+from core.quality import Reason
+from core.units import NS_PER_S
+from service.reports.parts import BearingPart, CellPart, ComparisonPart
+from service.reports.plots import Plot, Scale, TimeScale, Values, around
+from service.reports.report.case import Case
+from service.reports.tables import Columns
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A plot with the sentence that says what it shows."""
+
+    plot: Plot
+    sentence: str
+
+    @property
+    def html(self) -> str:
+        """Both together, as wide as the plot is beside others, so that all writing is alike."""
+        caption = f"<figcaption>{escape(self.sentence)}</figcaption>"
+        return f'<figure style="flex:{self.plot.width:g}">{self.plot.svg()}{caption}</figure>'
+
+
+def spectra_figure(case: Case) -> Figure | None:
+    """Spectra of shaft and bearing."""
+    bearing, axis = case.bearing, case.direction
+    rows = _rows(case.spectra, case.evidence.bearing)
+    if bearing is None or len(rows) < 3:
+        return None
+    f, shaft, frame = (
+        [case.spectra[name][i] for i in rows]
+        for name in ("frequency_hz", f"shaft_{axis}_um_pk", f"bearing_{axis}_um_pk")
+    )
+    heights = _decades([*shaft, *frame])
+    if heights is None:
+        return None
+    plot = Plot(
+        *(525.0, 146.0),
+        *(Scale(0.0, f[-1]), heights),
+        *("Frequency, Hz", f"Amplitude {axis}, µm 0-pk", "Spectra", "spectra"),
+    )
+    _mark_orders(plot, bearing)
+    plot.line(f, shaft, "shaft")
+    plot.line(f, frame, "bearing")
+    return Figure(
+        plot,
+        f"Averaged spectra in {axis} as displacement, {bearing.window.n_segments} segments in"
+        f" {bearing.window.duration_s:.0f} s before the alarm. Blue: shaft relative to bearing."
+        " Orange: bearing.",
+    )
+
+
+def _decades(amplitudes: Sequence[float]) -> Scale | None:
+    """Whole decades that hold all amplitudes, five at most; None if there is no motion."""
+    seen = [value for value in amplitudes if value and value > 0.0]
+    if not seen:
+        return None
+    top = max(seen)
+    floor = max(min(seen), top * 1e-5)
+    low, high = math.floor(math.log10(floor)), math.ceil(math.log10(top))
+    return Scale(10.0**low, 10.0 ** max(high, low + 1), True)
+
+
+def _mark_orders(plot: Plot, bearing: BearingPart) -> None:
+    lines = (("order1_frequency_hz", "1×"), ("vortex_frequency_hz", "vortex"))
+    for row, (name, words) in enumerate(lines):
+        reading = bearing.readings.get(name)
+        is_there = reading is not None and reading.reason != Reason.OUTSIDE_BAND
+        if reading is not None and is_there and reading.value is not None:
+            plot.upright(reading.value, "marked", words, row)
+
+
+def orbit_figure(case: Case) -> Figure | None:
+    """The newest turns of the shaft."""
+    rows = _rows(case.orbits, case.evidence.bearing)
+    if len(rows) < 2:
+        return None
+    x, y = ([case.orbits[name][i] for i in rows] for name in ("shaft_x_um", "shaft_y_um"))
+    most = 1.1 * max(abs(value) for value in (*x, *y)) or 1.0
+    plot = Plot(
+        *(170.0, 146.0),
+        Scale(-most, most),
+        Scale(-most, most),
+        *("Shaft x, µm", "Shaft y, µm", "Orbit", "orbit"),
+    )
+    plot.line(x, y, "shaft", math.inf)
+    return Figure(plot, "The newest turns of the shaft in its bearing, means removed.")
+
+
+def _rows(table: Columns, bearing: str | None) -> list[int]:
+    return [i for i, each in enumerate(table.get("bearing", ())) if each == bearing]
+
+
+GN_PER_M = 1e9
+
+DAY_S = 86_400.0
+
+
+def finite_of(values: Values) -> list[float | None]:
+    """The same without what is not a number."""
+    return [v if v is not None and math.isfinite(v) else None for v in values]
+
+
+EccentricityStiffness = tuple[list[float | None], list[float | None]]
+"""Two columns."""
+
+LOOKS = {"none": "unknown", "borrowed": "borrowed", "own": "known"}
+"""Of cells, by their support."""
+
+
+def condition_figure(case: Case) -> Figure | None:
+    """Stiffness against eccentricity: members of the cell, the last day, what is expected."""
+    found = case.comparison
+    if found is None:
+        return None
+    recent, members = _recent(case), found.members
+    e = [*(members.eccentricity_ratio if members else ()), *recent[0], found.eccentricity_ratio]
+    k = [*(members.stiffness_n_per_m if members else ()), *recent[1], found.stiffness_n_per_m]
+    x, y = around(e, 0.25), around(k, 0.15)
+    if x is None or y is None:
+        return None
+    plot = Plot(
+        *(350.0, 148.0),
+        *(Scale(*x), Scale(*y, divisor=GN_PER_M)),
+        *("Eccentricity ratio, 1", f"Stiffness {case.direction}, GN/m"),
+        *("Stiffness against condition", "condition"),
+    )
+    _draw_films(plot, found, recent, y)
+    return Figure(
+        plot,
+        f"Grey: the {members.n_in_all if members else 0} readings of the cell (pink) that the"
+        " baseline stands on. Dashed: expected at this oil temperature. Blue: the last 24 hours."
+        " Red: the reading of the alarm; its bar holds 95 % of what chance does.",
+    )
+
+
+def map_figure(case: Case) -> Figure | None:
+    """Which conditions the baseline knows, and how stiff the film was in each."""
+    found = case.comparison
+    if found is None or not found.map or found.bounds is None:
+        return None
+    own, cells = found.bounds[:2], [_bounds(found, each) for each in found.map]
+    sides = [[edge for bounds in (own, *cells) for edge in bounds[axis]] for axis in (0, 1)]
+    x, y = (Scale(min(edges), max(edges)) for edges in sides)
+    plot = Plot(
+        *(350.0, 148.0, x, y),
+        *("Eccentricity ratio, 1", "Oil temperature, °C", "Map of the baseline", "map"),
+    )
+    known = [e.location_n_per_m for e in found.map if e.support != "none"] or [1.0]
+    low, high = min(known), max(known)
+    for each, bounds in zip(found.map, cells, strict=True):
+        plot.cell(bounds[0], bounds[1], LOOKS[each.support], _darkness(each, low, high))
+    plot.cell(own[0], own[1], "own", 0.0)
+    plot.points([found.eccentricity_ratio], [found.oil_temperature_c], "alarm", 2.2)
+    return Figure(
+        plot,
+        f"What the baseline knows: the darker, the stiffer, {low / GN_PER_M:.3g} to"
+        f" {high / GN_PER_M:.3g} GN/m. Dashed: known from neighbours. White: too few readings to"
+        " compare. Red: the cell and reading of the alarm.",
+    )
+
+
+def _draw_films(
+    plot: Plot, found: ComparisonPart, recent: EccentricityStiffness, height: tuple[float, float]
+) -> None:
+    members, expected = found.members, found.expected
+    if found.bounds:
+        plot.cell(found.bounds[0], height, "strip")
+    if members is not None:
+        plot.dots(members.eccentricity_ratio, members.stiffness_n_per_m, "member")
+    if expected is not None:
+        plot.line(expected.eccentricity_ratio, expected.stiffness_n_per_m, "expected")
+    plot.dots(*recent, "today")
+    _own_point(plot, found)
+
+
+def _bounds(found: ComparisonPart, cell: CellPart) -> list[tuple[float, float]]:
+    """Limits of a cell, all of which are as wide as that of the alarm."""
+    widths = [high - low for low, high in (found.bounds or ())[:2]]
+    return [(i * w, (i + 1) * w) for i, w in zip(cell.cell, widths, strict=False)]
+
+
+def _darkness(cell: CellPart, low: float, high: float) -> float:
+    if cell.support == "none" or high == low:
+        return 1.0 if cell.support == "none" else 0.5
+    return 0.12 + 0.78 * math.log(cell.location_n_per_m / low) / math.log(high / low)
+
+
+def _own_point(plot: Plot, found: ComparisonPart) -> None:
+    k, u = found.stiffness_n_per_m, found.u_random
+    error = None if k is None or u is None else 1.96 * u * k
+    plot.points([found.eccentricity_ratio], [k], "alarm", 2.4, [error])
+
+
+def _recent(case: Case) -> EccentricityStiffness:
+    """Eccentricity and stiffness of the settled readings of the last day before the alarm."""
+    table = case.before
+    since_ns = case.evidence.alarm.time_ns - DAY_S * NS_PER_S
+    times, settled = table.get("time_ns", ()), table.get("is_settled", ())
+    rows = [i for i, (t, s) in enumerate(zip(times, settled, strict=True)) if s and t >= since_ns]
+    if not rows:
+        return [], []
+    e = finite_of(table["eccentricity_ratio"])
+    k = finite_of(table[f"stiffness_n_per_m_{case.direction}"])
+    return [e[i] for i in rows], [k[i] for i in rows]
+
+
+HOLE_S = 6 * 3600.0
+"""Expected stiffness is not drawn across longer holes."""
+
+SHORTEST_S, MARGIN = 3600.0, 0.04
+"""Before the alarm at least, and after it as a share of what is before."""
+
+
+def trend_figure(case: Case) -> Figure | None:
+    """Stiffness before and after, with what is expected and the limit."""
+    found = _trend(case)
+    room = None if found is None else around(_heights(case, found))
+    if found is None or room is None:
+        return None
+    axis = case.direction
+    plot = Plot(
+        *(720.0, 126.0),
+        TimeScale(found.first_s, found.last_s),
+        Scale(*room, divisor=GN_PER_M),
+        *("Time, UTC", f"Stiffness {axis}, GN/m", "Stiffness over time", "trend"),
+    )
+    _draw(plot, found)
+    if case.comparison is not None:
+        plot.points([found.alarm_s], [case.comparison.stiffness_n_per_m], "alarm", 2.2)
+    days = (found.last_s - found.first_s) / DAY_S
+    return Figure(
+        plot,
+        f"Stiffness of the film in {axis} over {days:.0f} days, {len(found.time)} readings; red"
+        f" line: the alarm with its reading, red dots: {sum(found.after)} readings since. Dashed:"
+        f" expected under the condition of each reading; band: within {100.0 * found.limit:g} % of"
+        " it, the limit of an alert. Light grey: not settled.",
+    )
+
+
+@dataclass(frozen=True)
+class _Trend:
+    """Readings of a film around an alarm, by column; times in seconds since 1970."""
+
+    alarm_s: float
+    time: list[float]
+    stiffness: list[float | None]
+    expected: list[float | None]
+    is_settled: list[bool]
+    limit: float
+
+    @property
+    def lows(self) -> list[float | None]:
+        return _times(self.expected, math.exp(-self.limit))
+
+    @property
+    def highs(self) -> list[float | None]:
+        return _times(self.expected, math.exp(self.limit))
+
+    @property
+    def first_s(self) -> float:
+        return min(self.time[0], self.alarm_s - SHORTEST_S)
+
+    @property
+    def last_s(self) -> float:
+        return max(self.time[-1], self.alarm_s + MARGIN * (self.alarm_s - self.first_s))
+
+    @property
+    def after(self) -> list[bool]:
+        """Whether each reading is settled, and later than the alarm."""
+        rows = zip(self.is_settled, self.time, strict=True)
+        return [settled and time > self.alarm_s for settled, time in rows]
+
+
+def _trend(case: Case) -> _Trend | None:
+    table, axis = _joined(case.before, case.after), case.direction
+    if not table.get("time_ns"):
+        return None
+    stiffness = finite_of(table[f"stiffness_n_per_m_{axis}"])
+    return _Trend(
+        alarm_s=case.evidence.alarm.time_ns / NS_PER_S,
+        time=[time / NS_PER_S for time in table["time_ns"]],
+        stiffness=stiffness,
+        expected=_expected(stiffness, table[f"deviation_{axis}"]),
+        is_settled=[bool(each) for each in table["is_settled"]],
+        limit=case.evidence.limits["films"]["change"]["alert_change"],
+    )
+
+
+def _draw(plot: Plot, found: _Trend) -> None:
+    time, k, after = found.time, found.stiffness, found.after
+    before = [s and not a for s, a in zip(found.is_settled, after, strict=True)]
+    plot.band(time, found.lows, found.highs, "band", HOLE_S)
+    plot.line(time, found.expected, "expected", HOLE_S)
+    plot.dots(time, _where(k, [not settled for settled in found.is_settled]), "unsettled")
+    plot.dots(time, _where(k, before), "today")
+    plot.dots(time, _where(k, after), "alarm")
+    plot.upright(found.alarm_s, "at")
+
+
+def _heights(case: Case, found: _Trend) -> list[float | None]:
+    own = None if case.comparison is None else case.comparison.stiffness_n_per_m
+    return [own, *found.stiffness, *found.lows, *found.highs]
+
+
+def _joined(before: Columns, after: Columns) -> Columns:
+    return {name: [*column, *after.get(name, ())] for name, column in before.items()}
+
+
+def _expected(k: Values, deviation: Values) -> list[float | None]:
+    """What each reading was compared with."""
+    return [
+        None if value is None or by is None else value * math.exp(-by)
+        for value, by in zip(k, deviation, strict=True)
+    ]
+
+
+def _times(values: Values, factor: float) -> list[float | None]:
+    return [None if value is None else value * factor for value in values]
+
+
+def _where(values: Values, wanted: list[bool]) -> list[float | None]:
+    return [value if is_wanted else None for value, is_wanted in zip(values, wanted, strict=True)]
+
+
+def figures(case: Case) -> Iterator[str]:
+    """All that there is something to show of, in rows."""
+    for row in (
+        (trend_figure,),
+        (condition_figure, map_figure),
+        (spectra_figure, orbit_figure),
+    ):
+        drawn = [figure.html for make in row if (figure := make(case)) is not None]
+        if drawn:
+            yield f'<div class="row">{"".join(drawn)}</div>'

@@ -1,1 +1,0 @@
-"""Small plots as SVG without any script: lines, points with error bars, cells of a map."""
