@@ -11,9 +11,9 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from starlette.types import Message
 
-from service.api import edition as told
 from service.api.edition import EditionHeader
 from service.api.http.answers import BoundedAnswers
+from service.dashboard import edition as told
 from service.dashboard.assets import Asset, pages, plotly
 from service.dashboard.edition import edition
 from service.dashboard.routes import dashboard_router

@@ -71,7 +71,7 @@ DELIVER_AND_HANG = """
 import asyncio, sys, threading
 from pathlib import Path
 from acquisition.clock import SystemClock
-from service.notifications.network import Trust
+from service.notifications.channel import Trust
 from service.notifications.sender import Receiver, Sender
 from service.notifications.webhook import Webhook, WebhookTarget
 from service.store.sqlite import SqliteStore

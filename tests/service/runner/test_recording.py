@@ -23,8 +23,8 @@ from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.samples.gaps import Gap
-from service.api.app import create_app
 from service.api.context import Context
+from service.app.application import application
 from service.measuring import recorder as recording
 from service.measuring.commands import InProcess
 from service.measuring.recorder import FILE, Findings, NotStoredError, ParkedRows, Recorder
@@ -95,7 +95,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
     break_store(plant)
     source = scripted([block(number) for number in range(36)], ends=False)
     references = ReferencesInForce({}, plant.store, plant.clock)
-    app = create_app(
+    app = application(
         Context(
             *("Plant", {}, plant.live, plant.store, plant.clock, 9.0, references),
             alarms=plant.alarms,
