@@ -20,8 +20,8 @@ from service.live.alarm_board import AlarmBoard
 from service.live.evidence import EvidenceStatus
 from service.measuring.references import ReferencesInForce
 from service.recordings.continuous.tape import Tape
+from service.runtime.disk import SpaceWatch
 from service.runtime.polls import TimedSource
-from service.runtime.space.watch import SpaceWatch
 from service.settings.bearings import BearingSettings
 from service.settings.configuration import Configuration
 from service.settings.origin import Origin

@@ -20,8 +20,8 @@ from service.live.live_view import LiveView
 from service.measuring.acquiring import Acquirer
 from service.measuring.watched_unit import WatchedUnit
 from service.runtime.heartbeats import Heartbeats
+from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import NOBODY, ServiceManager
-from service.runtime.stopping import stop_on_signals
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings
 

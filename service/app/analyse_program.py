@@ -42,8 +42,8 @@ from service.measuring.runner import BUS_CAPACITY
 from service.measuring.unit_memory import UnitMemory
 from service.notifications.facts import Around
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
+from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import NOBODY, ServiceManager
-from service.runtime.stopping import stop_on_signals
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.settings.stream import StreamSettings

@@ -40,8 +40,8 @@ from service.recordings.capture.captures import Captures
 from service.recordings.continuous.tape import Tape
 from service.recordings.keeping.keeper import WaveformKeeper
 from service.reports.keeper import EvidenceKeeper
+from service.runtime.disk import SpaceWatch
 from service.runtime.heartbeats import Loop
-from service.runtime.space.watch import SpaceWatch
 from service.settings.origin import Origin
 from service.store.retaining import Retaining
 from service.store.rolling import Rolling

@@ -24,8 +24,8 @@ from service.measuring.runner import BUS_CAPACITY, Runner
 from service.measuring.watched_unit import WatchedUnit
 from service.notifications.facts import Around
 from service.runtime.heartbeats import Heartbeats
+from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import NOBODY, ServiceManager
-from service.runtime.stopping import stop_on_signals
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.instance import only_one

@@ -24,7 +24,7 @@ from service.notifications.metrics import delivery_metrics
 from service.recordings.capture.captures import Captures
 from service.recordings.metrics import recording_metrics
 from service.reports.keeper import EvidenceKeeper
-from service.runtime.families import counter, gauge
+from service.runtime.metrics import counter, gauge
 from service.store.port import StoreError
 
 

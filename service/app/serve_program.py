@@ -15,8 +15,8 @@ from service.app.stores import open_store
 from service.app.supervision import Supervision
 from service.measuring.metrics.timings import Timings
 from service.runtime.heartbeats import Heartbeats
+from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import NOBODY, ServiceManager
-from service.runtime.stopping import stop_on_signals
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.port import Store

@@ -11,7 +11,7 @@ from service.measuring.soundness import Soundness
 from service.recordings.capture.captures import Captures
 from service.recordings.continuous.tape import Tape
 from service.recordings.keeping.keeper import WaveformKeeper
-from service.runtime.space.watch import SpaceWatch
+from service.runtime.disk import SpaceWatch
 
 
 def health_of(

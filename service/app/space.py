@@ -6,8 +6,7 @@ from acquisition.clock import Clock
 from service.app.captures import CAPTURES
 from service.app.evidence import EVIDENCE
 from service.app.tapes import RECORDINGS, recordings_folder
-from service.runtime.space.limits import SpaceLimits
-from service.runtime.space.watch import SpaceWatch
+from service.runtime.disk import SpaceLimits, SpaceWatch
 from service.settings.plant import PlantFile
 from service.settings.space import SpaceSettings
 

@@ -17,8 +17,8 @@ from service.recordings.capture.captures import Captures
 from service.recordings.continuous.tape import Tape
 from service.recordings.keeping.keeper import WaveformKeeper
 from service.reports.keeper import EvidenceKeeper
+from service.runtime.disk import SpaceWatch
 from service.runtime.polls import TimedSource
-from service.runtime.space.watch import SpaceWatch
 
 
 @dataclass(frozen=True)

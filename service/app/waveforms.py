@@ -16,7 +16,7 @@ from service.recordings.keeping.place import place_of
 from service.recordings.keeping.room import RoomLimits
 from service.recordings.keeping.watch_keeping import WatchKeeping
 from service.reports.capture_link import captures_in_use
-from service.runtime.space.disk import measure_disk
+from service.runtime.disk import measure_disk
 from service.settings.plant import PlantFile
 from service.store.port import Store
 from service.store.waveform_port import WaveformKind

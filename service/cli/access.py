@@ -9,7 +9,7 @@ import typer
 from service.api.auth.passwords import PasswordRefusedError
 from service.app.stores import has_store, open_store, store_name
 from service.cli.plant_file import fail
-from service.runtime.made_by import made_by
+from service.runtime.process import made_by
 from service.settings.plant import PlantFile
 from service.store.access.acting import Acting, acting_as
 from service.store.access.audit_entry import Source

@@ -12,7 +12,7 @@ from service.app.health.serving import HOST
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.stream import stream_settings
 from service.measuring.sources import live_units
-from service.runtime.ending import leave, run_to_its_end
+from service.runtime.process import leave, run_to_its_end
 from service.runtime.service_manager import ServiceManager
 from service.settings.plant import PlantFile
 

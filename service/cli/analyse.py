@@ -13,7 +13,7 @@ from service.cli.stream import stream_settings
 from service.cluster.partition import Partition
 from service.cluster.stream.errors import StreamAnewError
 from service.measuring.sources import monitor_of
-from service.runtime.ending import leave, run_to_its_end
+from service.runtime.process import leave, run_to_its_end
 from service.runtime.service_manager import ServiceManager
 from service.settings.plant import PlantFile
 from service.store.port import StoreError

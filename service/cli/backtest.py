@@ -19,7 +19,7 @@ from service.cli.offline.back_test.report import BackTestReport
 from service.cli.offline.back_test.rules import places_of, rules_of
 from service.cli.offline.back_test.running import Found, run_back_test
 from service.cli.plant_file import fail, read_plant_file
-from service.runtime.made_by import made_by
+from service.runtime.process import made_by
 from service.settings.film_alarms import FilmAlarmSettings
 from service.settings.plant import PlantFile
 from service.settings.toml_file import TomlFileError, load_toml

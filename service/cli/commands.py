@@ -16,7 +16,7 @@ from service.cli.run import run
 from service.cli.serve import serve
 from service.cli.store import app as store_app
 from service.cli.validate import validate
-from service.runtime.logs import set_up_logging
+from service.runtime.process import set_up_logging
 
 app = typer.Typer(
     no_args_is_help=True,

@@ -8,7 +8,7 @@ from typing import NoReturn
 
 import typer
 
-from service.runtime.ending import leave
+from service.runtime.process import leave
 
 EXIT_BUG = 70
 

@@ -19,7 +19,7 @@ from service.app.recordings import recording_of, recording_writer
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.units import UnitOption, one_unit
 from service.measuring.sources import source_of
-from service.runtime.made_by import made_by
+from service.runtime.process import made_by
 from service.settings.modbus_sources import ModbusVectorSettings
 
 MAX_SECONDS = 7 * 86_400.0

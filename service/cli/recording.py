@@ -16,7 +16,7 @@ from service.cli.plant_file import fail, read_plant_file
 from service.cli.recording_check import check
 from service.cli.recording_listing import json_of, lines_of
 from service.cli.units import UnitOption, one_unit
-from service.runtime.made_by import made_by
+from service.runtime.process import made_by
 from service.settings.import_mapping import ImportMapping
 from service.settings.toml_file import TomlFileError, load_toml
 

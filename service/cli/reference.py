@@ -20,7 +20,7 @@ from service.measuring.reference_setting import (
     given_gaps,
     measured_gaps,
 )
-from service.runtime.made_by import person
+from service.runtime.process import person
 from service.settings.core_values import machine_of
 from service.settings.plant import PlantFile
 from service.store.access.acting import Acting, acting_as

@@ -23,7 +23,7 @@ from service.cli.daq_process import RunningDaq, daq_process
 from service.cli.plant_file import fail, read_plant_file
 from service.cli.run import announce
 from service.measuring.sources import source_of, watched_units
-from service.runtime.ending import run_to_its_end
+from service.runtime.process import run_to_its_end
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.store.port import StoreError

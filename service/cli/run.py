@@ -15,7 +15,7 @@ from service.app.program import Performance, run_service
 from service.app.web import listener_of
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.measuring.sources import live_units
-from service.runtime.ending import leave, run_to_its_end
+from service.runtime.process import leave, run_to_its_end
 from service.runtime.service_manager import ServiceManager
 from service.settings.plant import PlantFile
 from service.store.port import StoreError

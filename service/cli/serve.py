@@ -11,7 +11,7 @@ from service.app.serve_program import run_serve
 from service.app.web import listener_of
 from service.cli.plant_file import PlantPath, fail, read_plant_file
 from service.cli.run import CLOSED, announce
-from service.runtime.ending import leave, run_to_its_end
+from service.runtime.process import leave, run_to_its_end
 from service.runtime.service_manager import ServiceManager
 from service.store.port import StoreError
 

@@ -15,7 +15,7 @@ from acquisition.recordings.summary import RecordingSummary, summary_of
 from service.recordings.capture.folders import ALARM, FILES
 from service.recordings.continuous.names import KIND, unit_of
 from service.recordings.keeping.folders import finished, n_bytes_of
-from service.runtime.zipped import Sink, zipped
+from service.runtime.files import Sink, zipped
 from service.store.waveform_port import WaveformKind
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,119}")

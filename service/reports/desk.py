@@ -10,7 +10,7 @@ from service.reports.bundle import bundle_files
 from service.reports.keeper import EvidenceKeeper
 from service.reports.report.case import read_case
 from service.reports.report.page import report_page
-from service.runtime.zipped import zipped
+from service.runtime.files import zipped
 
 
 @dataclass(frozen=True)

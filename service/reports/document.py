@@ -9,7 +9,7 @@ from pydantic import Field
 from service.reports.bearing_part import BearingPart, Direction, LevelWord
 from service.reports.comparison_part import ComparisonPart
 from service.reports.part import EvidencePart, Moment, Sha256
-from service.runtime.whole_files import CHUNK
+from service.runtime.files import CHUNK
 
 FORMAT = "padwatch-evidence"
 VERSION = 1

@@ -3,8 +3,8 @@
 import asyncio
 
 from acquisition.clock import Clock
-from service.runtime.background import TroubleLog, rest_after
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import TroubleLog, rest_after
 from service.store.port import StoreError
 from service.store.rollups.port import RollupStore
 

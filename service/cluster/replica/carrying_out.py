@@ -17,8 +17,8 @@ from service.live.film_actions import BaselineRefusedError
 from service.measuring.alarms.engine import AlarmEngine
 from service.measuring.films.keeper import FilmKeeper
 from service.measuring.recorder import NotStoredError, Recorder
-from service.runtime.background import TroubleLog
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import TroubleLog
 from service.store.access.acting import Acting, acting_as
 from service.store.access.audit_entry import Source
 from service.store.commands_port import DONE, Answer, Command, CommandState, OpenCommand

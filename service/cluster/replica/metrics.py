@@ -20,7 +20,7 @@ from service.measuring.metrics.judged import alarm_metrics, film_metrics
 from service.measuring.metrics.kept import store_info
 from service.notifications.deliveries import ReceiverView
 from service.notifications.metrics import delivery_metrics
-from service.runtime.families import gauge
+from service.runtime.metrics import gauge
 from service.store.port import StoreError
 
 UNIT = ("unit",)

@@ -12,8 +12,8 @@ from service.measuring.alarms.gone_alarms import SHARED, is_shared
 from service.measuring.alarms.service_rules import told_by
 from service.measuring.describing import alarm_state, plant_signs, unit_signs, unit_state
 from service.measuring.films.keeper import FilmKeeper
-from service.runtime.background import TroubleLog
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import TroubleLog
 from service.settings.units import UnitSettings
 from service.store.port import StoreError
 from service.store.unit_states_port import UnitReport, UnitStates

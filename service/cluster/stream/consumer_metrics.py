@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from prometheus_client.metrics_core import Metric
 
 from service.cluster.stream.consumer import Consumer
-from service.runtime.families import counter, gauge
+from service.runtime.metrics import counter, gauge
 
 UNIT = ("unit",)
 

@@ -8,7 +8,7 @@ from prometheus_client.metrics_core import Metric
 from core.samples.gaps import SampleAccount
 from core.units import NS_PER_S
 from service.live.live_view import LinkState, LiveView
-from service.runtime.families import counter, gauge, histogram
+from service.runtime.metrics import counter, gauge, histogram
 from service.runtime.polls import TimedSource
 
 MAX_REASONS = 24

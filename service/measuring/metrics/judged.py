@@ -13,7 +13,7 @@ from core.quality import Level
 from service.live.alarm_board import AlarmBoard
 from service.live.live_view import LiveView
 from service.measuring.metrics.timings import Timings
-from service.runtime.families import Rows, gauge, histogram
+from service.runtime.metrics import Rows, gauge, histogram
 
 HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 

@@ -9,9 +9,8 @@ from service.measuring.bus import Bus
 from service.measuring.metrics.timings import Timings
 from service.measuring.recorder import Recorder
 from service.measuring.soundness import Soundness
-from service.runtime.families import counter, gauge, plain_histogram
-from service.runtime.space.growth import S_PER_DAY
-from service.runtime.space.watch import SpaceWatch
+from service.runtime.disk import S_PER_DAY, SpaceWatch
+from service.runtime.metrics import counter, gauge, plain_histogram
 
 
 def queue_metrics(bus: Bus) -> Iterator[Metric]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from acquisition.clock import Clock
-from service.runtime.durations import Durations
+from service.runtime.metrics import Durations
 
 ASSESSMENT_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0)
 """An assessment takes some milliseconds."""

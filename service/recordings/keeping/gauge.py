@@ -5,8 +5,7 @@ from pathlib import Path
 
 from service.recordings.keeping.room import Need
 from service.recordings.keeping.troubles import Troubles
-from service.runtime.space.disk import Measure
-from service.runtime.space.limits import SpaceLimits
+from service.runtime.disk import Measure, SpaceLimits
 from service.store.waveform_port import WaveformKind
 
 

@@ -4,7 +4,7 @@ import re
 import uuid
 from pathlib import Path
 
-from service.runtime.whole_files import write_whole
+from service.runtime.files import write_whole
 
 FILE = "place.txt"
 

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from core.units import s_from_ns
-from service.runtime.durable import create_private, put_in_place
+from service.runtime.files import create_private, put_in_place
 from service.store.backup.check import BackupError, Content, alone_in, checked, content_of
 
 BUSY_TIMEOUT_S = 30.0

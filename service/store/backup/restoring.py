@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from core.units import s_from_ns
-from service.runtime.durable import create_private, put_in_place, sync_folder
+from service.runtime.files import create_private, put_in_place, sync_folder
 from service.store.backup.check import BackupError, Content, checked
 from service.store.highwater.adopting import adopt_copy
 

@@ -10,10 +10,7 @@ from pydantic import ValidationError
 from acquisition.clock import Clock
 from core.limits import AlarmLevel
 from service.app.space import space_limits
-from service.runtime.space.disk import DiskSpace, measure_disk
-from service.runtime.space.growth import Growth
-from service.runtime.space.limits import SpaceLimits
-from service.runtime.space.watch import SpaceWatch
+from service.runtime.disk import DiskSpace, Growth, SpaceLimits, SpaceWatch, measure_disk
 from service.settings.space import SpaceSettings
 
 GB = 10**9

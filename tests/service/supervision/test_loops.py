@@ -98,8 +98,8 @@ async def test_a_stuck_loop_is_named_and_starves_the_watchdog_until_it_goes_on(
     await program.loops["alarms"].go_on()
     program.supervision.look()
 
-    assert program.beats.look() == {"record": "stuck: not heard of for 61 s", "alarms": None}
-    assert manager_socket.received == [{"STATUS": "record stuck: not heard of for 61 s"}]
+    assert program.beats.look() == {"record": "stuck: no heartbeat for 61 s", "alarms": None}
+    assert manager_socket.received == [{"STATUS": "record stuck: no heartbeat for 61 s"}]
 
     await program.loops["record"].go_on()
     program.supervision.look()

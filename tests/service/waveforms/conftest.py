@@ -19,8 +19,7 @@ from service.recordings.keeping.index import Index
 from service.recordings.keeping.keeper import WaveformKeeper
 from service.recordings.keeping.room import RoomLimits
 from service.recordings.keeping.watch_keeping import WatchKeeping
-from service.runtime.space.disk import DiskSpace
-from service.runtime.space.limits import SpaceLimits
+from service.runtime.disk import DiskSpace, SpaceLimits
 from service.store.sqlite import SqliteStore
 from service.store.waveform_port import WaveformFile, WaveformKind
 

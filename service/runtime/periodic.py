@@ -1,4 +1,4 @@
-"""What loops in the background share: trouble told once, and rests during which they are heard."""
+"""Shared parts of background loops: logging of failures, and pauses with heartbeats."""
 
 import structlog
 
@@ -8,19 +8,19 @@ from service.runtime.heartbeats import Pulse
 log = structlog.get_logger()
 
 LOOK_S = 20.0
-"""Between heartbeats during a long rest."""
+"""Interval of heartbeats during a long pause."""
 
 MOST_REST_S = 120.0
-"""After one piece of work."""
+"""Longest pause after one piece of work."""
 
 
 class TroubleLog:
-    """Logs when something begins to fail, and when it ceases to; not each time between.
+    """Logs the first failure of a task and its recovery, but not the failures between.
 
     Parameters
     ----------
     failing, again
-        What is said then.
+        Messages of the first failure and of the recovery.
     """
 
     def __init__(self, failing: str, again: str) -> None:
@@ -28,7 +28,7 @@ class TroubleLog:
         self._trouble: str | None = None
 
     def note(self, trouble: str | None) -> None:
-        """Hear how it went; None if it went well."""
+        """Record the outcome of one run: the reason of its failure, or None."""
         if trouble is not None and self._trouble is None:
             log.error(self._failing, reason=trouble)
         if trouble is None and self._trouble is not None:
@@ -37,7 +37,7 @@ class TroubleLog:
 
 
 async def rest(duration_s: float, clock: Clock, pulse: Pulse) -> None:
-    """Rest, and be heard meanwhile."""
+    """Pause and send heartbeats meanwhile."""
     until_s = clock.monotonic_s() + duration_s
     while (left_s := until_s - clock.monotonic_s()) > 0.0:
         pulse.beat(LOOK_S)
@@ -45,8 +45,8 @@ async def rest(duration_s: float, clock: Clock, pulse: Pulse) -> None:
 
 
 async def rest_after(taken_s: float, share: float, clock: Clock, pulse: Pulse) -> None:
-    """Rest so many times as long as the work took, and be heard meanwhile.
+    """Pause for a multiple of the time that the work took, and send heartbeats meanwhile.
 
-    A disk that stood still says nothing of how much work it was: the rest is bounded.
+    The pause is capped so that one slow disk access does not stall the loop.
     """
     await rest(min(share * taken_s, MOST_REST_S), clock, pulse)
