@@ -17,9 +17,9 @@ from service.measuring.simulations import simulated_feed
 from service.recordings.continuous.joining import join
 from service.recordings.continuous.pieces import TapeSettings
 from service.recordings.continuous.unit_tape import UnitTape
+from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
-from service.settings.recorded_units import recorded_unit
 from service.settings.units import UnitSettings
 
 PLANT = Path(__file__).parents[1] / "deploy" / "demo.toml"

@@ -24,7 +24,7 @@ from service.runtime.disk import SpaceWatch
 from service.runtime.polls import TimedSource
 from service.settings.bearings import BearingSettings
 from service.settings.configuration import Configuration
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.settings.units import UnitSettings
 from service.store.port import Store
 

@@ -26,7 +26,7 @@ from service.recordings.motion import channels_for, motion_of
 from service.recordings.recorded_motion import NoMotionError, recorded_motion
 from service.recordings.shelf import Kept
 from service.settings.core_values import machine_of
-from service.settings.modbus_sources import ModbusVectorSettings
+from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.units import UnitSettings
 from service.store.access.roles import Permission
 

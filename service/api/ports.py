@@ -15,7 +15,7 @@ from core.samples.blocks import SampleBlock
 from service.live.film_actions import Action as BaselineAction
 from service.live.film_actions import FilmPlace
 from service.live.live_view import CurrentBearing, UnitStatus
-from service.settings.film_alarms import FilmAlarmSettings
+from service.settings.films import FilmAlarmSettings
 
 
 class LiveLook(Protocol):

@@ -13,9 +13,9 @@ from acquisition.recordings.writer import RecordingWriter
 from acquisition.simulated.devices.recorded import RecordedFeed
 from acquisition.simulated.feed import SampleFeed
 from acquisition.source import SampleSource
+from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.plant import PlantFile
-from service.settings.recorded_units import recorded_unit
 from service.settings.units import UnitSettings
 
 

@@ -12,7 +12,7 @@ from acquisition.source import SampleSource
 from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 from service.settings.plant import PlantFile
-from service.settings.store import StoreSettings
+from service.settings.storage import StoreSettings
 
 REPLAYS = "replays"
 """Folder below the plant's data folder, apart from its live database."""

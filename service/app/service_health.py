@@ -1,6 +1,6 @@
-"""How the service does, read from its parts."""
+"""Health of the service, as its alarms and its recorders read it."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from service.api.load.watch import LoadWatch
 from service.live.live_view import LiveView
@@ -9,6 +9,7 @@ from service.measuring.bus import Bus
 from service.measuring.recorder import Recorder
 from service.measuring.soundness import Soundness
 from service.recordings.capture.captures import Captures
+from service.recordings.continuous.pieces import Shed
 from service.recordings.continuous.tape import Tape
 from service.recordings.keeping.keeper import WaveformKeeper
 from service.runtime.disk import SpaceWatch
@@ -59,3 +60,46 @@ def recording_error(tape: Tape | None, recordings: WaveformKeeper | None) -> str
     """Why not all samples are recorded, or recordings not looked after; None if all is well."""
     now = tape.trouble if tape else None
     return now or (recordings.lasting_trouble if recordings else None)
+
+
+BEHIND_S = 3.0
+"""Blocks that wait this long for the analysis put off recording; results come first."""
+
+BEHIND_SHARE = 0.25
+"""So does a queue that is filled this far."""
+
+CAUGHT_UP = 1.0 / 3.0
+"""Share of these limits below which recording goes on."""
+
+
+class Pressure:
+    """Looks at the queue to the analysis and at the disk; waveforms give way to both.
+
+    Parameters
+    ----------
+    is_full
+        Whether the disk is nearly full.
+    has_shed
+        Whether questions are refused already: these go before waveforms do.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        is_full: Callable[[], bool] = lambda: False,
+        has_shed: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self._bus, self._is_full, self._has_shed = bus, is_full, has_shed
+        self._is_behind = False
+
+    def look(self) -> Shed | None:
+        """Why nothing is to be recorded now; None if nothing is in the way."""
+        share = CAUGHT_UP if self._is_behind else 1.0
+        is_behind = (
+            self._bus.oldest_wait_s > share * BEHIND_S
+            or self._bus.depth > share * BEHIND_SHARE * self._bus.capacity
+        )
+        self._is_behind = is_behind and (self._is_behind or self._has_shed())
+        if self._is_behind:
+            return Shed.ANALYSIS_BEHIND
+        return Shed.DISK_FULL if self._is_full() else None

@@ -1,4 +1,4 @@
-"""The HTTP server of a plant file."""
+"""The HTTP server of a plant file: application, access and socket."""
 
 import socket
 from collections.abc import Iterator
@@ -7,16 +7,31 @@ from pathlib import Path
 from ssl import SSLContext
 from urllib.parse import urlsplit
 
+from fastapi import Depends
 from starlette.types import ASGIApp
 
 from acquisition.clock import Clock
+from service.api.app import create_app
+from service.api.auth.application import GuardedApi
+from service.api.auth.desk import AccessDesk
+from service.api.context import Context
+from service.api.edition import EditionHeader
 from service.api.http.config import GuardedConfig
 from service.api.http.listening import listen
 from service.api.http.server import GuardedServer
 from service.api.http.socket_file import socket_file
 from service.api.http.tls import server_tls
 from service.api.http.trusted_proxy import TrustedProxy
+from service.api.problems import refuse_unknown_parameters
+from service.dashboard.edition import edition
+from service.dashboard.routes import dashboard_router
+from service.reports.desk import EvidenceDesk
+from service.reports.routes import evidence_router
 from service.settings.plant import PlantFile
+from service.settings.processes import Doorway, is_loopback, why_closed
+from service.store.access.port import AccessStore
+from service.store.access.roles import Role
+from service.store.access.sessions import SessionLimits
 
 HSTS = ("Strict-Transport-Security", "max-age=31536000")
 """Browsers that have seen it once never ask in plain HTTP again."""
@@ -66,3 +81,58 @@ def _names(plant: PlantFile) -> list[str]:
     if plant.delivery.dashboard_url is not None:
         names.append(urlsplit(plant.delivery.dashboard_url).hostname or "")
     return [name for name in names if name]
+
+
+class ClosedError(Exception):
+    """The service does not start at this address; the message says why."""
+
+
+def access_desk(
+    plant: PlantFile, store: AccessStore, clock: Clock, is_demo: bool = False
+) -> AccessDesk:
+    """What asks who somebody is.
+
+    Parameters
+    ----------
+    is_demo
+        Whether people and programs on this computer may do everything without a login.
+
+    Raises
+    ------
+    ClosedError
+        If others could reach the service, and it is not fit for that.
+    StoreError
+        If accounts cannot be read.
+    """
+    service, access = plant.service, plant.access
+    doorway = Doorway(
+        service.host,
+        is_unix_socket=service.socket is not None,
+        has_tls=service.tls is not None,
+        has_account=bool(store.accounts.all()),
+    )
+    reason = why_closed(doorway)
+    if reason is not None:
+        raise ClosedError(reason)
+    local_role: Role | None = Role.ADMIN if is_demo else Role.VIEWER
+    if access.login or doorway.is_unix_socket or not is_loopback(service.host):
+        local_role = None
+    limits = SessionLimits(idle_s=60.0 * access.idle_min, absolute_s=3600.0 * access.longest_h)
+    return AccessDesk(store, clock, local_role, limits=limits)
+
+
+def application(context: Context, evidence: EvidenceDesk | None = None) -> GuardedApi:
+    """Put the application together.
+
+    Parameters
+    ----------
+    evidence
+        Hands out evidence of alarms; None where none is kept.
+    """
+    app = create_app(context)
+    app.add_middleware(EditionHeader, edition=edition())
+    guarded = [Depends(refuse_unknown_parameters)]
+    app.include_router(evidence_router(context, evidence), dependencies=guarded)
+    app.include_router(dashboard_router())
+    app.require_declarations()
+    return app

@@ -8,8 +8,8 @@ import typer
 from pydantic import TypeAdapter
 
 from service.api.audit_csv import write_csv
-from service.app.stores import open_trail
-from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.app.storage import open_trail
+from service.cli.options import PlantPath, fail, read_plant_file
 from service.store.access.audit_walk import Verdict
 from service.store.port import StoreError
 

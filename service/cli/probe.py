@@ -13,28 +13,24 @@ from pydantic import ValidationError
 from acquisition.errors import AcquisitionError
 from acquisition.modbus.cells import ByteOrder
 from core.machine.channel import Measurand
-from service.cli.offline.probes import (
-    identify_once,
-    measure_in_flight,
-    read_map_once,
-    read_once,
-    read_ring_once,
-)
 from service.cli.offline.probing import (
     RegisterLook,
     RingLook,
     ValueLook,
+    identify_once,
     looks,
+    measure_in_flight,
+    read_map_once,
+    read_once,
+    read_ring_once,
     ring_look,
     value_looks,
 )
-from service.cli.plant_file import fail, read_plant_file
-from service.cli.units import UnitOption, one_unit
+from service.cli.options import UnitOption, fail, one_unit, read_plant_file
 from service.runtime.times import rfc3339
-from service.settings.map_file import load_map_file
-from service.settings.modbus_link import ModbusLinkSettings
-from service.settings.modbus_map import RegisterMapSettings
-from service.settings.modbus_sources import MappedDeviceSettings
+from service.settings.sources.devices import MappedDeviceSettings
+from service.settings.sources.modbus import ModbusLinkSettings
+from service.settings.sources.register_map import RegisterMapSettings, load_map_file
 from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
 

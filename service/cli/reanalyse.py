@@ -23,8 +23,7 @@ from service.cli.offline.reanalysis import (
     calibration_differences,
     is_full,
 )
-from service.cli.plant_file import fail, read_plant_file
-from service.cli.units import UnitOption, one_unit
+from service.cli.options import UnitOption, fail, one_unit, read_plant_file
 from service.runtime.times import rfc3339
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 

@@ -16,11 +16,10 @@ from acquisition.errors import AcquisitionError, LinkError
 from acquisition.recordings.writer import RecordingWriter
 from acquisition.source import SampleSource
 from service.app.recordings import recording_of, recording_writer
-from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.cli.units import UnitOption, one_unit
+from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
 from service.measuring.sources import source_of
 from service.runtime.process import made_by
-from service.settings.modbus_sources import ModbusVectorSettings
+from service.settings.sources.devices import ModbusVectorSettings
 
 MAX_SECONDS = 7 * 86_400.0
 

@@ -12,20 +12,19 @@ import typer
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError, LinkError
 from service.api.http.listening import PortInUseError
-from service.app.program import Performance, run_service
 from service.app.recordings import recordings_by_unit, replay_source
 from service.app.replay import PlayedOut, replay_folder, replayed_plant
-from service.app.stores import database_path
+from service.app.service import Performance, run_service
+from service.app.simulated_daq import Wire, over_wire
+from service.app.storage import database_path
 from service.app.web import listener_of
-from service.app.wires import Wire, over_wire
-from service.cli.daq import SpeedOption
-from service.cli.daq_process import RunningDaq, daq_process
-from service.cli.plant_file import fail, read_plant_file
+from service.cli.daq import RunningDaq, SpeedOption, daq_process
+from service.cli.options import fail, read_plant_file
 from service.cli.run import announce
 from service.measuring.sources import source_of, watched_units
 from service.runtime.process import run_to_its_end
-from service.settings.origin import Origin
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.store.port import StoreError
 
 

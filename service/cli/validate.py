@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from service.cli.offline.validation import paper
-from service.cli.offline.validation.comparison import (
+from service.cli.offline import validation as paper
+from service.cli.offline.validation import (
     Row,
     errors,
     measured_rows,

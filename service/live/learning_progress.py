@@ -10,7 +10,7 @@ from core.change.decision import JUDGED
 from core.condition.operating_state import STEADY
 from core.units import DAY_NS
 from service.live.film_actions import FilmPlace
-from service.settings.film_alarms import FilmAlarmSettings
+from service.settings.films import FilmAlarmSettings
 from service.store.baseline_versions import Versions
 from service.store.film_port import BaselineEntry, FilmHistory, FilmQuery, FilmStore
 

@@ -13,8 +13,8 @@ from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.spectra.polls import PollTransform
-from service.settings.modbus_devices import link_fields
-from service.settings.modbus_sources import (
+from service.settings.adapter_values import link_fields
+from service.settings.sources.devices import (
     MappedDeviceSettings,
     ModbusFifoSettings,
     ModbusPolledSettings,

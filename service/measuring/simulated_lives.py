@@ -14,8 +14,7 @@ from acquisition.simulated.plant.scenario import TransducerNoise
 from core.baseline.history import StiffnessHistory
 from core.units import ns_from_s
 from service.settings.core_values import machine_of
-from service.settings.simulated_life import SimulatedDamageSettings
-from service.settings.simulation import SimulationSettings
+from service.settings.sources.simulated import SimulatedDamageSettings, SimulationSettings
 from service.settings.units import UnitSettings
 
 NOISES = {"gap_noise_um_rms", "velocity_noise_mm_s_rms", "acceleration_noise_m_s2_rms"}

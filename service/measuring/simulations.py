@@ -12,7 +12,7 @@ from acquisition.simulated.plant.scenario import (
 from acquisition.simulated.plant.unit import SimulatedUnit
 from service.measuring.simulated_lives import course_of_life
 from service.settings.core_values import calibration_of, machine_of
-from service.settings.simulation import SimulatedBearingSettings, SimulationSettings
+from service.settings.sources.simulated import SimulatedBearingSettings, SimulationSettings
 from service.settings.units import UnitSettings
 
 

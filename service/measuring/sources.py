@@ -22,12 +22,12 @@ from service.measuring.registers import (
 from service.measuring.simulations import simulated_feed
 from service.measuring.watched_unit import WatchedUnit
 from service.runtime.polls import TimedSource
-from service.settings import modbus_sources, sources
-from service.settings.can import CanSettings
-from service.settings.can_devices import can_settings_of
+from service.settings.adapter_values import can_settings_of, link_fields
 from service.settings.core_values import analysis_of, calibration_of, machine_of
-from service.settings.modbus_devices import link_fields
 from service.settings.plant import AnalysisModel, PlantFile
+from service.settings.sources import devices as modbus_sources
+from service.settings.sources import devices as sources
+from service.settings.sources.can import CanSettings
 from service.settings.units import UnitSettings
 
 DEFAULT_RETRY_S = 0.5

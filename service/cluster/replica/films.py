@@ -8,8 +8,8 @@ from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
 from service.live.film_actions import FilmPlace
 from service.live.unit_state import UnitState
-from service.settings.film_alarms import FilmAlarmSettings
-from service.settings.film_rules import film_rules_of
+from service.settings.core_values import film_rules_of
+from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
 from service.store.film_port import FilmStore
 

@@ -22,7 +22,7 @@ from service.cluster.stream.session import session
 from service.measuring.recorder import Findings, Recorder
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.plant import PlantFile
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 
 log = structlog.get_logger()
 

@@ -14,7 +14,7 @@ from nats.js.errors import (
 from service.cluster.stream.errors import StreamError, StreamMisfitError
 from service.cluster.stream.names import plant_mark, stream_name, subjects
 from service.settings.plant import PlantFile
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 
 BYTES_PER_GB = 1e9
 S_PER_H = 3600.0

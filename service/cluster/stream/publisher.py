@@ -24,7 +24,7 @@ from service.cluster.stream.wire import encoded_block, encoded_link
 from service.measuring.link_news import LinkNews
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.plant import PlantFile
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 
 log = structlog.get_logger()
 

@@ -16,7 +16,7 @@ from nats.js.client import JetStreamContext
 
 from acquisition.delivery.network import let_stop_through, n_stops
 from service.cluster.stream.errors import StreamError, StreamMisfitError
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 
 OLDEST_SERVER = (2, 10)
 """First version whose streams and consumers carry what is asked for."""

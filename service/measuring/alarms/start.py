@@ -21,11 +21,15 @@ from service.measuring.alarms.service_rules import service_rules_of, told_by
 from service.measuring.alarms.stream_alarms import stream_alarms
 from service.measuring.plant_part import WHOLE, PlantPart
 from service.measuring.recorder import Findings
-from service.settings.alarm_rules import chatter_rule_of, references_of, rules_of
-from service.settings.core_values import machine_of
-from service.settings.film_rules import film_rules_of
-from service.settings.origin import Origin
+from service.settings.core_values import (
+    chatter_rule_of,
+    film_rules_of,
+    machine_of,
+    references_of,
+    rules_of,
+)
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.settings.units import UnitSettings
 from service.store.port import AlarmQuery, Store
 

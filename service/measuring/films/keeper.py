@@ -21,7 +21,7 @@ from service.live.film_actions import Action, FilmPlace, step_of
 from service.measuring.films.learning import Learner
 from service.measuring.films.resume import UnitStart, in_force, unit_start
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.settings.film_alarms import FilmAlarmSettings
+from service.settings.films import FilmAlarmSettings
 from service.store.baseline_versions import Versions
 from service.store.film_port import FilmStore, StoredStep
 from service.store.port import StoreError

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from acquisition.clock import Clock
 from core.machine.unit import Unit
 from service.measuring.films.keeper import FilmKeeper
-from service.settings.film_rules import film_rules_of
+from service.settings.core_values import film_rules_of
 from service.settings.plant import PlantFile
 from service.store.film_port import FilmStore
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.schema import MIGRATIONS
 from service.store.sqlite.migrating import APPLICATION_IDS
 

@@ -3,7 +3,7 @@
 import time
 from pathlib import Path
 
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.access.acting import acting
 from service.store.access.audit_entry import Deed
 from service.store.access.audit_head import AuditHead, write_head

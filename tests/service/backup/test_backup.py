@@ -12,7 +12,7 @@ import pytest
 from rigs.memory_folder import path_in_memory  # noqa: F401 - a fixture
 
 from core.samples.gaps import Gap
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.backup.backing_up import back_up
 from service.store.backup.check import BackupError, checked
 from service.store.backup.restoring import restore

@@ -8,8 +8,8 @@ import pytest
 from rigs.command_line import padwatch
 
 from core.machine.unit import Estimator
-from service.cli import demo
-from service.cli.daq_process import RunningDaq
+from service.cli import run as demo
+from service.cli.daq import RunningDaq
 from service.measuring.simulated_lives import simulated_history
 from service.settings.plant import PlantFile
 from service.store.baseline_versions import versions_after

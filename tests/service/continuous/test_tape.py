@@ -9,8 +9,8 @@ from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.summary import summary_of
-from service.app import pressure
-from service.app.pressure import Pressure
+from service.app import service_health as pressure
+from service.app.service_health import Pressure
 from service.measuring.bus import Bus
 from service.recordings.continuous import tape, unit_tape
 from service.recordings.continuous.last import last_end

@@ -13,8 +13,7 @@ from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.quality import Reading
-from service.app.captures import captures_of
-from service.app.evidence import evidence_folders, evidence_of
+from service.app.storage import captures_of, evidence_folders, evidence_of
 from service.live.live_view import LinkState, LiveView
 from service.measuring.films.keeper import FilmKeeper
 from service.measuring.films.start import film_keeper
@@ -22,8 +21,8 @@ from service.reports.archive import EvidenceArchive
 from service.reports.capture_link import CapturePart, linked
 from service.settings.core_values import machine_of
 from service.settings.loading import load_plant_file
-from service.settings.origin import Origin
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000

@@ -14,7 +14,7 @@ from service.measuring.alarms.engine import AlarmEngine
 from service.measuring.alarms.health import ServiceHealth
 from service.measuring.alarms.start import alarm_engine
 from service.settings.loading import load_plant_file
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.sqlite import SqliteStore
 
 LOST = Alarm(AlarmIdentity(PLANT, "U2", "samples_lost"))

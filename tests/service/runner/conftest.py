@@ -31,7 +31,7 @@ from service.measuring.watched_unit import WatchedUnit
 from service.recordings.capture.captures import Captures
 from service.recordings.capture.file import MakeWriter
 from service.recordings.capture.span import CaptureSettings
-from service.settings.film_alarms import FilmAlarmSettings
+from service.settings.films import FilmAlarmSettings
 from service.store.sqlite import SqliteStore
 
 RATE_HZ = 100.0

@@ -13,7 +13,7 @@ from service.api.auth.backoff import OF_ACCOUNT, Backoff
 from service.api.auth.doors import Doors, LoggedIn, NotLoggedIn, Refusal
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import People, create_key
-from service.settings.addresses import Doorway, why_closed
+from service.settings.processes import Doorway, why_closed
 from service.store.access.accounts import MAX_SESSIONS
 from service.store.access.identity import Identity, Means
 from service.store.access.port import AccessStore

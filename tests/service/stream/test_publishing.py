@@ -23,7 +23,7 @@ from service.cluster.stream.wire import Taken, decoded
 from service.live.live_view import LinkState
 from service.measuring.link_news import LinkNews
 from service.settings.plant import PlantFile
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 
 WAIT_S = 30.0
 

@@ -13,7 +13,7 @@ from service.cluster.stream.identity import UnitIdentity
 from service.cluster.stream.outbound import Outgoing
 from service.cluster.stream.publisher import Publisher
 from service.settings.plant import PlantFile
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 
 SETTINGS = StreamSettings(servers=("nats://127.0.0.1:9",))
 

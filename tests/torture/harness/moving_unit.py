@@ -10,7 +10,7 @@ import numpy as np
 
 from acquisition.clock import Clock, SystemClock
 from harness.stream_rig import ground_of
-from service.app.analysis import Analysis, analysis_on
+from service.app.measuring_process import Analysis, analysis_on
 from service.cluster.stream.names import identity_of
 from service.cluster.stream.progress import UnitProgress
 from service.cluster.stream.stored import memories_of, usable

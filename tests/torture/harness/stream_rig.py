@@ -18,10 +18,10 @@ from core.units import NS_PER_S
 from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer
 from harness.waiting import at_work
-from service.app.analyse_program import Analysing
-from service.app.analysis import analysis_on
-from service.app.ground import Ground, live_view
-from service.app.stores import open_store
+from service.app.cluster_processes import Analysing
+from service.app.measuring_process import analysis_on
+from service.app.process import Ground, live_view
+from service.app.storage import open_store
 from service.cluster.partition import Partition
 from service.cluster.stream.names import identity_of, stream_name, subject
 from service.cluster.stream.publisher import Publisher
@@ -34,8 +34,8 @@ from service.measuring.sources import monitor_of
 from service.notifications.facts import Around
 from service.runtime.heartbeats import Heartbeats
 from service.settings.loading import load_plant_file
-from service.settings.origin import Origin
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.store.port import Store
 from service.store.sqlite import SqliteStore
 
