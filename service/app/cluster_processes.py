@@ -70,7 +70,7 @@ async def run_acquire(
     Parameters
     ----------
     units
-        Those whose devices are read; their monitors are not used.
+        Units whose devices are read; their monitors are not used.
     listener
         Where the health page is served.
     announce
@@ -105,7 +105,7 @@ async def _drain(publisher: Publisher) -> None:
     try:
         await asyncio.wait_for(publisher.waiting.drained(), DRAIN_S)
     except TimeoutError:
-        return  # the devices' rings may have it yet; if not, its index tells what is missing
+        return  # the devices' rings may still hold the samples; otherwise the index shows the gap
 
 
 def _health(publisher: Publisher, live: LiveView, beats: Heartbeats, units: list[str]) -> Health:
@@ -143,7 +143,7 @@ async def run_analyse(
     plant
         The whole plant.
     monitors
-        Of the units of the partition.
+        Monitors of the units of the partition.
     listener
         Where the health page is served.
     announce
@@ -152,9 +152,9 @@ async def run_analyse(
     Raises
     ------
     StoreError
-        If the database cannot be used, or others may have taken the units over.
+        If the database cannot be used, or another process may have taken the units over.
     StreamAnewError
-        If the stream is another one than when it began.
+        If the stream has been replaced since the start.
     """
     part = partition.part_of(plant)
     live = live_view(part, clock)
@@ -220,7 +220,7 @@ class Analysing:
             await asyncio.wait([server])
 
     async def close(self) -> None:
-        """Write what is not written yet, then let others take over."""
+        """Write all pending data, then release the units to other processes."""
         if self._analysis is not None:
             await self._analysis.close()
         self._holds.release()
@@ -228,7 +228,7 @@ class Analysing:
     async def _analyse(self) -> None:
         ground = self._ground
         await self._holds.take()
-        bus = Bus(BUS_CAPACITY, ground.clock)  # nothing waits in this one: the stream does
+        bus = Bus(BUS_CAPACITY, ground.clock)  # always empty: blocks wait in the stream
         monitors = timed_monitors(self._monitors, ground.timings)
         self._stored = {
             unit: found
@@ -263,7 +263,7 @@ class Analysing:
                 tasks.create_task(tend(name, loop), name=name)
 
     def _held(self) -> list[str]:
-        """What this process tells of: its units, and what else is its own just now."""
+        """Return the units and shared parts that this process publishes now."""
         is_watching = self._silent_units is not None and self._silent_units.is_watching
         service = [PLANT] if self._share.leads else []
         return [*self._monitors, *service, *([SHARED] if is_watching else [])]
@@ -273,12 +273,12 @@ class Analysing:
         return None if self._consumer is None else self._consumer.trouble
 
     def _behind_s(self) -> float:
-        """How far behind their devices the blocks are that are taken in."""
+        """Return how far the analysed blocks lag behind their devices."""
         units = self._consumer.units if self._consumer else {}
         return max((progress.behind_s for progress in units.values()), default=0.0)
 
     async def _begin(self, stream: str, newest: int) -> dict[str, UnitProgress]:
-        """Where each unit goes on."""
+        """Return where each unit resumes."""
         reaches = {
             unit: await asyncio.to_thread(self._ground.store.reach, unit) for unit in self._monitors
         }
@@ -298,7 +298,7 @@ class Analysing:
         return UnitProgress(identity, stream, stored, self._memories.get(unit), *parts, done)
 
     async def _watch(self, pulse: Pulse) -> None:
-        """See that the units are still this process's, and which have fallen silent."""
+        """Check that this process still holds its units, and which units are silent."""
         while True:
             pulse.beat(WATCH_EVERY_S)
             await asyncio.to_thread(self._holds.require)
@@ -323,7 +323,7 @@ class Analysing:
             units = {u: self._ground.live.status(u).state.value for u in self._monitors}
             shown = {f"unit {unit}": state for unit, state in units.items()}
             shown["database"] = self._ground.store.kind
-            if self._analysis is not None:  # there is one alarm of each for the whole plant
+            if self._analysis is not None:  # the plant has one alarm of each kind
                 shown |= _of_this_host(self._analysis)
             return shown
 
@@ -337,7 +337,7 @@ class Analysing:
 
 
 def _of_this_host(analysis: Analysis) -> dict[str, str]:
-    """What only shows here, unless it is this process that raises alarms about the service."""
+    """Return conditions of this host; only the leading process raises alarms about them."""
     troubles = {
         "stored data": analysis.soundness.trouble,
         "captures": analysis.captures.trouble,
@@ -347,11 +347,11 @@ def _of_this_host(analysis: Analysis) -> dict[str, str]:
 
 
 def shared_work(analysis: Analysis) -> dict[str, Loop]:
-    """What is done once for the plant, in whichever process holds the name of it."""
+    """Return the loops that one process runs for the whole plant."""
 
     async def deliver(pulse: Pulse) -> None:
-        pulse.rest()  # its senders are heard each for itself
+        pulse.rest()  # each sender has its own heartbeat
         await analysis.deliveries.run(analysis.ground.beats)
-        await asyncio.Event().wait()  # where nobody is told, that is all there is to do
+        await asyncio.Event().wait()  # without receivers there is nothing to do
 
     return {**analysis.shared_loops, "deliver": deliver}

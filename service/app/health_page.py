@@ -22,16 +22,16 @@ TEXT = exposition.CONTENT_TYPE_PLAIN_0_0_4
 
 @dataclass(frozen=True)
 class Health:
-    """What a process says of itself.
+    """Contents of the health page of a process.
 
     Parameters
     ----------
     checks
-        What is wrong with each thing that must work; None where nothing is.
+        Fault of each part that must work; None if it works.
     shown
-        What is told beside them and makes nobody unready: a device that is away, say.
+        Information that does not affect readiness, such as a disconnected device.
     metrics
-        For Prometheus.
+        Metric families for Prometheus.
     """
 
     checks: Callable[[], Mapping[str, str | None]]
@@ -41,27 +41,27 @@ class Health:
 
 @dataclass(frozen=True)
 class _Families:
-    """What the library takes for a registry."""
+    """Collector of the families, in place of a registry."""
 
     families: Callable[[], Iterable[Metric]]
 
     def collect(self) -> Iterable[Metric]:
-        """All families."""
+        """Return all families."""
         return self.families()
 
 
 def health_app(health: Health) -> FastAPI:
-    """The application; it answers anybody who reaches it, and tells no secrets."""
+    """Build the application; it needs no login and shows no secrets."""
     app = FastAPI(title="padwatch", docs_url=None, redoc_url=None, openapi_url=None)
 
     @app.get("/livez")
     async def livez() -> JSONResponse:
-        """Answer as long as the event loop turns."""
+        """Return 200 while the event loop runs."""
         return JSONResponse({"status": "ok", "checks": {"event_loop": "turning"}})
 
     @app.get("/readyz")
     async def readyz() -> JSONResponse:
-        """Answer 200 if everything that must work does, 503 if not."""
+        """Return 200 if all required parts work, 503 otherwise."""
         checks = health.checks()
         is_ready = not any(checks.values())
         words = {name: trouble or "ok" for name, trouble in checks.items()}
@@ -73,7 +73,7 @@ def health_app(health: Health) -> FastAPI:
 
     @app.get("/metrics")
     async def metrics() -> Response:
-        """Counters and gauges, for Prometheus."""
+        """Return the metrics in the text format of Prometheus."""
         return Response(
             exposition.generate_latest(_Families(health.metrics)), headers={"content-type": TEXT}
         )
@@ -82,7 +82,7 @@ def health_app(health: Health) -> FastAPI:
 
 
 HOST = "127.0.0.1"
-"""Whoever else wants to know asks a proxy or an agent on the same computer."""
+"""Loopback only; other hosts use a proxy or an agent on this computer."""
 
 
 class HealthServer:
@@ -93,15 +93,15 @@ class HealthServer:
         self._server, self._listener = GuardedServer(config), listener
 
     def start(self, tasks: asyncio.TaskGroup, beats: Heartbeats) -> asyncio.Task[None]:
-        """Begin to serve; ends after `stop`."""
+        """Start the server; the task ends after `stop`."""
         serve = partial(self._server.run_on, self._listener)
         return tasks.create_task(beats.tend("health", serve), name="health")
 
     async def started(self) -> None:
-        """Wait until it answers."""
+        """Wait until the server answers."""
         while not self._server.started:
             await asyncio.sleep(0.01)
 
     def stop(self) -> None:
-        """Take no more requests."""
+        """Stop accepting requests."""
         self._server.should_exit = True

@@ -42,24 +42,24 @@ from service.store.port import StoreError
 
 @dataclass(frozen=True)
 class Watched:
-    """Where metrics come from; nothing of it is changed.
+    """Parts of the process that metrics are read from.
 
     Parameters
     ----------
     bearings
-        Of every unit.
+        Bearings of every unit.
     sources
-        Where samples come from, by unit; of those that are timed.
+        Timed sources by unit.
     space
-        Knows how full the disks are; None where nobody looks.
+        Disk watch, if there is one.
     load
-        Knows which questions are refused now; None where none ever are.
+        Load monitor, if requests can be refused.
     tape, recordings
-        Continuous recording, and what looks after recordings; None where nothing does.
+        Continuous recorder and keeper of recordings, if there are any.
     soundness
-        Knows what of the stored data is damaged; None where nobody looks.
+        Check of stored data, if there is one.
     store_kind
-        Which database results are in, as `Store.kind` says it; None if that is not told.
+        `Store.kind` of the database, if it is reported.
     """
 
     bearings: Mapping[str, Sequence[str]]
@@ -84,19 +84,19 @@ class Watched:
 
 @dataclass(frozen=True)
 class Scrape:
-    """What is read on the event loop without waiting, so that all numbers belong together.
+    """Collector that reads all parts at once on the event loop, so that numbers are consistent.
 
     Parameters
     ----------
     receivers
-        What waits for whom; None if that could not be read.
+        Queued messages by receiver; None if the outbox cannot be read.
     """
 
     watched: Watched
     receivers: Sequence[ReceiverView] | None
 
     def collect(self) -> Iterator[Metric]:
-        """All families."""
+        """Yield all families."""
         watched = self.watched
         yield gauge(
             "build_info",
@@ -122,7 +122,7 @@ class Scrape:
 
 
 async def scrape(watched: Watched) -> Scrape:
-    """Look at the parts of the service; an outbox that cannot be read is a metric, no error."""
+    """Prepare a scrape; an outbox that cannot be read is reported as a metric."""
     try:
         return Scrape(watched, await watched.deliveries.look())
     except StoreError:
@@ -130,7 +130,7 @@ async def scrape(watched: Watched) -> Scrape:
 
 
 def evidence_metrics(captures: Captures, evidence: EvidenceKeeper) -> Iterator[Metric]:
-    """Samples and evidence around alarms."""
+    """Yield the families of captures and evidence."""
     counts = (
         ("captures_written", "Captures of samples around alarms.", captures.n_written),
         ("captures_failed", "Attempts to write such captures in vain.", captures.n_failed),

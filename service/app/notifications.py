@@ -1,4 +1,4 @@
-"""Receivers of alarms, as the plant file names them."""
+"""Receivers and routes of notifications, built from the plant file."""
 
 from collections.abc import Iterator
 from datetime import time
@@ -34,14 +34,14 @@ SECONDS_PER_HOUR = 3600.0
 
 
 def receivers_of(plant: PlantFile, origin: Origin, clock: Clock) -> list[Receiver]:
-    """Everyone who is told: none of a replay, and of a mail each recipient apart."""
+    """Return all receivers, one for each mail recipient; a replay has none."""
     if origin is not Origin.LIVE:
         return []
     return [found for each in plant.delivery.receiver for found in receivers(each, clock)]
 
 
 def receivers(settings: ReceiverSettings, clock: Clock) -> Iterator[Receiver]:
-    """Those that one entry of the plant file stands for."""
+    """Yield the receivers of one entry of the plant file."""
     trust = Trust(None if settings.ca_file is None else Path(settings.ca_file))
     timeouts = Timeouts(
         settings.connect_timeout_s, settings.answer_timeout_s, settings.total_timeout_s
@@ -50,7 +50,7 @@ def receivers(settings: ReceiverSettings, clock: Clock) -> Iterator[Receiver]:
         target = WebhookTarget(
             settings.url, _secret(settings.secret), _secret(settings.authorization), timeouts
         )
-        shown = urlsplit(settings.url)  # without its path, which may be as good as a password
+        shown = urlsplit(settings.url)  # without its path, which may contain a token
         address = f"{shown.scheme}://{shown.netloc}"
         yield _receiver(settings, settings.id, address, Webhook(target, trust, clock))
         return
@@ -60,7 +60,7 @@ def receivers(settings: ReceiverSettings, clock: Clock) -> Iterator[Receiver]:
 
 
 def router_of(plant: PlantFile, origin: Origin, look: LookAround, clock: Clock) -> Address:
-    """What queues letters while events are being stored; of a replay nobody is told."""
+    """Return the router that queues messages of stored events; a replay queues none."""
     if origin is not Origin.LIVE or not plant.delivery.receiver:
         return nobody
     routes = [route for each in plant.delivery.receiver for route in _routes(each)]
@@ -68,7 +68,7 @@ def router_of(plant: PlantFile, origin: Origin, look: LookAround, clock: Clock) 
 
 
 def composer_of(plant: PlantFile, look: LookAround) -> Composer:
-    """What writes messages about a plant."""
+    """Build the composer of messages about a plant."""
     service = plant.service
     host = f"[{service.host}]" if ":" in service.host else service.host
     scheme = "http" if service.tls is None else "https"

@@ -28,16 +28,16 @@ STEPPED = "clock.stepped"
 
 @dataclass(frozen=True)
 class Release:
-    """Which padwatch runs with which configuration.
+    """Program version, configuration and data origin of a run.
 
     Parameters
     ----------
     version
-        Of padwatch.
+        Version of padwatch.
     configuration
-        Version of the configuration, under which it is kept beside the evidence.
+        Version of the configuration, as stored beside the evidence.
     origin
-        Whether it is live or a replay.
+        Live or replay.
     """
 
     version: str
@@ -46,12 +46,12 @@ class Release:
 
 
 def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[Deed]:
-    """That the service starts, and first whether its configuration has changed since it did last.
+    """Return the entries of a start; a changed configuration has its own entry before it.
 
     Parameters
     ----------
     last_start
-        Newest entry that tells of a start; None if there is none.
+        Newest entry of a start; None if there is none.
     """
     before = _configuration_of(last_start)
     started = Deed(now_ns, PADWATCH, STARTED, SERVICE, after=vars(release))
@@ -63,19 +63,19 @@ def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) ->
 
 
 def stop_deed(release: Release, refusals: int, now_ns: int) -> Deed:
-    """That the service stops.
+    """Return the entry of a stop.
 
     Parameters
     ----------
     refusals
-        How many refused requests have no entry of their own since the last that has one.
+        Refused requests without an entry of their own since the last one with an entry.
     """
     after = {"n_refused_more": refusals} if refusals else None
     return Deed(now_ns, PADWATCH, STOPPED, SERVICE, before=vars(release), after=after)
 
 
 def step_deed(step_s: float, now_ns: int) -> Deed:
-    """That the clock of the host was set, forward or, below 0, back; `now_ns` is by the new one."""
+    """Return the entry of a step of the host's clock; `now_ns` is the time after the step."""
     return Deed(now_ns, PADWATCH, STEPPED, CLOCK, after={"by_s": round(step_s, 3)})
 
 
@@ -90,12 +90,12 @@ LOOK_S = 1.0
 
 
 class ServiceTrail:
-    """Tells of starts, stops and steps of the clock; a plant is watched also where that fails.
+    """Records starts, stops and clock steps; a failure to record does not stop the service.
 
     Parameters
     ----------
     audit
-        Where it is written.
+        Audit trail.
     """
 
     def __init__(self, plant: PlantFile, origin: Origin, audit: AuditStore, clock: Clock) -> None:
@@ -106,15 +106,15 @@ class ServiceTrail:
         self.refusals = Refusals(audit, clock)
 
     async def begin(self) -> None:
-        """Tell that the service starts, and whether its configuration has changed."""
+        """Record the start, and a changed configuration."""
         await asyncio.to_thread(self._tell, self._start)
 
     async def end(self) -> None:
-        """Tell that it stops."""
+        """Record the stop."""
         await asyncio.to_thread(self._tell, self._stop)
 
     async def watch_clock(self, pulse: Pulse = UNHEARD) -> None:
-        """Tell, for ever, when the host's clock is set, after which times cannot be compared."""
+        """Record steps of the host's clock until cancelled; times before and after differ."""
         seen = Arrival.now(self._clock)
         while True:
             pulse.beat(LOOK_S)

@@ -28,7 +28,7 @@ def health_of(
     soundness: Soundness | None = None,
     stream: StreamLook | None = None,
 ) -> LookAtHealth:
-    """A look at the parts of the running service."""
+    """Return a function that reads the health of the running service."""
     names = list(units)
 
     def look() -> ServiceHealth:
@@ -57,30 +57,30 @@ def health_of(
 
 
 def recording_error(tape: Tape | None, recordings: WaveformKeeper | None) -> str | None:
-    """Why not all samples are recorded, or recordings not looked after; None if all is well."""
+    """Return why samples are not recorded or recordings not maintained; None if neither."""
     now = tape.trouble if tape else None
     return now or (recordings.lasting_trouble if recordings else None)
 
 
 BEHIND_S = 3.0
-"""Blocks that wait this long for the analysis put off recording; results come first."""
+"""Wait of a block for the analysis above which recording pauses; results come first."""
 
 BEHIND_SHARE = 0.25
-"""So does a queue that is filled this far."""
+"""Filled share of the queue above which recording pauses."""
 
 CAUGHT_UP = 1.0 / 3.0
-"""Share of these limits below which recording goes on."""
+"""Share of these limits below which recording resumes."""
 
 
 class Pressure:
-    """Looks at the queue to the analysis and at the disk; waveforms give way to both.
+    """Decides from the queue to the analysis and from the disk whether recording pauses.
 
     Parameters
     ----------
     is_full
-        Whether the disk is nearly full.
+        Returns whether the disk is nearly full.
     has_shed
-        Whether questions are refused already: these go before waveforms do.
+        Returns whether requests are refused already; they are shed before waveforms.
     """
 
     def __init__(
@@ -93,7 +93,7 @@ class Pressure:
         self._is_behind = False
 
     def look(self) -> Shed | None:
-        """Why nothing is to be recorded now; None if nothing is in the way."""
+        """Return why recording pauses now, or None."""
         share = CAUGHT_UP if self._is_behind else 1.0
         is_behind = (
             self._bus.oldest_wait_s > share * BEHIND_S

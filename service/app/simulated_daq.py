@@ -25,8 +25,6 @@ from core.machine.unit import Unit
 from service.settings.adapter_values import can_daq_of
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.plant import PlantFile
-from service.settings.sources import devices as modbus_sources
-from service.settings.sources import devices as sources
 from service.settings.sources.can import CanSettings
 from service.settings.sources.devices import (
     ModbusFifoSettings,
@@ -41,7 +39,7 @@ from service.settings.units import UnitSettings
 Tell = Callable[[str], None]
 
 MAX_COUNT = 1_000_000
-"""Of one command; each takes a place in a queue."""
+"""Largest count of one command; each fault takes a place in a queue."""
 
 _STANDARD_INPUT = 0
 
@@ -49,8 +47,8 @@ _STANDARD_INPUT = 0
 async def run_daq(servers: Mapping[str, DaqServer], tell: Tell, *, controlled: bool) -> None:
     """Serve until SIGINT or SIGTERM, or until standard input ends.
 
-    Tells, each as one line of JSON: first where each unit's reader finds it; later
-    ``{"ended": unit}`` when a unit's recording is over, and the answer to each command.
+    Prints lines of JSON: first the endpoint of each unit, later ``{"ended": unit}`` when the
+    recording of a unit ends, and the answer to each command.
 
     Parameters
     ----------
@@ -60,7 +58,7 @@ async def run_daq(servers: Mapping[str, DaqServer], tell: Tell, *, controlled: b
     Raises
     ------
     AcquisitionError
-        If a server cannot listen, or cannot go on.
+        If a server cannot listen, or fails later.
     """
     stopped = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -104,9 +102,9 @@ async def _obey(servers: Mapping[str, DaqServer], tell: Tell, stopped: asyncio.E
 
 
 def _read_lines(loop: asyncio.AbstractEventLoop, hear: Callable[[str], None]) -> None:
-    """Hand on what comes line by line, at last an empty one; it may be a file, which loops cannot.
+    """Pass standard input on line by line, then an empty line; event loops cannot read files.
 
-    A loop that is closed hears no more.
+    Lines are dropped once the event loop is closed.
     """
     with suppress(RuntimeError):
         with suppress(OSError), open(os.dup(_STANDARD_INPUT), errors="replace") as lines:
@@ -116,12 +114,12 @@ def _read_lines(loop: asyncio.AbstractEventLoop, hear: Callable[[str], None]) ->
 
 
 def obeyed(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
-    """Do what one command says: ``UNIT FAULT [COUNT]``.
+    """Execute one command: ``UNIT FAULT [COUNT]``.
 
     Returns
     -------
     dict
-        The command under "done", or what is wrong with it under "refused".
+        The command under "done", or the reason of its refusal under "refused".
     """
     words = line.split()
     if len(words) not in (2, 3) or (len(words) == 3 and not words[2].isdecimal()):
@@ -139,7 +137,7 @@ def obeyed(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
 
 
 VECTOR_WINDOW_S = 10.0
-"""What a simulated rack looks at: fifteen turns of a slow machine."""
+"""Analysis window of a simulated rack: fifteen turns of a slow machine."""
 
 
 def polled_device(
@@ -150,7 +148,7 @@ def polled_device(
     *,
     on_demand: bool,
 ) -> MapDevice:
-    """Registers that show the newest sample of a feed."""
+    """Build a device whose registers hold the newest sample of a feed."""
     rows = [channel.id for channel in unit.channels]
     device = MapDevice(feed, source.registers, rows, calibration, unit.id)
     device.on_demand = on_demand
@@ -165,7 +163,7 @@ def vector_device(
     *,
     on_demand: bool,
 ) -> VectorDevice:
-    """A rack that makes vectors of a feed, anew for each poll.
+    """Build a rack that computes vectors from a feed at each poll.
 
     Raises
     ------
@@ -194,7 +192,7 @@ def vector_device(
 def fifo_device(
     source: ModbusFifoSettings, unit: Unit, feed: SampleFeed, *, on_demand: bool
 ) -> FifoDevice:
-    """Queues that a feed's samples wait in."""
+    """Build a device that queues the samples of a feed."""
     device = FifoDevice(feed, source.fifo_layout(len(unit.channels)), unit.id)
     device.on_demand = on_demand
     return device
@@ -203,14 +201,14 @@ def fifo_device(
 def modbus_server(
     device: ModbusDevice, source: ModbusLinkSettings, clock: Clock | None, *, patient: bool
 ) -> ModbusServer:
-    """Serves a device where a source looks for it, over TCP or on a serial line.
+    """Build the server of a device at the address of a source, on TCP or a serial line.
 
     Parameters
     ----------
     clock
         Paces the device; without one it produces as fast as its reader reads.
     patient
-        Whether time begins with the reader's first request.
+        Whether time starts with the reader's first request.
     """
     if source.host is not None:
         return ModbusTcpServer(device, clock, source.host, source.port, patient=patient)
@@ -221,48 +219,48 @@ def modbus_server(
 def daq_of(
     unit: UnitSettings, feed: SampleFeed, clock: Clock | None, *, recorded: bool
 ) -> DaqServer:
-    """A DAQ of the kind that a unit's source reads.
+    """Build a DAQ of the kind that a unit's source reads.
 
     Parameters
     ----------
     clock
         Paces the device; without one it produces as fast as its reader reads.
     recorded
-        Whether nothing of the feed must be lost, so that the device waits for its reader.
+        Whether the feed is a recording: the device waits for its reader and loses nothing.
 
     Raises
     ------
     ConfigError
-        If what it should serve does not fit into such a device.
+        If the unit does not fit into such a device.
     LookupError
         If the unit's source reads no device.
     """
     source, machine = unit.source, machine_of(unit)
     on_demand = clock is None
     match source:
-        case sources.ModbusRingSettings():
+        case ModbusRingSettings():
             device = RingDevice(feed, unit.id, _ring_shape(unit, source))
             device.on_demand, device.patient = on_demand, recorded
             return modbus_server(device, source, clock, patient=recorded)
-        case modbus_sources.ModbusFifoSettings():
+        case ModbusFifoSettings():
             queue = fifo_device(source, machine, feed, on_demand=on_demand)
             return modbus_server(queue, source, clock, patient=recorded)
-        case modbus_sources.ModbusPolledSettings():
+        case ModbusPolledSettings():
             registers = polled_device(
                 source, machine, calibration_of(unit), feed, on_demand=on_demand
             )
             return modbus_server(registers, source, clock, patient=recorded)
-        case modbus_sources.ModbusVectorSettings():
+        case ModbusVectorSettings():
             rack = vector_device(source, machine, calibration_of(unit), feed, on_demand=on_demand)
             return modbus_server(rack, source, clock, patient=recorded)
         case CanSettings():
             return can_daq_of(unit, source, feed, clock, patient=recorded)
-        case sources.SimulatedSettings():
+        case devices.SimulatedSettings():
             raise LookupError(f'the source of unit {unit.id} is of kind "simulated": no DAQ')
 
 
-def _ring_shape(unit: UnitSettings, source: sources.ModbusRingSettings) -> RingDeviceSettings:
-    """The ring that the unit's simulation asks for; of slots as long as its blocks otherwise."""
+def _ring_shape(unit: UnitSettings, source: ModbusRingSettings) -> RingDeviceSettings:
+    """Return the ring of the unit's simulation, otherwise slots as long as its blocks."""
     if unit.simulation is None:
         return RingDeviceSettings(
             base_address=source.base_address, samples_per_slot=unit.block_samples
@@ -278,11 +276,11 @@ _LOOPBACK = "127.0.0.1"
 
 
 STALE_AFTER_S = 5.0
-"""Silence that ends a run that is over; one that is busy with its start is not."""
+"""Silence after which a finished run ends; longer than a start takes."""
 
 
 class Wire(StrEnum):
-    """A protocol and what carries it."""
+    """Protocol and transport."""
 
     MODBUS_TCP = "modbus_tcp"
     MODBUS_RTU = "modbus_rtu"
@@ -291,9 +289,9 @@ class Wire(StrEnum):
 
 
 def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
-    """The plant with all units behind DAQs on this wire, where no DAQ has said yet where it is."""
+    """Return the plant with all units behind DAQs on this wire, at addresses still to be set."""
     units = tuple(
-        # where a sample is a poll, the rate of the recording is that of the polls
+        # where each sample is a poll, the recording has the rate of the polls
         unit.model_copy(update={"source": _source(wire), "rate_hz": unit.sampling_hz})
         for unit in plant.unit
     )

@@ -59,53 +59,53 @@ DATABASE = "padwatch.sqlite3"
 
 
 def database_path(plant: PlantFile) -> Path:
-    """Where the plant's database is, or would be."""
+    """Return the path of the plant's database file, whether it exists or not."""
     return Path(plant.service.data_folder) / DATABASE
 
 
 def has_store(plant: PlantFile) -> bool:
-    """Whether there is a database already; one of a server has to be."""
+    """Return whether the database exists; a database on a server must exist."""
     return plant.store.postgresql is not None or database_path(plant).exists()
 
 
 def store_name(plant: PlantFile) -> str:
-    """What the plant's database is called in messages."""
+    """Return the name of the plant's database for messages."""
     if plant.store.postgresql is not None:
         return _postgres_address(plant, plant.store.postgresql).name
     return str(database_path(plant).absolute())
 
 
 def head_file(plant: PlantFile) -> Path:
-    """File on this host that names the newest entry of the audit trail."""
+    """Return the file on this host that names the newest entry of the audit trail."""
     if plant.store.postgresql is not None:
         return head_path(Path(plant.service.data_folder) / "postgresql")
     return head_path(database_path(plant))
 
 
 def open_store(plant: PlantFile, origin: Origin = Origin.LIVE, address: Address = nobody) -> Store:
-    """The plant's database: a file, created if need be, or a database of a PostgreSQL server.
+    """Open the plant's database: a file, created if missing, or a PostgreSQL database.
 
     Parameters
     ----------
     address
-        Who is to be told of events of alarms.
+        Returns the recipients of an alarm event.
 
     Raises
     ------
     StoreError
-        If it cannot be used, or holds results of the other origin.
+        If the database cannot be used, or holds results of the other origin.
     """
     spectra = spectra_limits(plant.spectra)
     if plant.store.postgresql is None:
         return SqliteStore(database_path(plant), origin, address, spectra)
-    from service.store.postgres import PostgresStore  # only here: it takes a while to load
+    from service.store.postgres import PostgresStore  # imported late: slow to load
 
     where = _postgres_address(plant, plant.store.postgresql)
     return PostgresStore(where, head_file(plant), origin, address, spectra)
 
 
 def open_trail(plant: PlantFile) -> Trail:
-    """The audit trail of the plant's database, for those who only read it."""
+    """Open the audit trail of the plant's database for reading."""
     if plant.store.postgresql is None:
         return file_trail(database_path(plant))
     from service.store.postgres.trail import server_trail
@@ -120,7 +120,7 @@ def _postgres_address(plant: PlantFile, conninfo: str) -> "PostgresAddress":
 
 
 def spectra_limits(settings: SpectraSettings) -> SpectraLimits:
-    """How many spectra are kept."""
+    """Return the limits of stored spectra."""
     return SpectraLimits(
         TierLimits(settings.dense_every_s, settings.n_dense),
         TierLimits(settings.sparse_every_s, settings.n_sparse),
@@ -134,10 +134,10 @@ BYTES_PER_GB = 1e9
 
 
 def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
-    """Captures of all units of a live plant; what is replayed is a recording already."""
+    """Build the captures of all units of a live plant; a replay plays recordings already."""
     found = plant.capture
     kept = origin is Origin.LIVE and found.samples == "kept"
-    # a rack that gives vectors has no samples to keep
+    # a vector rack has no samples
     waveforms = [u for u in plant.unit if not isinstance(u.source, ModbusVectorSettings)]
     units = waveforms if kept else []
     settings = CaptureSettings(
@@ -156,7 +156,7 @@ def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
 
 
 def _window_s(plant: PlantFile, unit: UnitSettings) -> float:
-    """How long the samples are that a film's stiffness stands on; none where none is watched."""
+    """Return the length of an averaging window of a watched film; 0 if none is watched."""
     if isinstance(film_rules_of(unit, plant.films), str):
         return 0.0
     analysis = analysis_of(plant.analysis)
@@ -173,19 +173,19 @@ RECORDINGS = "recordings"
 
 
 def recordings_folder(plant: PlantFile) -> Path:
-    """Where continuous recordings of a plant are kept."""
+    """Return the folder of continuous recordings of a plant."""
     return Path(plant.recording.folder or Path(plant.service.data_folder) / RECORDINGS)
 
 
 def tape_of(
     plant: PlantFile, origin: Origin, clock: Clock, press: Callable[[], Shed | None]
 ) -> Tape:
-    """Keeps all samples of those units of a live plant of which they are wanted."""
+    """Build the continuous recorder of the units of a live plant that are to be recorded."""
     found = plant.recording
     units = {
         unit.id: recorded_unit(unit)
         for unit in plant.unit
-        # a rack that gives vectors has no samples; what is replayed is a recording already
+        # a vector rack has no samples; a replay plays recordings already
         if found.keeps(unit.id)
         and origin is Origin.LIVE
         and not isinstance(unit.source, ModbusVectorSettings)
@@ -199,7 +199,7 @@ EVIDENCE, CONFIGURATIONS = "evidence", "configurations"
 
 
 def evidence_folders(plant: PlantFile) -> EvidenceFolders:
-    """Where evidence of a plant is kept."""
+    """Return the folders of evidence of a plant."""
     root = Path(plant.service.data_folder)
     return EvidenceFolders(root / EVIDENCE, root / CAPTURES, root / CONFIGURATIONS)
 
@@ -207,7 +207,7 @@ def evidence_folders(plant: PlantFile) -> EvidenceFolders:
 def evidence_desk(
     plant: PlantFile, store: Store, keeper: EvidenceKeeper, clock: Clock, downloads: Downloads
 ) -> EvidenceDesk:
-    """Where evidence is asked for."""
+    """Build the service that hands out evidence."""
     archive = EvidenceArchive(evidence_folders(plant), store)
     return EvidenceDesk(archive, keeper, plant.evidence.trend_days, clock, downloads)
 
@@ -221,7 +221,7 @@ def evidence_of(
     captures: Captures,
     clock: Clock,
 ) -> EvidenceKeeper:
-    """The keeper of all evidence; `watch` lets it see alarms."""
+    """Build the collector of evidence; `watch` connects it to the alarms."""
     limits, folders = limits_of(plant), evidence_folders(plant)
     configuration = built_configuration(plant)
     maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
@@ -232,19 +232,19 @@ def evidence_of(
 
 
 def watch(keeper: EvidenceKeeper, alarms: AlarmEngine, captures: Captures, origin: Origin) -> None:
-    """Let a keeper see alarms; what is replayed can be replayed again, and needs no evidence."""
+    """Connect the collector of evidence to the alarms; a replay collects no evidence."""
     if origin is Origin.LIVE:
         alarms.show(keeper.see)
         captures.tell(keeper.captured)
 
 
 def built_configuration(plant: PlantFile) -> Configuration:
-    """The plant file as this program was built to read it, without secrets."""
+    """Return the plant file as this build reads it, without secrets."""
     return configuration_of(plant, version("padwatch"), built_from())
 
 
 def limits_of(plant: PlantFile) -> EvidenceLimits:
-    """How much is kept."""
+    """Return the limits of stored evidence."""
     found = plant.evidence
     return EvidenceLimits(
         max_bytes=round(found.max_gb * BYTES_PER_GB),
@@ -256,7 +256,7 @@ def limits_of(plant: PlantFile) -> EvidenceLimits:
 
 
 def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:
-    """Looks at whatever the plant's data are on; captures may be on a disk of their own."""
+    """Build the watch of all disks with data of the plant; captures may have their own."""
     data = Path(plant.service.data_folder)
     folders = {"data": data, CAPTURES: data / CAPTURES, EVIDENCE: data / EVIDENCE}
     if plant.recording.samples == "kept":
@@ -265,7 +265,7 @@ def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:
 
 
 def space_limits(settings: SpaceSettings) -> SpaceLimits:
-    """Limits as the plant file has them."""
+    """Return the disk limits of the plant file."""
     return SpaceLimits(
         settings.alert_free_share,
         settings.danger_free_share,
@@ -275,7 +275,7 @@ def space_limits(settings: SpaceSettings) -> SpaceLimits:
 
 
 def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> WaveformKeeper:
-    """Looks after the recordings of a live plant."""
+    """Build the keeper of the recordings of a live plant."""
     data, custody = Path(plant.service.data_folder), custody_of(plant)
 
     def hire() -> Caretaker:
@@ -285,7 +285,7 @@ def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> WaveformKee
 
 
 def custody_of(plant: PlantFile) -> Custody:
-    """Which recordings there are, and by which rules they stay."""
+    """Return the folders of recordings and the rules of their retention."""
     data = Path(plant.service.data_folder)
     room = RoomLimits(
         continuous_bytes=round(plant.recording.max_gb * BYTES_PER_GB),
@@ -305,7 +305,7 @@ def custody_of(plant: PlantFile) -> Custody:
 
 
 def retention_limits(settings: RetentionSettings) -> RetentionLimits:
-    """Ages as the plant file has them; 0 there is for ever."""
+    """Return the retention limits of the plant file; an age of 0 keeps data for ever."""
     return RetentionLimits(
         readings_ns=_age_ns(settings.readings_days),
         minutes_ns=_age_ns(settings.minutes_days),

@@ -34,11 +34,11 @@ from service.store.access.roles import Role
 from service.store.access.sessions import SessionLimits
 
 HSTS = ("Strict-Transport-Security", "max-age=31536000")
-"""Browsers that have seen it once never ask in plain HTTP again."""
+"""Browsers that received this header use HTTPS only."""
 
 
 def server_of(app: ASGIApp, plant: PlantFile, clock: Clock) -> GuardedServer:
-    """What serves an application within the plant file's limits, under the names it gives."""
+    """Build the server of an application, with the limits and host names of the plant file."""
     service, tls = plant.service, _tls(plant)
     if service.socket is not None:
         app = TrustedProxy(app)
@@ -49,17 +49,17 @@ def server_of(app: ASGIApp, plant: PlantFile, clock: Clock) -> GuardedServer:
 
 @contextmanager
 def listener_of(plant: PlantFile, port: int) -> Iterator[socket.socket]:
-    """Where the server is to listen, taken before anything else is started.
+    """Open the server's socket, before anything else is started.
 
     Parameters
     ----------
     port
-        Instead of the plant file's; of no matter on a socket file.
+        Replaces the plant file's port; ignored with a Unix socket.
 
     Raises
     ------
     PortInUseError, CertificateError
-        If it cannot be had, or not with this certificate.
+        If the address is in use, or the certificate cannot be used.
     """
     _tls(plant)
     if plant.service.socket is not None:
@@ -76,7 +76,7 @@ def _tls(plant: PlantFile) -> SSLContext | None:
 
 
 def _names(plant: PlantFile) -> list[str]:
-    """Its own names, and the one that people are sent to by messages."""
+    """Return the host names of the service and of the dashboard URL in messages."""
     names = [plant.service.host, *plant.service.hosts]
     if plant.delivery.dashboard_url is not None:
         names.append(urlsplit(plant.delivery.dashboard_url).hostname or "")
@@ -90,17 +90,17 @@ class ClosedError(Exception):
 def access_desk(
     plant: PlantFile, store: AccessStore, clock: Clock, is_demo: bool = False
 ) -> AccessDesk:
-    """What asks who somebody is.
+    """Build the access service, which authenticates requests.
 
     Parameters
     ----------
     is_demo
-        Whether people and programs on this computer may do everything without a login.
+        Whether local clients may do everything without a login.
 
     Raises
     ------
     ClosedError
-        If others could reach the service, and it is not fit for that.
+        If the service would be reachable from other hosts without TLS or accounts.
     StoreError
         If accounts cannot be read.
     """
@@ -122,12 +122,12 @@ def access_desk(
 
 
 def application(context: Context, evidence: EvidenceDesk | None = None) -> GuardedApi:
-    """Put the application together.
+    """Build the application.
 
     Parameters
     ----------
     evidence
-        Hands out evidence of alarms; None where none is kept.
+        Service that hands out evidence of alarms; None if none is stored.
     """
     app = create_app(context)
     app.add_middleware(EditionHeader, edition=edition())

@@ -2,8 +2,7 @@
 
 import typer
 
-from service.cli import audit, config, probe, recording, reference
-from service.cli import notifications as delivery
+from service.cli import audit, config, notifications, probe, recording, reference
 from service.cli.accounts import keys_app, users_app
 from service.cli.backtest import backtest
 from service.cli.daq import daq
@@ -41,7 +40,7 @@ app.add_typer(recording.app, name="recording")
 app.add_typer(store_app, name="store")
 app.add_typer(readings_app, name="readings")
 app.add_typer(probe.app, name="probe")
-app.add_typer(delivery.app, name="delivery")
+app.add_typer(notifications.app, name="delivery")
 app.add_typer(users_app, name="users")
 app.add_typer(keys_app, name="keys")
 
