@@ -31,6 +31,7 @@ from service.settings.sources.devices import (
     ModbusPolledSettings,
     ModbusRingSettings,
     ModbusVectorSettings,
+    SimulatedSettings,
     SourceSettings,
 )
 from service.settings.sources.modbus import ModbusLinkSettings
@@ -255,7 +256,7 @@ def daq_of(
             return modbus_server(rack, source, clock, patient=recorded)
         case CanSettings():
             return can_daq_of(unit, source, feed, clock, patient=recorded)
-        case devices.SimulatedSettings():
+        case SimulatedSettings():
             raise LookupError(f'the source of unit {unit.id} is of kind "simulated": no DAQ')
 
 

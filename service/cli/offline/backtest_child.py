@@ -1,7 +1,7 @@
-"""The process that reads a file: its rows go out as an Arrow stream.
+"""Child process that reads a file of readings and writes its rows as an Arrow stream.
 
-Whatever a hostile file does to a reader happens here, with bounded memory and time and without
-writing anything.
+It runs confined, with bounded memory and time and without write access, so that a hostile file
+cannot harm more than this process.
 """
 
 import sys

@@ -1,4 +1,14 @@
-"""The paper's tables, recomputed and compared."""
+"""Tables of the paper, recomputed and compared.
+
+Source: Brito, Machado, Chaves Neto, Martini, "Experimental Estimation of Journal Bearing Stiffness
+for Damage Detection in Large Hydrogenerators", Tables 4 to 9 and section 3.2. Amplitudes are
+zero-to-peak at the frequency named. Measured values are kept as printed text, because their last
+digit shows the rounding.
+
+Errata. Section 3.2 lists the bearing amplitudes 8.9 and 16.8 µm in the wrong order: only 16.8 for
+UJB and 8.9 for LJB reproduce its own stiffnesses. The Y columns of Table 8 are marked unreliable
+there and those of Table 9 lack the bearing amplitudes, so only the X direction is used here.
+"""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
