@@ -28,7 +28,7 @@ NS_PER_S = 1_000_000_000
 
 @contextmanager
 def access_of(plant: PlantFile, command: str, creates: bool = False) -> Iterator[AccessStore]:
-    """The plant's accounts and keys; what is refused ends the command with one line.
+    """Open the plant's accounts and keys; a refusal ends the command with one line.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def access_of(plant: PlantFile, command: str, creates: bool = False) -> Iterator
         Whether the database is created if there is none.
     """
     name = store_name(plant)
-    if not has_store(plant):  # its folder may be relative to another one than this
+    if not has_store(plant):  # the data folder may be relative to another folder
         if not creates:
             fail(f"{command}: {name}: there is no such database")
         typer.echo(f"{name}: a new database; is that where the service runs?", err=True)
@@ -51,7 +51,7 @@ def access_of(plant: PlantFile, command: str, creates: bool = False) -> Iterator
 
 
 def time_text(time_ns: int) -> str:
-    """UTC, to the second."""
+    """Format a time in UTC, to the second."""
     return datetime.fromtimestamp(time_ns // NS_PER_S, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
@@ -68,10 +68,12 @@ def create(
     unit: Annotated[
         list[str] | None, typer.Option(help="Open only this unit; may be repeated.")
     ] = None,
-    days: Annotated[int, typer.Option(min=1, max=MAX_DAYS, help="Valid for so long.")] = 365,
+    days: Annotated[
+        int, typer.Option(min=1, max=MAX_DAYS, help="Days until the key expires.")
+    ] = 365,
     json_output: JsonOutput = False,
 ) -> None:
-    """Create a key and print it: this once, nobody can show it again."""
+    """Create a key and print it; it cannot be shown again."""
     plant = read_plant_file(plant_file)
     known = [settings.id for settings in plant.unit]
     for wanted in unit or ():
@@ -89,7 +91,7 @@ def create(
 
 @keys_app.command("list")
 def list_keys(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
-    """List all keys that ever were; what they open is in them alone."""
+    """List all keys, including expired and revoked ones, without their secrets."""
     with access_of(read_plant_file(plant_file), "padwatch keys list") as access:
         keys = access.keys.all()
     now_ns = SystemClock().now_ns()
@@ -105,7 +107,7 @@ def revoke(
     plant_file: PlantPath,
     id_: Annotated[str, typer.Argument(metavar="ID", help="As listed.", show_default=False)],
 ) -> None:
-    """Take a key back for ever, from its next request on."""
+    """Revoke a key permanently, from its next request on."""
     with access_of(read_plant_file(plant_file), "padwatch keys revoke") as access:
         is_there = access.keys.get(id_) is not None
         is_news = is_there and access.keys.revoke(id_, SystemClock().now_ns())
@@ -192,7 +194,7 @@ def set_role(plant_file: PlantPath, name: Name, role: WantedRole) -> None:
 
 @users_app.command("password")
 def set_password(plant_file: PlantPath, name: Name, password_fd: PasswordFd = None) -> None:
-    """Set another password; everybody who is logged in to the account is logged out."""
+    """Set another password and end all sessions of the account."""
     plant = read_plant_file(plant_file)
     password = password_from(password_fd, "padwatch users password")
     with access_of(plant, "padwatch users password") as access:
@@ -203,7 +205,7 @@ def set_password(plant_file: PlantPath, name: Name, password_fd: PasswordFd = No
 
 @users_app.command()
 def remove(plant_file: PlantPath, name: Name) -> None:
-    """Remove an account; whoever is logged in to it is logged out."""
+    """Remove an account and end its sessions."""
     with access_of(read_plant_file(plant_file), "padwatch users remove") as access:
         access.accounts.remove(account_name(name), SystemClock().now_ns())
     typer.echo(f"{account_name(name)}: removed")

@@ -1,4 +1,4 @@
-"""`padwatch audit`: who did what, whether all of it is there, and as a file."""
+"""`padwatch audit`: verify the audit trail, and export it as a file."""
 
 from dataclasses import asdict
 from pathlib import Path

@@ -71,7 +71,7 @@ def backtest(
         ),
     ] = None,
     estimator: Annotated[
-        str, typer.Option(help="Whose stiffness this is, for the exported baselines.")
+        str, typer.Option(help="Name of the stiffness estimator, stored with exported baselines.")
     ] = "not told",
     export: Annotated[
         Path | None,

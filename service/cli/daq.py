@@ -74,7 +74,7 @@ def _feeds(plant: PlantFile, recordings: list[Path]) -> Mapping[str, SampleFeed]
     feeds = {unit.id: simulated_feed(unit, clock) for unit in plant.unit if unit.simulation}
     if not feeds:
         raise LookupError("no unit of this plant file has a [unit.simulation] table")
-    now_ns = clock.now_ns()  # the first of them was made seconds ago
+    now_ns = clock.now_ns()  # the first feed was built seconds ago
     for feed in feeds.values():
         feed.begin_at(now_ns)
     return feeds
@@ -88,12 +88,12 @@ Endpoints = dict[str, dict[str, str | int]]
 
 @dataclass(frozen=True)
 class RunningDaq:
-    """A simulated DAQ that serves.
+    """A running simulated DAQ.
 
     Parameters
     ----------
     endpoints
-        Where each unit is found: keys and values of its source's settings.
+        Address of each unit, as keys and values of its source's settings.
     over
         For each unit, set when its recording has been played to the end.
     gone
@@ -106,11 +106,11 @@ class RunningDaq:
 
     @property
     def has_failed(self) -> bool:
-        """Whether it has ended before its recordings have."""
+        """Whether the DAQ ended before its recordings."""
         return self.gone.is_set() and not all(over.is_set() for over in self.over.values())
 
     def attached(self, plant: PlantFile) -> PlantFile:
-        """The plant with its sources pointed to this DAQ."""
+        """Return the plant with the sources of its units at this DAQ."""
         units = []
         for unit in plant.unit:
             source = unit.source.model_copy(update=self.endpoints.get(unit.id, {}))
@@ -120,16 +120,16 @@ class RunningDaq:
 
 @contextmanager
 def held_lines(endpoints: Endpoints) -> Iterator[None]:
-    """Hold the pseudo-terminals of some endpoints open, so that nobody else gets their names.
+    """Hold the pseudo-terminals of endpoints open, so that their names are not reused.
 
-    The system gives the name of a terminal away as soon as no program has it open. A reader that
-    tries again after its DAQ has ended would open, and lock, the terminal of another program.
+    The system reuses the name of a terminal that no program has open. A reader that reconnects
+    after its DAQ has ended would otherwise open, and lock, the terminal of another program.
     """
     places = [place for endpoint in endpoints.values() for place in endpoint.values()]
     with ExitStack() as stack:
         for place in places:
             if isinstance(place, str) and place.startswith(TERMINALS):
-                with suppress(OSError):  # the DAQ has ended already, which its reader reports
+                with suppress(OSError):  # the DAQ has ended; its reader reports that
                     held = os.open(place, os.O_RDWR | os.O_NOCTTY)
                     stack.callback(os.close, held)
         yield
@@ -137,7 +137,7 @@ def held_lines(endpoints: Endpoints) -> Iterator[None]:
 
 @contextmanager
 def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
-    """Run ``padwatch daq`` with arguments; it ends with this process, however that ends."""
+    """Run ``padwatch daq`` with arguments; it ends when this process ends in any way."""
     with subprocess.Popen(  # noqa: S603  our own program
         [sys.executable, "-m", "service.cli.main", "daq", *arguments, "--control"],
         stdin=subprocess.PIPE,
@@ -158,7 +158,7 @@ def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
         finally:
             _stop(process)
             if news is not None:
-                news.join()  # before what it reads is closed
+                news.join()  # before its pipe is closed
 
 
 def _stop(process: "subprocess.Popen[bytes]") -> None:
@@ -171,7 +171,7 @@ def _stop(process: "subprocess.Popen[bytes]") -> None:
 
 
 def _listen(stdout: IO[bytes], daq: RunningDaq) -> None:
-    """Note what the DAQ tells, until it ends."""
+    """Record the events that the DAQ prints, until it ends."""
     for line in stdout:
         ended = json.loads(line).get("ended")
         if ended in daq.over:

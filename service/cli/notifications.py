@@ -1,4 +1,4 @@
-"""`padwatch delivery`: test a receiver, send again what it refused."""
+"""`padwatch delivery`: test a receiver, and retry messages that it refused."""
 
 import asyncio
 import json
@@ -29,7 +29,7 @@ JsonOutput = Annotated[bool, typer.Option("--json", help="Print the result as JS
 
 @app.command("test")
 def send_test(plant_file: PlantPath, receiver: ReceiverId, json_output: JsonOutput = False) -> None:
-    """Send a test message now and say what came of it; exit code 1 unless it was taken.
+    """Send a test message now and print the outcome; exit code 1 unless it was accepted.
 
     It does not go through the outbox: a running service is not disturbed.
     """
@@ -50,7 +50,7 @@ def send_test(plant_file: PlantPath, receiver: ReceiverId, json_output: JsonOutp
 def send_again(
     plant_file: PlantPath, receiver: ReceiverId, json_output: JsonOutput = False
 ) -> None:
-    """Let what a receiver refused, or what grew too old for it, be sent again in its old order.
+    """Queue messages again that a receiver refused or that expired, in their old order.
 
     A running service begins within half a minute.
     """
@@ -92,7 +92,7 @@ def _result(receiver: Receiver, outcome: Outcome) -> dict[str, str]:
 
 
 def _chosen(plant: PlantFile, wanted: str) -> list[Receiver]:
-    """The receivers of one entry of the plant file, or one recipient of it."""
+    """Return the receivers of one entry of the plant file, or one of its recipients."""
     known = receivers_of(plant, Origin.LIVE, SystemClock())
     chosen = [one for one in known if wanted in (one.name, one.name.partition(":")[0])]
     if not chosen:

@@ -28,7 +28,7 @@ def read_plant_file(path: Path) -> PlantFile:
 
 
 def fail(message: str, code: int = 1) -> NoReturn:
-    """End the command with a message for people."""
+    """End the command with a message."""
     typer.echo(message, err=True)
     raise typer.Exit(code)
 
@@ -39,7 +39,7 @@ UnitOption = Annotated[
 
 
 def one_unit(plant: PlantFile, id_: str | None, path: Path) -> UnitSettings:
-    """Find a unit, or end with exit code 2; a plant's only unit need not be named."""
+    """Return a unit, or end with exit code 2; the name of a plant's only unit is optional."""
     known = ", ".join(unit.id for unit in plant.unit)
     if id_ is None and len(plant.unit) > 1:
         fail(f"{path}: has units {known}; choose one with --unit", code=2)
@@ -50,7 +50,7 @@ def one_unit(plant: PlantFile, id_: str | None, path: Path) -> UnitSettings:
 
 
 def stream_settings(plant: PlantFile) -> StreamSettings:
-    """The plant file's [stream], or the end of the command."""
+    """Return the plant file's [stream], or end the command."""
     if plant.stream is None:
         fail(
             "padwatch: the plant file has no [stream]: give it one, with the servers of NATS, or"
@@ -71,7 +71,7 @@ def terminal_to_itself() -> Iterator[None]:
     if not sys.stdin.isatty() or group == os.getpid() or os.tcgetpgrp(0) != group:
         yield
         return
-    before = signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # or giving it back would stop us
+    before = signal.signal(signal.SIGTTOU, signal.SIG_IGN)  # else the restore would stop us
     os.setpgid(0, 0)
     os.tcsetpgrp(0, os.getpgrp())
     try:
@@ -90,7 +90,7 @@ PasswordFd = Annotated[
 
 
 def password_from(descriptor: int | None, command: str) -> str:
-    """Get a new password; ends the command with exit code 2 if there is none to be had."""
+    """Read a new password, or end the command with exit code 2."""
     if descriptor is not None:
         return _read(descriptor, command)
     if not sys.stdin.isatty():
@@ -119,12 +119,12 @@ DEMO_LIFE = "demo-life.toml"
 EXAMPLE = "plant.toml"
 
 PACKAGED = Path(sysconfig.get_path("data")) / "share" / "padwatch"
-"""Where a wheel puts them, with the units and files of `deploy/`."""
+"""Folder of the example files in an installed package."""
 
 CHECKOUT = Path(__file__).parent.parent.parent / "deploy"
-"""Where they are kept."""
+"""Folder of the example files in a checkout."""
 
 
 def example_path(name: str) -> Path:
-    """Path of an example plant file."""
+    """Return the path of an example plant file."""
     return next(path for path in (CHECKOUT / name, PACKAGED / name) if path.exists())

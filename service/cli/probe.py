@@ -1,4 +1,4 @@
-"""`padwatch probe`: what a Modbus device has in its registers, before anything is stored."""
+"""`padwatch probe`: contents of the registers of a Modbus device, without storing anything."""
 
 import asyncio
 import json
@@ -182,7 +182,7 @@ def _done(look: Coroutine[Any, Any, Result]) -> Result:
 def _place(
     device: str, unit_id: int, timeout_s: float, baudrate: int, parity: str
 ) -> ModbusLinkSettings:
-    """Where a device is, or end with exit code 2."""
+    """Return the link to a device, or end with exit code 2."""
     given: dict[str, Any] = {"device_id": unit_id, "timeout_s": timeout_s}
     if device.startswith(RTU_PREFIX):
         given |= {"device": device, "baudrate": baudrate, "parity": parity}
@@ -206,7 +206,7 @@ def _map_of(path: Path) -> RegisterMapSettings:
 
 
 def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
-    """The device of a unit that has a register map, or end with exit code 2."""
+    """Return the device of a unit with a register map, or end with exit code 2."""
     device = getattr(unit, "slow_source", None) if slow else unit.source
     if not isinstance(device, MappedDeviceSettings):
         key = "slow_source" if slow else "source"
@@ -215,7 +215,7 @@ def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
 
 
 def _units_of(unit: UnitSettings) -> dict[str, str]:
-    """In which unit each channel is read."""
+    """Return the engineering unit of each channel."""
     waveforms = {channel.id: MEASURAND_UNITS[channel.measurand] for channel in unit.channel}
     return waveforms | {c.id: c.unit for c in unit.slow_channel}
 

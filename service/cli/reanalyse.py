@@ -92,11 +92,11 @@ class TextPrinter:
     """Assessments as tables for people."""
 
     def put(self, assessment: Assessment) -> None:
-        """Print one."""
+        """Print one assessment."""
         typer.echo("\n".join(_table(assessment)))
 
     def end(self) -> None:
-        """Print what comes after all."""
+        """Print the end of the output."""
 
 
 class JsonPrinter:
@@ -106,12 +106,12 @@ class JsonPrinter:
         self._before = "[\n"
 
     def put(self, assessment: Assessment) -> None:
-        """Print one."""
+        """Print one assessment."""
         typer.echo(self._before + assessment_model(assessment).model_dump_json(), nl=False)
         self._before = ",\n"
 
     def end(self) -> None:
-        """Print what comes after all."""
+        """Print the end of the output."""
         typer.echo("[]" if self._before == "[\n" else "\n]")
 
 
@@ -122,7 +122,7 @@ async def _print(
     printer: TextPrinter | JsonPrinter,
     n_samples: int,
 ) -> bool:
-    """Print what was chosen; return whether there was anything."""
+    """Print the chosen results; return whether there were any."""
     last, found = LastAverages(), False
     with typer.progressbar(
         length=n_samples, label="Analysing", file=sys.stderr, hidden=not sys.stderr.isatty()

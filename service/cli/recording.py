@@ -99,7 +99,7 @@ GAPS_PRINTED = 20
 
 
 def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
-    """All about a recording, for programs."""
+    """Return the description of a recording as JSON."""
     manifest = recording.manifest
     return {
         "folder": str(recording.folder),
@@ -137,7 +137,7 @@ def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
 
 
 def lines_of(recording: Recording, summary: RecordingSummary) -> Iterator[str]:
-    """All about a recording, for people."""
+    """Yield the description of a recording as text."""
     manifest = recording.manifest
     yield f"{recording.folder}: unit {manifest.unit}, {manifest.sample_type}, {manifest.made_by}"
     yield f"  from         {rfc3339(summary.start_ns)}"

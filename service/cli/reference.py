@@ -56,7 +56,7 @@ class BearingReferences(ApiModel):
 def bearing_references(
     unit: str, bearing: Bearing, history: Sequence[GapReference]
 ) -> BearingReferences:
-    """What the plant file and what was set since say of a bearing's reference.
+    """Return a bearing's reference in force, from the plant file or set since, and its history.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def bearing_references(
 
 
 def text_lines(found: BearingReferences) -> Iterator[str]:
-    """A line for the reference in force, and one for each before it."""
+    """Yield a line for the reference in force, and one for each earlier reference."""
     gaps = _gaps(found.gap_reference_um, found.opposite_reference_um)
     said = found.reference
     yield f"{found.unit} {found.bearing}: {gaps}, {_words(said)}"
@@ -185,7 +185,7 @@ def _all_references(plant: PlantFile) -> Iterator[BearingReferences]:
 
 def _add(plant: PlantFile, reference: GapReference) -> Sequence[GapReference]:
     """Store a reference and return its bearing's history."""
-    if not has_store(plant):  # its folder may be relative to another one than this
+    if not has_store(plant):  # the data folder may be relative to another folder
         typer.echo(
             f"{store_name(plant)}: a new database; is that where the service runs?", err=True
         )
@@ -197,7 +197,7 @@ def _add(plant: PlantFile, reference: GapReference) -> Sequence[GapReference]:
 
 @contextmanager
 def _existing_store(plant: PlantFile) -> Iterator[Store | None]:
-    """The plant's database; looking at one that is not there must not create it."""
+    """Open the plant's database, or yield None if it does not exist, without creating it."""
     if not has_store(plant):
         yield None
         return

@@ -78,7 +78,7 @@ def _performance(
     speed: float,
     serve: bool,
 ) -> Iterator[tuple[Performance, RunningDaq | None]]:
-    """What is to be run, and the DAQ that plays the recordings, if there is one."""
+    """Build the service run, and start the DAQ that plays the recordings, if there is one."""
     clock = SystemClock()
     if through is None:
         watched = watched_units(
@@ -99,12 +99,12 @@ def _performance(
 
 
 def _require_new(database: Path) -> None:
-    """Refuse a folder with results: alarms would go on where those had ended.
+    """Refuse a folder with results: its alarms would be resumed.
 
     Raises
     ------
     LookupError
-        Naming it.
+        If the database exists.
     """
     if database.exists():
         raise LookupError(f"{database} holds results already; a replay needs a folder of its own")
@@ -113,12 +113,12 @@ def _require_new(database: Path) -> None:
 async def _play(
     performance: Performance, listener: socket, daq: RunningDaq | None, line: str
 ) -> None:
-    """Run the service and print where the results are, before threads may be left behind.
+    """Run the service and print the place of the results, before the process may exit.
 
     Raises
     ------
     LinkError
-        If the DAQ has ended too early.
+        If the DAQ ended before its recordings.
     """
     await run_service(performance, listener, SystemClock(), announce)
     if daq is not None and daq.has_failed:

@@ -41,7 +41,7 @@ from service.store.port import StoreError
 log = structlog.get_logger()
 
 CLOSED = (ClosedError, CertificateError)
-"""What will be so the next time, too."""
+"""Errors that a restart does not cure."""
 
 
 def run(
@@ -57,12 +57,12 @@ def run(
 
 
 def run_plant(plant: PlantFile, port: int, is_demo: bool = False) -> None:
-    """Run the service on a port; ends the command with one line if it cannot.
+    """Run the service on a port, or end the command with one line.
 
     Parameters
     ----------
     is_demo
-        Whether people and programs on this computer may do everything without a login.
+        Whether local clients may do everything without a login.
     """
     try:
         with listener_of(plant, port) as listener:
@@ -77,7 +77,7 @@ def run_plant(plant: PlantFile, port: int, is_demo: bool = False) -> None:
 
 
 def announce(url: str) -> None:
-    """Tell where the dashboard is."""
+    """Print the URL of the dashboard."""
     typer.echo(f"padwatch: {url}")
 
 
@@ -138,7 +138,7 @@ def acquire(
 
 
 def _announce_acquire(url: str) -> None:
-    """Tell where the health page is."""
+    """Print the URL of the health page."""
     typer.echo(f"padwatch acquire: {url}readyz")
 
 
@@ -185,7 +185,7 @@ def analyse(
 
 
 def _announce_analyse(url: str) -> None:
-    """Tell where the health page is."""
+    """Print the URL of the health page."""
     typer.echo(f"padwatch analyse: {url}readyz")
 
 
@@ -226,7 +226,7 @@ def demo(
 
 
 def _give_past(plant: PlantFile) -> None:
-    """Fill an empty store with a simulated year; ends the command with one line if it cannot."""
+    """Fill an empty store with a simulated year, or end the command with one line."""
     now_ns = SystemClock().now_ns()
     try:
         store = open_store(plant, Origin.LIVE)

@@ -89,7 +89,7 @@ def restore(
 
 
 def _access_lines(after: AccessAfter) -> Iterator[str]:
-    """Who and what can come in now: what is not named here would be found out too late."""
+    """Yield the accounts and keys that are valid after the restore."""
     yield f"all logins are ended; accounts, with passwords of then: {_listed(after.accounts)}"
     if after.returned:
         names = _listed(after.returned)
@@ -104,7 +104,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _file(command: str, plant: PlantFile) -> Path:
-    """The plant's database file; a database of a server is copied by the server's own tools."""
+    """Return the plant's database file; PostgreSQL is copied by its own tools."""
     if plant.store.postgresql is not None:
         fail(
             f"padwatch {command}: {store_name(plant)} is copied with pg_dump or pg_basebackup and"
@@ -216,7 +216,7 @@ def export(
 def _export(
     films: FilmStore, plant: PlantFile, file: ReadingsFile, start_ns: int, end_ns: int
 ) -> list[int]:
-    """Write all films; how many readings each has."""
+    """Write the readings of all films; return their numbers."""
     counts = []
     for unit in plant.unit:
         for bearing in unit.bearing:

@@ -37,12 +37,12 @@ from service.store.documents import to_json
 
 YEAR_NS = 365.25 * DAY_NS
 APART = 2.0
-"""How many times a reading's length may be off the time between readings without a doubt."""
+"""Largest ratio of a reading's length to the time between readings without a warning."""
 
 
 @dataclass
 class Found:
-    """What has been found so far."""
+    """Results of a back-test so far."""
 
     films: list[FilmReport] = field(default_factory=list)
     alarms: list[AlarmReport] = field(default_factory=list)
@@ -52,7 +52,7 @@ class Found:
     unit_years: float = 0.0
 
     def rate(self) -> RateReport:
-        """How often it alarmed."""
+        """Return the rate of alarms."""
         n_alarms = len(self.alarms)
         return RateReport(
             unit_years=self.unit_years,
@@ -67,17 +67,17 @@ def run_back_test(
     rules: BackTestRules,
     advanced: Callable[[int], object] = lambda _: None,
 ) -> Found:
-    """Learn and decide over everything.
+    """Learn and decide over all histories.
 
     Parameters
     ----------
     advanced
-        Told how many more rows have been dealt with.
+        Called with the number of further rows processed.
 
     Raises
     ------
     ReadingsError
-        If an event is about a bearing without readings, or operating states are not known.
+        If an event names a bearing without readings, or operating states are unknown.
     """
     found = Found(doubts=list(_doubts(histories, rules)))
     _check_events(histories, rules)
@@ -118,7 +118,7 @@ def _take_unit(found: Found, unit: str, runs: Sequence[BearingRun], rules: BackT
 
 
 def _unsettled(run: BearingRun) -> Iterator[str]:
-    """Why nothing was learned or judged, if the bearing was never warm."""
+    """Yield why nothing was learned or judged, if the bearing never warmed up."""
     n = int(np.isin(run.operation.state, [int(state) for state in STEADY]).sum())
     if n and not run.operation.is_settled.any():
         yield (
@@ -128,7 +128,7 @@ def _unsettled(run: BearingRun) -> Iterator[str]:
 
 
 def _compared_ns(run: BearingRun) -> int:
-    """Time from the end of learning to the last reading, all periods together."""
+    """Return the time from the end of learning to the last reading, summed over periods."""
     time_ns = run.rows.history.time_ns
     return sum(
         int(time_ns[p.period.end - 1] - time_ns[p.period.learned])
@@ -145,7 +145,7 @@ def _check_events(histories: Mapping[Place, BearingRows], rules: BackTestRules) 
 
 
 def _doubts(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> Iterator[str]:
-    """What makes a result worth less than it looks."""
+    """Yield warnings about the validity of the results."""
     told_h = rules.baseline.reading_h
     for (unit, bearing), rows in histories.items():
         history = rows.history

@@ -11,14 +11,14 @@ import pyarrow.compute as pc
 from core.arrays import TimeArray
 
 MAX_NAMED = 10
-"""Rows that a refusal names."""
+"""Rows named in an error."""
 
 MAX_SHOWN = 40
 """Characters of a wrong value that are shown."""
 
 
 class RowProblems:
-    """Problems by row; only as many are kept as a refusal names.
+    """Problems by row, up to the number that an error names.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class RowProblems:
 
 
 def shown(value: Any) -> str:
-    """A wrong value as messages show it."""
+    """Return a wrong value as messages show it."""
     text = repr(value)
     return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
 
@@ -86,14 +86,14 @@ REQUIRED = (*NAMES, *STIFFNESS, "eccentricity_ratio", "oil_temperature_c")
 
 TEXTS = (*NAMES, *OPTIONAL_NAMES)
 HEADINGS = (TIME, *NAMES, *NUMBERS, *OPTIONAL_NAMES)
-"""In the order in which padwatch writes them."""
+"""All columns, in the order in which padwatch writes them."""
 
 SILENT = "insufficient_excitation"
 """Quality, or reason, of a reading without enough motion to measure stiffness."""
 
 MAX_COLUMNS = 100
 MAX_ROWS = 40_000_000
-"""Of one file: 20 units of 3 bearings for 6 years; about 230 bytes of memory each."""
+"""Rows of one file: 20 units of 3 bearings for 6 years; about 230 bytes of memory each."""
 
 
 class ReadingsError(Exception):
@@ -145,7 +145,7 @@ def _listed(names: list[str]) -> str:
 _UTC = pa.timestamp("ns", tz="UTC")
 _NO_TIME = "not a time of ISO 8601 with an offset from UTC, like 2026-03-01T08:00:00Z:"
 REASON, NO_REASON = "reason", "ok"
-"""A reading that is good needs no reason."""
+"""Name of the column, and its value for a good reading."""
 
 _TIMES = "must be texts like 2026-03-01T08:00:00Z or timestamps with a zone; whole ns are time_ns"
 
@@ -158,7 +158,7 @@ def converted(table: Any, line: Any, word: str) -> Any:
     line : (n,)
         Number of each row in messages.
     word
-        What such a number counts: lines or rows.
+        What the numbers count: "line" or "row".
 
     Raises
     ------
@@ -196,7 +196,7 @@ def _time_ns(table: Any, problems: RowProblems) -> Any:
 
 
 def _number(column: Any, key: str, problems: RowProblems) -> Any:
-    """Numbers, NaN where there is none."""
+    """Return a column of numbers, NaN where a number is missing."""
     column, kind = _flat(column), column.type
     is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)
     if not (is_number or _is_text(kind)):
@@ -218,7 +218,7 @@ def _text(column: Any, key: str, problems: RowProblems) -> Any:
 def _cast(
     column: Any, kind: Any, text: str, problems: RowProblems, may_be_empty: bool = False
 ) -> Any:
-    """Convert a column at once, or look for what does not fit, value by value."""
+    """Convert a column at once; if that fails, find the wrong values one by one."""
     if not may_be_empty:
         problems.add(_is_null(column), f"{text} nothing")
     try:
@@ -239,7 +239,7 @@ def _fits(value: Any, kind: Any) -> bool:
 
 
 def _said(value: Any) -> Any:
-    """A value for a message; times may be beyond what Python has."""
+    """Return a value for a message; times may lie outside Python's range."""
     is_stamp = pa.types.is_timestamp(value.type) and value.is_valid
     return f"{value.value} {value.type.unit} since 1970" if is_stamp else value.as_py()
 

@@ -31,7 +31,7 @@ QUALITIES = {
     "bad": ReadingOutcome.BAD_QUALITY,
     SILENT: ReadingOutcome.INSUFFICIENT_EXCITATION,
 }
-"""Outcome of a reading by quality: an uncertain one is neither learned nor judged."""
+"""Outcome of a reading by quality; uncertain readings are neither learned nor judged."""
 
 STATES = {state.name.lower(): state for state in OperatingState}
 _KNOWN: Mapping[str, Collection[str]] = {
@@ -94,7 +94,7 @@ def histories_of(
 def _mapped(
     column: Any, values: Mapping[str, Any], default: Any, rows: _Rows | slice = slice(None)
 ) -> npt.NDArray[Any]:
-    """(n,) value for the name of each row."""
+    """Return the (n,) values of the names of the rows."""
     names = column.dictionary.to_pylist()
     found = np.array([values.get(name, default) for name in names] or [default])
     return np.asarray(found[column.indices.to_numpy()[rows]])
@@ -140,7 +140,7 @@ def _check_numbers(columns: Mapping[str, Any], problems: RowProblems) -> None:
 
 
 def _by_place(columns: Mapping[str, Any]) -> list[tuple[Place, _Rows]]:
-    """Rows of each bearing, in their order."""
+    """Return the rows of each bearing, in their order."""
     unit, bearing = (columns[key].indices.to_numpy() for key in ("unit", "bearing"))
     key = unit.astype(np.int64) * len(columns["bearing"].dictionary) + bearing
     order = np.argsort(key, kind="stable")
@@ -154,7 +154,7 @@ def _by_place(columns: Mapping[str, Any]) -> list[tuple[Place, _Rows]]:
 
 
 def _outcome(columns: Mapping[str, Any], rows: _Rows) -> npt.NDArray[Any]:
-    """(n,) members of `ReadingOutcome`."""
+    """Return (n,) members of `ReadingOutcome`."""
     found = _mapped(columns["quality"], QUALITIES, ReadingOutcome.BAD_QUALITY, rows)
     if "reason" in columns:
         is_silent = _is_in(columns["quality"], ["bad"], rows)
@@ -164,7 +164,7 @@ def _outcome(columns: Mapping[str, Any], rows: _Rows) -> npt.NDArray[Any]:
 
 
 def _merged(columns: Mapping[str, Any], rows: _Rows, problems: RowProblems) -> BearingRows:
-    """Both directions of a bearing on one axis of time."""
+    """Merge both directions of a bearing on one time axis."""
     row_ns = columns[TIME_NS][rows]
     time_ns = np.unique(row_ns)
     sides = [np.flatnonzero(_is_in(columns["direction"], [name], rows)) for name in DIRECTIONS]
@@ -175,7 +175,7 @@ def _merged(columns: Mapping[str, Any], rows: _Rows, problems: RowProblems) -> B
         problems.add(later[step_ns < 0], "earlier than the row before")
 
     def both(column: npt.NDArray[Any] | None) -> FloatArray:
-        """(2, n) of each direction; NaN where it has no row, and without a column."""
+        """Return (2, n) values by direction; NaN for a missing row or column."""
         found = np.full((len(DIRECTIONS), time_ns.size), np.nan)
         for row, (side, slot) in enumerate(zip(sides, slots, strict=True)):
             if column is not None:
@@ -183,7 +183,7 @@ def _merged(columns: Mapping[str, Any], rows: _Rows, problems: RowProblems) -> B
         return found
 
     def one(key: str, column: npt.NDArray[Any] | None) -> FloatArray:
-        """(n,) of the direction that has a row; they must agree where both have."""
+        """Return (n,) values of either direction; both must agree where both have a row."""
         x, y = both(column)
         differs = ~((x == y) | np.isnan(x) & np.isnan(y))
         wrong = np.isin(slots[1], slots[0]) & differs[slots[1]]

@@ -17,7 +17,7 @@ from service.cli.offline.backtest_cells import MAX_ROWS, ReadingsError, check_he
 
 CHUNK_BYTES = 4_000_000
 MAX_LINE_BYTES = 16_384
-"""Of a line of a hundred columns; the longest of padwatch's own have 300."""
+"""Longest line, for a hundred columns; padwatch's own lines have 300 bytes at most."""
 
 _BOM = b"\xef\xbb\xbf"
 _NUL, _LF, _CR, _QUOTE = 0, 10, 13, 34
@@ -32,7 +32,7 @@ class Lines:
     text
         UTF-8, each line with its end.
     number : (n,)
-        Numbers in the file of those that are not empty.
+        Numbers of the lines that are not empty, counted in the file.
     """
 
     text: bytes
@@ -92,7 +92,7 @@ def csv_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
 
     Yields
     ------
-    Rows, and how many bytes have been read.
+    Rows, and the number of bytes read.
 
     Raises
     ------
@@ -171,15 +171,15 @@ MAX_FOOTER_BYTES = 64_000_000
 _TAIL_BYTES = 8
 _ROWS = 65_536
 _BUFFER_BYTES = 1_000_000
-"""Of each column; without it all of a row group would be held at once."""
+"""Buffer of each column; without it a whole row group would be in memory."""
 
 
 def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
-    """Read a file; to be done where a lying file may take a process down with it.
+    """Read a file; call it in a child process, which a malformed file may crash.
 
     Yields
     ------
-    Rows, and about how many bytes have been read.
+    Rows, and the approximate number of bytes read.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
     try:
         yield from _batches(stream, size)
     except pa.ArrowMemoryError:
-        raise  # of the process, not of the file
+        raise  # the process is out of memory; the file may be fine
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         words = str(error) or type(error).__name__
         raise ReadingsError(f"not a sound Parquet file: {words.splitlines()[0][:200]}") from error
