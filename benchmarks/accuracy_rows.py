@@ -24,7 +24,7 @@ from core.machine.channel import Measurand
 from core.machine.response import HighPass, Response
 from core.machine.unit import BearingAccuracy
 from core.stiffness.evidence import LineLimits
-from service.cli.offline.validation import paper
+from service.cli.offline import validation as paper
 
 MINUTE_S = 60.0
 GN = 1e9

@@ -20,11 +20,11 @@ from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
 from core.quality import GOOD, Reading, Reason, bad
 from core.samples.blocks import DeviceClock, SampleBlock
-from service.app.captures import captures_of
+from service.app.storage import captures_of
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 
 DEMO = Path(__file__).parents[1] / "deploy" / "demo.toml"
 LIMIT_US = 100.0

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from service.app.stores import open_store
-from service.cli.offline.demo.past import fill
+from service.app.storage import open_store
+from service.cli.offline.demo_history import fill
 from service.measuring.simulated_sources import simulated_history
 from service.settings.loading import load_plant_file
 

@@ -16,9 +16,9 @@ from acquisition.clock import SystemClock
 from acquisition.delivery.blocks import BlockAssembler
 from acquisition.recordings.writer import RecordingWriter
 from service.measuring.simulated_sources import simulated_feed
+from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
-from service.settings.recorded_units import recorded_unit
 
 PLANT = Path(__file__).parents[1] / "deploy" / "demo.toml"
 SECONDS = 3600.0

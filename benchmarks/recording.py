@@ -16,9 +16,9 @@ from core.samples.blocks import SampleBlock
 from service.measuring.simulated_sources import simulated_feed
 from service.recordings.continuous_recorder import UnitTape
 from service.recordings.segment import TapeSettings, join
+from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
-from service.settings.recorded_units import recorded_unit
 from service.settings.units import UnitSettings
 
 PLANT = Path(__file__).parents[1] / "deploy" / "demo.toml"

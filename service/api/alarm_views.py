@@ -21,7 +21,7 @@ from service.api.ports import FilmBoard
 from service.live.alarm_board import AlarmBoard
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.port import StoredEvent
 
 

@@ -13,7 +13,7 @@ from service.api.rendering import rendered
 from service.api.waveform_views import waveform_model
 from service.live.live_view import HELD_S
 from service.live.samples import newest_stretch
-from service.settings.modbus_sources import ModbusVectorSettings
+from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.units import UnitSettings
 from service.store.access.identities import Permission
 

@@ -19,7 +19,7 @@ from service.api.views import quality_model
 from service.runtime.times import rfc3339
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
 from service.settings.channels import ChannelSettings, SlowChannelSettings
-from service.settings.modbus_sources import ModbusVectorSettings
+from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.units import UnitSettings
 
 UNITS: dict[Measurand, ChannelUnit] = {

@@ -9,7 +9,7 @@ from service.api.auth.declared import Reach, needs
 from service.api.configuration_models import ConfigurationModel
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
-from service.settings.schema import plant_file_schema
+from service.settings.loading import plant_file_schema
 from service.store.access.identities import Permission
 
 SCHEMA = "/api/v1/configuration/schema"

@@ -20,11 +20,11 @@ from service.live.alarm_board import AlarmBoard
 from service.live.evidence import EvidenceStatus
 from service.measuring.references_in_force import ReferencesInForce
 from service.recordings.continuous_recorder import Tape
+from service.runtime.disk import SpaceWatch
 from service.runtime.polls import TimedSource
-from service.runtime.space.watch import SpaceWatch
 from service.settings.bearings import BearingSettings
 from service.settings.configuration import Configuration
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.settings.units import UnitSettings
 from service.store.port import Store
 

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Header, Response
 from prometheus_client.registry import Collector
 
 from service.api.auth.declared import needs
-from service.runtime.families import OPEN_METRICS, rendered
+from service.runtime.metrics import OPEN_METRICS, rendered
 from service.store.access.identities import Permission
 
 EXAMPLE = """\

@@ -25,7 +25,7 @@ from service.live.samples import newest_of, stretch_of
 from service.recordings.library import Kept
 from service.recordings.motion import NoMotionError, channels_for, motion_of, recorded_motion
 from service.settings.core_values import machine_of
-from service.settings.modbus_sources import ModbusVectorSettings
+from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.units import UnitSettings
 from service.store.access.identities import Permission
 

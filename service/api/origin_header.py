@@ -3,7 +3,7 @@
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 
 HEADER = "Padwatch-Origin"
 

@@ -14,7 +14,7 @@ from core.quality import Reason
 from core.samples.blocks import SampleBlock
 from service.live.commands import BaselineAction, FilmPlace
 from service.live.live_view import CurrentBearing, UnitStatus
-from service.settings.film_alarms import FilmAlarmSettings
+from service.settings.films import FilmAlarmSettings
 
 
 class LiveLook(Protocol):

@@ -6,7 +6,7 @@ from service.api.auth.declared import needs
 from service.api.context import Context
 from service.api.source_models import PollsModel, SourceHealthModel
 from service.api.views import source_model
-from service.runtime.durations import Seen
+from service.runtime.metrics import Seen
 from service.settings.units import UnitSettings
 from service.store.access.identities import Permission
 

@@ -1,4 +1,4 @@
-"""Recordings of a unit: written, opened, and as sources."""
+"""Recordings of a unit: writers, readers, and recordings as sources."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -13,41 +13,41 @@ from acquisition.recordings.writer import RecordingWriter
 from acquisition.simulated.devices.recorded import RecordedFeed
 from acquisition.simulated.feed import SampleFeed
 from acquisition.source import SampleSource
+from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.plant import PlantFile
-from service.settings.recorded_units import recorded_unit
 from service.settings.units import UnitSettings
 
 
 def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
-    """A recording of a unit, about to be written; of counts if the first block is just that.
+    """Create the writer of a recording of a unit; the first block decides on counts or values.
 
     Raises
     ------
     ConfigError
-        If the folder exists or cannot be made.
+        If the folder exists or cannot be created.
     """
     return RecordingWriter(folder, recorded_unit(unit), made_by, first_decides=True)
 
 
 def recording_of(folder: Path) -> Recording:
-    """A finished recording, checked from end to end.
+    """Open a finished recording and check all of it.
 
     Raises
     ------
     ConfigError
-        If anything about it is wrong.
+        If the recording is damaged.
     """
     return open_recording(folder)
 
 
 def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, Path]:
-    """Recordings by the unit they are of.
+    """Return recordings by unit.
 
     Raises
     ------
     ConfigError
-        If one has no readable manifest, is of no unit of the plant, or of the same as another.
+        If one has no readable manifest, an unknown unit, or the same unit as another.
     """
     known = [unit.id for unit in plant.unit]
     found: dict[str, Path] = {}
@@ -62,12 +62,12 @@ def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, P
 
 
 def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
-    """What a unit needs of a recording.
+    """Return the part of a recording that a unit needs.
 
     Raises
     ------
     ConfigError
-        If it is not there, or at another rate or in another unit.
+        If a channel is missing, or has another rate or another unit.
     """
     slow_units = {channel.id: channel.unit for channel in unit.slow_channel}
     machine = replace(machine_of(unit), rate_hz=unit.sampling_hz)
@@ -77,12 +77,12 @@ def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
 def recording_source(
     recording: Recording, selection: Selection, unit: UnitSettings | None, clock: Clock
 ) -> SampleSource:
-    """A recording as an unpaced source.
+    """Return a recording as an unpaced source.
 
     Parameters
     ----------
     unit
-        Whose calibration is to replace the recorded one, if any.
+        Unit whose calibration replaces the recorded one, if given.
     """
     if unit is not None:
         selection = replace(selection, calibration=calibration_of(unit))
@@ -92,12 +92,12 @@ def recording_source(
 def replay_source(
     folder: Path, unit: UnitSettings, clock: Clock, speed: float | None
 ) -> SampleSource:
-    """A recording in the place of a unit's own source, read with the unit's own calibration.
+    """Return a recording in place of a unit's source, with the unit's calibration.
 
     Parameters
     ----------
     speed
-        Seconds of the recording in a second, or None for as fast as it is taken.
+        Seconds of the recording per second; None to play as fast as the reader reads.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def replay_source(
 
 
 def recorded_feed(folder: Path, unit: UnitSettings) -> SampleFeed:
-    """A recording behind a simulated DAQ.
+    """Return a recording as the feed of a simulated DAQ.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Recordings in the place of a plant's own sources: which units, where results go, when it ends."""
+"""Replay of recordings in place of a plant's sources."""
 
 import threading
 from collections.abc import AsyncGenerator, AsyncIterator, Iterable
@@ -12,14 +12,14 @@ from acquisition.source import SampleSource
 from core.samples.blocks import SampleBlock
 from core.units import NS_PER_S
 from service.settings.plant import PlantFile
-from service.settings.store import StoreSettings
+from service.settings.storage import StoreSettings
 
 REPLAYS = "replays"
-"""Folder below the plant's data folder, apart from its live database."""
+"""Folder below the plant's data folder, separate from its live database."""
 
 
 def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> PlantFile:
-    """The part of a plant that is replayed: in a file in a folder of its own, for this computer."""
+    """Return the replayed part of a plant: own folder, SQLite, reachable from this host only."""
     closed = {"host": "127.0.0.1", "socket": None, "tls": None}
     service = plant.service.model_copy(update={"data_folder": str(folder), **closed})
     chosen = tuple(unit for unit in plant.unit if unit.id in set(units))
@@ -28,7 +28,7 @@ def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> Plan
 
 
 def replay_folder(plant: PlantFile, recordings: Iterable[Path], now_ns: int) -> Path:
-    """A folder for the results of one replay, named after what is played and when."""
+    """Return the folder of the results of one replay, named after recordings and time."""
     moment = datetime.fromtimestamp(now_ns // NS_PER_S, UTC).strftime("%Y%m%dT%H%M%SZ")
     name = "+".join(path.resolve().name for path in recordings)[:80]
     return Path(plant.service.data_folder) / REPLAYS / f"{name}-{moment}"

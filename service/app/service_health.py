@@ -1,6 +1,6 @@
-"""How the service does, read from its parts."""
+"""Health of the service, as its alarms and its recorders read it."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from service.api.load.watch import LoadWatch
 from service.live.live_view import LiveView
@@ -9,9 +9,9 @@ from service.measuring.recorder import Recorder
 from service.measuring.service_alarms import LookAtHealth, ServiceHealth, StreamLook, enough_room
 from service.measuring.soundness import Soundness
 from service.recordings.around_alarms import Captures
-from service.recordings.continuous_recorder import Tape
+from service.recordings.continuous_recorder import Shed, Tape
 from service.recordings.keeper import WaveformKeeper
-from service.runtime.space.watch import SpaceWatch
+from service.runtime.disk import SpaceWatch
 
 
 def health_of(
@@ -27,7 +27,7 @@ def health_of(
     soundness: Soundness | None = None,
     stream: StreamLook | None = None,
 ) -> LookAtHealth:
-    """A look at the parts of the running service."""
+    """Return a function that reads the health of the running service."""
     names = list(units)
 
     def look() -> ServiceHealth:
@@ -56,6 +56,49 @@ def health_of(
 
 
 def recording_error(tape: Tape | None, recordings: WaveformKeeper | None) -> str | None:
-    """Why not all samples are recorded, or recordings not looked after; None if all is well."""
+    """Return why samples are not recorded or recordings not maintained; None if neither."""
     now = tape.trouble if tape else None
     return now or (recordings.lasting_trouble if recordings else None)
+
+
+BEHIND_S = 3.0
+"""Wait of a block for the analysis above which recording pauses; results come first."""
+
+BEHIND_SHARE = 0.25
+"""Filled share of the queue above which recording pauses."""
+
+CAUGHT_UP = 1.0 / 3.0
+"""Share of these limits below which recording resumes."""
+
+
+class Pressure:
+    """Decides from the queue to the analysis and from the disk whether recording pauses.
+
+    Parameters
+    ----------
+    is_full
+        Returns whether the disk is nearly full.
+    has_shed
+        Returns whether requests are refused already; they are shed before waveforms.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        is_full: Callable[[], bool] = lambda: False,
+        has_shed: Callable[[], bool] = lambda: True,
+    ) -> None:
+        self._bus, self._is_full, self._has_shed = bus, is_full, has_shed
+        self._is_behind = False
+
+    def look(self) -> Shed | None:
+        """Return why recording pauses now, or None."""
+        share = CAUGHT_UP if self._is_behind else 1.0
+        is_behind = (
+            self._bus.oldest_wait_s > share * BEHIND_S
+            or self._bus.depth > share * BEHIND_SHARE * self._bus.capacity
+        )
+        self._is_behind = is_behind and (self._is_behind or self._has_shed())
+        if self._is_behind:
+            return Shed.ANALYSIS_BEHIND
+        return Shed.DISK_FULL if self._is_full() else None

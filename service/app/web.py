@@ -1,4 +1,4 @@
-"""The HTTP server of a plant file."""
+"""The HTTP server of a plant file: application, access and socket."""
 
 import socket
 from collections.abc import Iterator
@@ -7,23 +7,36 @@ from pathlib import Path
 from ssl import SSLContext
 from urllib.parse import urlsplit
 
+from fastapi import Depends
 from starlette.types import ASGIApp
 
 from acquisition.clock import Clock
+from service.api.app import create_app
+from service.api.auth.application import GuardedApi
+from service.api.auth.desk import AccessDesk
+from service.api.context import Context
+from service.api.edition import EditionHeader
 from service.api.http.config import GuardedConfig
 from service.api.http.listening import listen
 from service.api.http.server import GuardedServer
 from service.api.http.socket_file import socket_file
 from service.api.http.tls import server_tls
 from service.api.http.trusted_proxy import TrustedProxy
+from service.api.problems import refuse_unknown_parameters
+from service.dashboard.edition import edition
+from service.dashboard.routes import dashboard_router
+from service.reports.routes import EvidenceDesk, evidence_router
 from service.settings.plant import PlantFile
+from service.settings.processes import Doorway, is_loopback, why_closed
+from service.store.access.identities import Role, SessionLimits
+from service.store.access.port import AccessStore
 
 HSTS = ("Strict-Transport-Security", "max-age=31536000")
-"""Browsers that have seen it once never ask in plain HTTP again."""
+"""Browsers that received this header use HTTPS only."""
 
 
 def server_of(app: ASGIApp, plant: PlantFile, clock: Clock) -> GuardedServer:
-    """What serves an application within the plant file's limits, under the names it gives."""
+    """Build the server of an application, with the limits and host names of the plant file."""
     service, tls = plant.service, _tls(plant)
     if service.socket is not None:
         app = TrustedProxy(app)
@@ -34,17 +47,17 @@ def server_of(app: ASGIApp, plant: PlantFile, clock: Clock) -> GuardedServer:
 
 @contextmanager
 def listener_of(plant: PlantFile, port: int) -> Iterator[socket.socket]:
-    """Where the server is to listen, taken before anything else is started.
+    """Open the server's socket, before anything else is started.
 
     Parameters
     ----------
     port
-        Instead of the plant file's; of no matter on a socket file.
+        Replaces the plant file's port; ignored with a Unix socket.
 
     Raises
     ------
     PortInUseError, CertificateError
-        If it cannot be had, or not with this certificate.
+        If the address is in use, or the certificate cannot be used.
     """
     _tls(plant)
     if plant.service.socket is not None:
@@ -61,8 +74,63 @@ def _tls(plant: PlantFile) -> SSLContext | None:
 
 
 def _names(plant: PlantFile) -> list[str]:
-    """Its own names, and the one that people are sent to by messages."""
+    """Return the host names of the service and of the dashboard URL in messages."""
     names = [plant.service.host, *plant.service.hosts]
     if plant.delivery.dashboard_url is not None:
         names.append(urlsplit(plant.delivery.dashboard_url).hostname or "")
     return [name for name in names if name]
+
+
+class ClosedError(Exception):
+    """The service does not start at this address; the message says why."""
+
+
+def access_desk(
+    plant: PlantFile, store: AccessStore, clock: Clock, is_demo: bool = False
+) -> AccessDesk:
+    """Build the access service, which authenticates requests.
+
+    Parameters
+    ----------
+    is_demo
+        Whether local clients may do everything without a login.
+
+    Raises
+    ------
+    ClosedError
+        If the service would be reachable from other hosts without TLS or accounts.
+    StoreError
+        If accounts cannot be read.
+    """
+    service, access = plant.service, plant.access
+    doorway = Doorway(
+        service.host,
+        is_unix_socket=service.socket is not None,
+        has_tls=service.tls is not None,
+        has_account=bool(store.accounts.all()),
+    )
+    reason = why_closed(doorway)
+    if reason is not None:
+        raise ClosedError(reason)
+    local_role: Role | None = Role.ADMIN if is_demo else Role.VIEWER
+    if access.login or doorway.is_unix_socket or not is_loopback(service.host):
+        local_role = None
+    limits = SessionLimits(idle_s=60.0 * access.idle_min, absolute_s=3600.0 * access.longest_h)
+    return AccessDesk(store, clock, local_role, limits=limits)
+
+
+def application(context: Context, evidence: EvidenceDesk | None = None) -> GuardedApi:
+    """Build the application.
+
+    Parameters
+    ----------
+    evidence
+        Service that hands out evidence of alarms; None if none is stored.
+    """
+    app = create_app(context)
+    app.add_middleware(EditionHeader, edition=edition())
+    guarded = [Depends(refuse_unknown_parameters)]
+    app.include_router(evidence_router(context, evidence), dependencies=guarded)
+    app.include_router(dashboard_router())
+    app.require_declarations()
+    return app

@@ -1,4 +1,4 @@
-"""`padwatch audit`: who did what, whether all of it is there, and as a file."""
+"""`padwatch audit`: verify the audit trail, and export it as a file."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -8,8 +8,8 @@ import typer
 from pydantic import TypeAdapter
 
 from service.api.audit_csv import write_csv
-from service.app.stores import open_trail
-from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.app.storage import open_trail
+from service.cli.options import PlantPath, fail, read_plant_file
 from service.store.access.audit_verification import Verdict
 from service.store.port import StoreError
 

@@ -7,20 +7,22 @@ from typing import Annotated, Any
 import typer
 
 from acquisition.clock import SystemClock
-from service.cli.offline.back_test.arguments import event_of, time_ns_of
-from service.cli.offline.back_test.bearing_run import BackTestRules
-from service.cli.offline.back_test.exporting import export_baselines
-from service.cli.offline.back_test.file_columns import ReadingsError
-from service.cli.offline.back_test.histories import BearingRows, Place
-from service.cli.offline.back_test.listing import lines_of
-from service.cli.offline.back_test.periods import Learning
-from service.cli.offline.back_test.reading import read_histories
-from service.cli.offline.back_test.report import BackTestReport
-from service.cli.offline.back_test.rules import places_of, rules_of
-from service.cli.offline.back_test.running import Found, run_back_test
-from service.cli.plant_file import fail, read_plant_file
-from service.runtime.made_by import made_by
-from service.settings.film_alarms import FilmAlarmSettings
+from service.cli.offline.backtest import (
+    Found,
+    event_of,
+    export_baselines,
+    lines_of,
+    run_back_test,
+    time_ns_of,
+)
+from service.cli.offline.backtest_bearing import BackTestRules, Learning, places_of, rules_of
+from service.cli.offline.backtest_cells import ReadingsError
+from service.cli.offline.backtest_files import read_histories
+from service.cli.offline.backtest_histories import BearingRows, Place
+from service.cli.offline.backtest_report import BackTestReport
+from service.cli.options import fail, read_plant_file
+from service.runtime.process import made_by
+from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
 from service.settings.toml_file import TomlFileError, load_toml
 
@@ -69,7 +71,7 @@ def backtest(
         ),
     ] = None,
     estimator: Annotated[
-        str, typer.Option(help="Whose stiffness this is, for the exported baselines.")
+        str, typer.Option(help="Name of the stiffness estimator, stored with exported baselines.")
     ] = "not told",
     export: Annotated[
         Path | None,

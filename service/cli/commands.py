@@ -2,21 +2,17 @@
 
 import typer
 
-from service.cli import audit, config, delivery, keys, probe, readings, recording, reference, users
-from service.cli.acquire import acquire
-from service.cli.analyse import analyse
+from service.cli import audit, config, notifications, probe, recording, reference
+from service.cli.accounts import keys_app, users_app
 from service.cli.backtest import backtest
-from service.cli.backup import backup, restore
 from service.cli.daq import daq
-from service.cli.demo import demo
 from service.cli.reanalyse import reanalyse
 from service.cli.record import record
 from service.cli.replay import replay
-from service.cli.run import run
-from service.cli.serve import serve
-from service.cli.store import app as store_app
+from service.cli.run import acquire, analyse, demo, run, serve
+from service.cli.store import backup, readings_app, restore, store_app
 from service.cli.validate import validate
-from service.runtime.logs import set_up_logging
+from service.runtime.process import set_up_logging
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -42,11 +38,11 @@ app.add_typer(reference.app, name="reference")
 app.add_typer(audit.app, name="audit")
 app.add_typer(recording.app, name="recording")
 app.add_typer(store_app, name="store")
-app.add_typer(readings.app, name="readings")
+app.add_typer(readings_app, name="readings")
 app.add_typer(probe.app, name="probe")
-app.add_typer(delivery.app, name="delivery")
-app.add_typer(users.app, name="users")
-app.add_typer(keys.app, name="keys")
+app.add_typer(notifications.app, name="delivery")
+app.add_typer(users_app, name="users")
+app.add_typer(keys_app, name="keys")
 
 
 @app.callback()

@@ -6,10 +6,9 @@ from typing import Annotated
 import typer
 
 from acquisition.errors import ConfigError
-from service.cli.examples import EXAMPLE, example_path
-from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.settings.can_devices import require_dbc_fits
-from service.settings.schema import plant_file_schema
+from service.cli.options import EXAMPLE, PlantPath, example_path, fail, read_plant_file
+from service.settings.adapter_values import require_dbc_fits
+from service.settings.loading import plant_file_schema
 
 app = typer.Typer(no_args_is_help=True, help="Check a plant file, print its schema or an example.")
 

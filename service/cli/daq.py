@@ -1,8 +1,15 @@
-"""`padwatch daq`: simulated or recorded units behind a real DAQ."""
+"""`padwatch daq`: simulated or recorded units behind a simulated DAQ."""
 
-from collections.abc import Mapping
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import IO, Annotated
 
 import typer
 import uvloop
@@ -10,11 +17,9 @@ import uvloop
 from acquisition.clock import FastClock, SystemClock
 from acquisition.errors import AcquisitionError
 from acquisition.simulated.feed import SampleFeed
-from service.app.daq_program import run_daq
-from service.app.daqs import daq_of
 from service.app.recordings import recorded_feed, recordings_by_unit
-from service.app.wires import Wire, over_wire
-from service.cli.plant_file import PlantPath, fail, read_plant_file
+from service.app.simulated_daq import Wire, daq_of, over_wire, run_daq
+from service.cli.options import PlantPath, fail, read_plant_file
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.plant import PlantFile
 
@@ -69,7 +74,106 @@ def _feeds(plant: PlantFile, recordings: list[Path]) -> Mapping[str, SampleFeed]
     feeds = {unit.id: simulated_feed(unit, clock) for unit in plant.unit if unit.simulation}
     if not feeds:
         raise LookupError("no unit of this plant file has a [unit.simulation] table")
-    now_ns = clock.now_ns()  # the first of them was made seconds ago
+    now_ns = clock.now_ns()  # the first feed was built seconds ago
     for feed in feeds.values():
         feed.begin_at(now_ns)
     return feeds
+
+
+STOP_S = 3.0
+TERMINALS = "/dev/pts/"
+
+Endpoints = dict[str, dict[str, str | int]]
+
+
+@dataclass(frozen=True)
+class RunningDaq:
+    """A running simulated DAQ.
+
+    Parameters
+    ----------
+    endpoints
+        Address of each unit, as keys and values of its source's settings.
+    over
+        For each unit, set when its recording has been played to the end.
+    gone
+        Set when the process has ended.
+    """
+
+    endpoints: Endpoints
+    over: dict[str, threading.Event]
+    gone: threading.Event = field(default_factory=threading.Event)
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether the DAQ ended before its recordings."""
+        return self.gone.is_set() and not all(over.is_set() for over in self.over.values())
+
+    def attached(self, plant: PlantFile) -> PlantFile:
+        """Return the plant with the sources of its units at this DAQ."""
+        units = []
+        for unit in plant.unit:
+            source = unit.source.model_copy(update=self.endpoints.get(unit.id, {}))
+            units.append(unit.model_copy(update={"source": source}))
+        return plant.model_copy(update={"unit": tuple(units)})
+
+
+@contextmanager
+def held_lines(endpoints: Endpoints) -> Iterator[None]:
+    """Hold the pseudo-terminals of endpoints open, so that their names are not reused.
+
+    The system reuses the name of a terminal that no program has open. A reader that reconnects
+    after its DAQ has ended would otherwise open, and lock, the terminal of another program.
+    """
+    places = [place for endpoint in endpoints.values() for place in endpoint.values()]
+    with ExitStack() as stack:
+        for place in places:
+            if isinstance(place, str) and place.startswith(TERMINALS):
+                with suppress(OSError):  # the DAQ has ended; its reader reports that
+                    held = os.open(place, os.O_RDWR | os.O_NOCTTY)
+                    stack.callback(os.close, held)
+        yield
+
+
+@contextmanager
+def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
+    """Run ``padwatch daq`` with arguments; it ends when this process ends in any way."""
+    with subprocess.Popen(  # noqa: S603  our own program
+        [sys.executable, "-m", "service.cli.main", "daq", *arguments, "--control"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,  # Ctrl-C is for this process, which stops the DAQ last
+    ) as process:
+        news = None
+        try:
+            line = process.stdout.readline() if process.stdout else b""
+            if not line or process.stdout is None:
+                fail("padwatch: the simulated DAQ did not start; its own message stands above")
+            endpoints: Endpoints = json.loads(line)
+            daq = RunningDaq(endpoints, {unit: threading.Event() for unit in endpoints})
+            news = threading.Thread(target=_listen, args=(process.stdout, daq), daemon=True)
+            news.start()
+            with held_lines(endpoints):
+                yield daq
+        finally:
+            _stop(process)
+            if news is not None:
+                news.join()  # before its pipe is closed
+
+
+def _stop(process: "subprocess.Popen[bytes]") -> None:
+    process.terminate()
+    try:
+        process.wait(STOP_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def _listen(stdout: IO[bytes], daq: RunningDaq) -> None:
+    """Record the events that the DAQ prints, until it ends."""
+    for line in stdout:
+        ended = json.loads(line).get("ended")
+        if ended in daq.over:
+            daq.over[ended].set()
+    daq.gone.set()

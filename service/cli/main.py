@@ -8,23 +8,23 @@ from typing import NoReturn
 
 import typer
 
-from service.runtime.ending import leave
+from service.runtime.process import leave
 
 EXIT_BUG = 70
 
 PRIVATE = 0o077
-"""Files are for their user alone: the database holds password hashes, recordings the plant."""
+"""umask: only the owner reads files; the database holds password hashes."""
 
 
 def main() -> NoReturn:
-    """Run the command line; a bug ends it with one line and a report for its makers."""
+    """Run the command line; an internal error ends it with one line and a report file."""
     os.umask(PRIVATE)
     leave(_exit_code())
 
 
 def _commands() -> typer.Typer:
-    """Load the program; what is loaded stays, and is not looked through for what may go."""
-    gc.disable()  # it would be, a hundred times: a fifth of the time that loading takes
+    """Load the program without garbage collection, and freeze the loaded objects."""
+    gc.disable()  # a hundred collections take a fifth of the loading time
     from service.cli.commands import app
 
     gc.freeze()
@@ -37,7 +37,7 @@ def _exit_code() -> int:
         _commands()()
     except SystemExit as ended:
         return ended.code if isinstance(ended.code, int) else int(ended.code is not None)
-    except Exception:  # the outermost rim: users get a sentence, the report gets the traceback
+    except Exception:  # last resort: a sentence for users, the traceback in the report
         with tempfile.NamedTemporaryFile(
             "w", prefix="padwatch-", suffix=".txt", delete=False
         ) as report:

@@ -1,4 +1,4 @@
-"""`padwatch probe`: what a Modbus device has in its registers, before anything is stored."""
+"""`padwatch probe`: contents of the registers of a Modbus device, without storing anything."""
 
 import asyncio
 import json
@@ -13,28 +13,24 @@ from pydantic import ValidationError
 from acquisition.errors import AcquisitionError
 from acquisition.modbus.cells import ByteOrder
 from core.machine.channel import Measurand
-from service.cli.offline.probes import (
-    identify_once,
-    measure_in_flight,
-    read_map_once,
-    read_once,
-    read_ring_once,
-)
 from service.cli.offline.probing import (
     RegisterLook,
     RingLook,
     ValueLook,
+    identify_once,
     looks,
+    measure_in_flight,
+    read_map_once,
+    read_once,
+    read_ring_once,
     ring_look,
     value_looks,
 )
-from service.cli.plant_file import fail, read_plant_file
-from service.cli.units import UnitOption, one_unit
+from service.cli.options import UnitOption, fail, one_unit, read_plant_file
 from service.runtime.times import rfc3339
-from service.settings.map_file import load_map_file
-from service.settings.modbus_link import ModbusLinkSettings
-from service.settings.modbus_map import RegisterMapSettings
-from service.settings.modbus_sources import MappedDeviceSettings
+from service.settings.sources.devices import MappedDeviceSettings
+from service.settings.sources.modbus import ModbusLinkSettings
+from service.settings.sources.register_map import RegisterMapSettings, load_map_file
 from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
 
@@ -186,7 +182,7 @@ def _done(look: Coroutine[Any, Any, Result]) -> Result:
 def _place(
     device: str, unit_id: int, timeout_s: float, baudrate: int, parity: str
 ) -> ModbusLinkSettings:
-    """Where a device is, or end with exit code 2."""
+    """Return the link to a device, or end with exit code 2."""
     given: dict[str, Any] = {"device_id": unit_id, "timeout_s": timeout_s}
     if device.startswith(RTU_PREFIX):
         given |= {"device": device, "baudrate": baudrate, "parity": parity}
@@ -210,7 +206,7 @@ def _map_of(path: Path) -> RegisterMapSettings:
 
 
 def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
-    """The device of a unit that has a register map, or end with exit code 2."""
+    """Return the device of a unit with a register map, or end with exit code 2."""
     device = getattr(unit, "slow_source", None) if slow else unit.source
     if not isinstance(device, MappedDeviceSettings):
         key = "slow_source" if slow else "source"
@@ -219,7 +215,7 @@ def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
 
 
 def _units_of(unit: UnitSettings) -> dict[str, str]:
-    """In which unit each channel is read."""
+    """Return the engineering unit of each channel."""
     waveforms = {channel.id: MEASURAND_UNITS[channel.measurand] for channel in unit.channel}
     return waveforms | {c.id: c.unit for c in unit.slow_channel}
 

@@ -23,8 +23,7 @@ from service.cli.offline.reanalysis import (
     calibration_differences,
     is_full,
 )
-from service.cli.plant_file import fail, read_plant_file
-from service.cli.units import UnitOption, one_unit
+from service.cli.options import UnitOption, fail, one_unit, read_plant_file
 from service.runtime.times import rfc3339
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 
@@ -93,11 +92,11 @@ class TextPrinter:
     """Assessments as tables for people."""
 
     def put(self, assessment: Assessment) -> None:
-        """Print one."""
+        """Print one assessment."""
         typer.echo("\n".join(_table(assessment)))
 
     def end(self) -> None:
-        """Print what comes after all."""
+        """Print the end of the output."""
 
 
 class JsonPrinter:
@@ -107,12 +106,12 @@ class JsonPrinter:
         self._before = "[\n"
 
     def put(self, assessment: Assessment) -> None:
-        """Print one."""
+        """Print one assessment."""
         typer.echo(self._before + assessment_model(assessment).model_dump_json(), nl=False)
         self._before = ",\n"
 
     def end(self) -> None:
-        """Print what comes after all."""
+        """Print the end of the output."""
         typer.echo("[]" if self._before == "[\n" else "\n]")
 
 
@@ -123,7 +122,7 @@ async def _print(
     printer: TextPrinter | JsonPrinter,
     n_samples: int,
 ) -> bool:
-    """Print what was chosen; return whether there was anything."""
+    """Print the chosen results; return whether there were any."""
     last, found = LastAverages(), False
     with typer.progressbar(
         length=n_samples, label="Analysing", file=sys.stderr, hidden=not sys.stderr.isatty()

@@ -16,16 +16,15 @@ from acquisition.errors import AcquisitionError, LinkError
 from acquisition.recordings.writer import RecordingWriter
 from acquisition.source import SampleSource
 from service.app.recordings import recording_of, recording_writer
-from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.cli.units import UnitOption, one_unit
+from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
 from service.measuring.sources import source_of
-from service.runtime.made_by import made_by
-from service.settings.modbus_sources import ModbusVectorSettings
+from service.runtime.process import made_by
+from service.settings.sources.devices import ModbusVectorSettings
 
 MAX_SECONDS = 7 * 86_400.0
 
 RETRY_S = 0.5
-"""Longest wait before a lost link is tried again; as the service waits."""
+"""Longest wait before a lost link is opened again, as in the service."""
 
 
 def record(
@@ -75,17 +74,17 @@ def record(
 
 
 class Patience:
-    """Waits before a lost link is tried again, until the recording should have ended."""
+    """Waits before a lost link is opened again, until the planned end of the recording."""
 
     def __init__(self, seconds: float, clock: Clock) -> None:
         self._clock = clock
         self._deadline_s = clock.monotonic_s() + seconds
 
     async def wait(self, error: LinkError) -> None:
-        """Wait a little; raises the error if there is no time left."""
+        """Wait briefly, or raise the error after the planned end of the recording."""
         if self._clock.monotonic_s() >= self._deadline_s:
             raise error
-        # a share at random, as the service does, so that many recorders do not call together
+        # a random share, as in the service, so that many recorders do not connect at once
         await self._clock.sleep(RETRY_S * random.uniform(0.5, 1.0))  # noqa: S311  not a secret
 
 
@@ -100,16 +99,16 @@ async def record_blocks(
     Parameters
     ----------
     patience
-        If the link is to be tried again when it is lost.
+        Given if a lost link is to be opened again.
 
     Returns
     -------
-    Why the link was lost, if it was.
+    The reason of a lost link, or None.
 
     Raises
     ------
     AcquisitionError
-        If nothing at all could be recorded; then nothing is left behind.
+        If nothing could be recorded; no files remain.
     """
     with writer:
         reading = asyncio.create_task(_read(source, writer, seconds, patience))

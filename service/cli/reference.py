@@ -1,4 +1,4 @@
-"""`padwatch reference`: set and list the probe gaps with the shaft centred."""
+"""`padwatch reference`: set and list references of the shaft centre."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -9,23 +9,97 @@ from pydantic import TypeAdapter
 
 from acquisition.clock import SystemClock
 from core.machine.unit import Bearing
-from service.app.stores import has_store, open_store, store_name
-from service.cli.plant_file import PlantPath, fail, read_plant_file
-from service.cli.reference_listing import BearingReferences, bearing_references, text_lines
-from service.cli.units import UnitOption, one_unit
+from service.api.bearing_models import ReferenceModel, SetReferenceModel
+from service.api.bearing_views import reference_model, set_reference_model
+from service.api.models import ApiModel
+from service.app.storage import has_store, open_store, store_name
+from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
 from service.measuring.references_in_force import (
     Gaps,
     ReferenceRefusedError,
     doubts,
     given_gaps,
     measured_gaps,
+    with_reference,
 )
-from service.runtime.made_by import person
+from service.runtime.process import person
 from service.settings.core_values import machine_of
 from service.settings.plant import PlantFile
 from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import Store, StoreError
+
+
+class BearingReferences(ApiModel):
+    """A bearing's references; the parts are those of the API."""
+
+    unit: str
+    """Unit."""
+
+    bearing: str
+    """Bearing."""
+
+    gap_reference_um: list[float]
+    """Probe gaps [x, y] with the shaft centred, as in force."""
+
+    opposite_reference_um: list[float] | None
+    """The same of the probes across the shaft."""
+
+    reference: ReferenceModel
+    """Where these gaps come from."""
+
+    history: list[SetReferenceModel]
+    """All that were set, newest first."""
+
+
+def bearing_references(
+    unit: str, bearing: Bearing, history: Sequence[GapReference]
+) -> BearingReferences:
+    """Return a bearing's reference in force, from the plant file or set since, and its history.
+
+    Parameters
+    ----------
+    history
+        Newest first.
+    """
+    newest = history[0] if history else None
+    watched = bearing if newest is None else with_reference(bearing, newest)
+    opposite = watched.opposite_reference_um
+    return BearingReferences(
+        unit=unit,
+        bearing=bearing.id,
+        gap_reference_um=list(watched.gap_reference_um),
+        opposite_reference_um=None if opposite is None else list(opposite),
+        reference=reference_model(newest),
+        history=[set_reference_model(reference) for reference in history],
+    )
+
+
+def text_lines(found: BearingReferences) -> Iterator[str]:
+    """Yield a line for the reference in force, and one for each earlier reference."""
+    gaps = _gaps(found.gap_reference_um, found.opposite_reference_um)
+    said = found.reference
+    yield f"{found.unit} {found.bearing}: {gaps}, {_words(said)}"
+    for before in found.history[1:]:
+        gaps = _gaps(before.gap_reference_um, before.opposite_reference_um)
+        yield f"  before: {gaps}, {_words(before)}"
+
+
+def _gaps(near: list[float], opposite: list[float] | None) -> str:
+    across = "" if opposite is None else f", opposite {_pair(opposite)}"
+    return _pair(near) + across
+
+
+def _pair(gaps_um: list[float]) -> str:
+    return f"{gaps_um[0]:.10g}, {gaps_um[1]:.10g} µm"
+
+
+def _words(said: ReferenceModel | SetReferenceModel) -> str:
+    if said.source == "plant_file":
+        return "from the plant file"
+    note = f": {said.note}" if said.note else ""
+    return f"{said.source}, set {said.set} by {said.author}{note}"
+
 
 app = typer.Typer(
     no_args_is_help=True, help="Set or list references: the probe gaps with the shaft centred."
@@ -110,7 +184,7 @@ def _all_references(plant: PlantFile) -> Iterator[BearingReferences]:
 
 def _add(plant: PlantFile, reference: GapReference) -> Sequence[GapReference]:
     """Store a reference and return its bearing's history."""
-    if not has_store(plant):  # its folder may be relative to another one than this
+    if not has_store(plant):  # the data folder may be relative to another folder
         typer.echo(
             f"{store_name(plant)}: a new database; is that where the service runs?", err=True
         )
@@ -122,7 +196,7 @@ def _add(plant: PlantFile, reference: GapReference) -> Sequence[GapReference]:
 
 @contextmanager
 def _existing_store(plant: PlantFile) -> Iterator[Store | None]:
-    """The plant's database; looking at one that is not there must not create it."""
+    """Open the plant's database, or yield None if it does not exist, without creating it."""
     if not has_store(plant):
         yield None
         return

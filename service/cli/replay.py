@@ -12,20 +12,19 @@ import typer
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError, LinkError
 from service.api.http.listening import PortInUseError
-from service.app.program import Performance, run_service
 from service.app.recordings import recordings_by_unit, replay_source
 from service.app.replay import PlayedOut, replay_folder, replayed_plant
-from service.app.stores import database_path
+from service.app.service import Performance, run_service
+from service.app.simulated_daq import Wire, over_wire
+from service.app.storage import database_path
 from service.app.web import listener_of
-from service.app.wires import Wire, over_wire
-from service.cli.daq import SpeedOption
-from service.cli.daq_process import RunningDaq, daq_process
-from service.cli.plant_file import fail, read_plant_file
+from service.cli.daq import RunningDaq, SpeedOption, daq_process
+from service.cli.options import fail, read_plant_file
 from service.cli.run import announce
 from service.measuring.sources import source_of, watched_units
-from service.runtime.ending import run_to_its_end
-from service.settings.origin import Origin
+from service.runtime.process import run_to_its_end
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.store.port import StoreError
 
 
@@ -79,7 +78,7 @@ def _performance(
     speed: float,
     serve: bool,
 ) -> Iterator[tuple[Performance, RunningDaq | None]]:
-    """What is to be run, and the DAQ that plays the recordings, if there is one."""
+    """Build the service run, and start the DAQ that plays the recordings, if there is one."""
     clock = SystemClock()
     if through is None:
         watched = watched_units(
@@ -100,12 +99,12 @@ def _performance(
 
 
 def _require_new(database: Path) -> None:
-    """Refuse a folder with results: alarms would go on where those had ended.
+    """Refuse a folder with results: its alarms would be resumed.
 
     Raises
     ------
     LookupError
-        Naming it.
+        If the database exists.
     """
     if database.exists():
         raise LookupError(f"{database} holds results already; a replay needs a folder of its own")
@@ -114,12 +113,12 @@ def _require_new(database: Path) -> None:
 async def _play(
     performance: Performance, listener: socket, daq: RunningDaq | None, line: str
 ) -> None:
-    """Run the service and print where the results are, before threads may be left behind.
+    """Run the service and print the place of the results, before the process may exit.
 
     Raises
     ------
     LinkError
-        If the DAQ has ended too early.
+        If the DAQ ended before its recordings.
     """
     await run_service(performance, listener, SystemClock(), announce)
     if daq is not None and daq.has_failed:

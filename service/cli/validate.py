@@ -1,4 +1,4 @@
-"""`padwatch validate`: the paper's tables beside padwatch's."""
+"""`padwatch validate`: the tables of the paper beside padwatch's results."""
 
 import json
 from collections.abc import Iterable, Iterator
@@ -8,8 +8,10 @@ from typing import Annotated
 
 import typer
 
-from service.cli.offline.validation import paper
-from service.cli.offline.validation.comparison import (
+from service.cli.offline.validation import (
+    MEASURED,
+    QUANTITIES,
+    MeasuredRow,
     Row,
     errors,
     measured_rows,
@@ -50,16 +52,16 @@ def _report(simulated: list[Row], measured: list[Row]) -> Iterator[str]:
         f" {summary.max_percent:.2f} % (limit {MAX_ERROR_PERCENT} %),"
         f" rms {summary.rms_percent:.2f} % (limit {MAX_RMS_ERROR_PERCENT} %)."
     )
-    for place, pairs in groupby(zip(measured, paper.MEASURED, strict=True), lambda p: p[0].table):
+    for place, pairs in groupby(zip(measured, MEASURED, strict=True), lambda p: p[0].table):
         title = f"Section {place}" if isinstance(place, str) else f"Table {place}"
         yield from _stiffness_table(title, pairs)
-    n_within = sum(_within_rounding(r, m) for r, m in zip(measured, paper.MEASURED, strict=True))
+    n_within = sum(_within_rounding(r, m) for r, m in zip(measured, MEASURED, strict=True))
     yield f"\n{n_within} of {len(measured)} stiffnesses within what the printed digits allow."
 
 
 def _amplitude_table(title: str, rows: list[Row]) -> Iterator[str]:
     yield f"\n{title}, {rows[0].bearing}, 1x, model: paper / padwatch (error)"
-    header = "".join(f"{name.removesuffix('_um_pk'):>24}" for name in paper.QUANTITIES)
+    header = "".join(f"{name.removesuffix('_um_pk'):>24}" for name in QUANTITIES)
     yield f"{'condition':>9}{header}"
     for condition, cells in groupby(rows, key=lambda row: row.condition):
         yield f"{condition:>9}" + "".join(_amplitude_cell(row) for row in cells)
@@ -69,7 +71,7 @@ def _amplitude_cell(row: Row) -> str:
     return f"{row.paper:>8.1f} /{row.padwatch:>6.2f} ({row.error_percent:+.1f}%)"
 
 
-def _stiffness_table(title: str, pairs: Iterable[tuple[Row, paper.MeasuredRow]]) -> Iterator[str]:
+def _stiffness_table(title: str, pairs: Iterable[tuple[Row, MeasuredRow]]) -> Iterator[str]:
     yield f"\n{title}, measured, X direction, equation (5)"
     yield (
         f"{'condition':<18}{'bearing':<9}{'shaft':>7}{'bearing':>9}{'paper':>8}{'padwatch':>10}"
@@ -85,7 +87,7 @@ def _stiffness_table(title: str, pairs: Iterable[tuple[Row, paper.MeasuredRow]])
         )
 
 
-def _within_rounding(row: Row, measured: paper.MeasuredRow) -> bool:
+def _within_rounding(row: Row, measured: MeasuredRow) -> bool:
     lowest, highest = rounding_limits_gn_per_m(measured)
     return lowest <= row.paper <= highest
 
@@ -95,5 +97,5 @@ def _passed(simulated: list[Row], measured: list[Row]) -> bool:
     return (
         summary.max_percent <= MAX_ERROR_PERCENT
         and summary.rms_percent <= MAX_RMS_ERROR_PERCENT
-        and all(map(_within_rounding, measured, paper.MEASURED))
+        and all(map(_within_rounding, measured, MEASURED))
     )

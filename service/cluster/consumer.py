@@ -27,10 +27,10 @@ from service.cluster.session import (
     subject,
 )
 from service.measuring.recorder import Findings, Recorder
-from service.runtime.families import counter, gauge
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.metrics import counter, gauge
 from service.settings.plant import PlantFile
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 
 log = structlog.get_logger()
 

@@ -28,10 +28,10 @@ from service.cluster.session import (
     subject,
 )
 from service.measuring.acquirer import LinkNews
-from service.runtime.families import counter, gauge
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.metrics import counter, gauge
 from service.settings.plant import PlantFile
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 
 
 @dataclass(frozen=True)

@@ -30,9 +30,9 @@ from service.measuring.counters import alarm_metrics, film_metrics, store_info
 from service.measuring.service_alarms import SHARED, is_shared, told_by
 from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import Receiver, ReceiverView, SenderState, SenderStatus
-from service.runtime.families import gauge
-from service.settings.film_alarms import FilmAlarmSettings
-from service.settings.film_rules import film_rules_of
+from service.runtime.metrics import gauge
+from service.settings.core_values import film_rules_of
+from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
 from service.store.film_port import FilmStore
 from service.store.outbox import Backlog, Outbox

@@ -26,8 +26,8 @@ from service.live.commands import (
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmKeeper
 from service.measuring.recorder import NotStoredError, Recorder
-from service.runtime.background import TroubleLog
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import TroubleLog
 from service.store.access.audit_entries import Acting, Source, acting, acting_as
 from service.store.port import Store, StoreError
 from service.store.sharing import DONE, OPEN, Answer, Command, CommandState, OpenCommand

@@ -27,8 +27,8 @@ from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.describing import alarm_state, plant_signs, unit_signs, unit_state
 from service.measuring.films import FilmKeeper
 from service.measuring.service_alarms import SHARED, is_shared, told_by
-from service.runtime.background import TroubleLog
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import TroubleLog
 from service.settings.units import UnitSettings
 from service.store.port import Store, StoreError
 from service.store.sharing import UnitBeat, UnitReport, UnitStates

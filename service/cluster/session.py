@@ -24,7 +24,7 @@ from acquisition.delivery.network import let_stop_through, n_stops
 from core.samples.blocks import SampleBlock
 from service.cluster.frames import UnitIdentity, fingerprint
 from service.settings.plant import PlantFile
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 from service.settings.units import UnitSettings
 
 

@@ -10,7 +10,7 @@ from core.change.decision import JUDGED
 from core.condition.operating_state import STEADY
 from core.units import DAY_NS
 from service.live.commands import FilmPlace
-from service.settings.film_alarms import FilmAlarmSettings
+from service.settings.films import FilmAlarmSettings
 from service.store.baselines import Versions
 from service.store.film_port import BaselineEntry, FilmHistory, FilmQuery, FilmStore
 

@@ -35,11 +35,15 @@ from service.measuring.service_alarms import (
 )
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.alarm_kinds import MESSAGES_REFUSED
-from service.settings.alarm_rules import chatter_rule_of, references_of, rules_of
-from service.settings.core_values import machine_of
-from service.settings.film_rules import film_rules_of
-from service.settings.origin import Origin
+from service.settings.core_values import (
+    chatter_rule_of,
+    film_rules_of,
+    machine_of,
+    references_of,
+    rules_of,
+)
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.settings.units import UnitSettings
 from service.store.access.audit_entries import acting
 from service.store.port import AlarmQuery, Store

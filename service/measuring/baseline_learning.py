@@ -14,7 +14,7 @@ from core.change.settings import FilmRules
 from core.change.shaft_response import ShaftResponse, learn_response
 from core.units import DAY_NS
 from service.live.commands import FilmPlace
-from service.settings.film_alarms import FilmAlarmSettings
+from service.settings.films import FilmAlarmSettings
 from service.store.baselines import Versions, versions_after
 from service.store.film_port import BaselineStep, FilmHistory, FilmQuery, FilmStore, StoredStep
 

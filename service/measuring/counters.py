@@ -19,10 +19,9 @@ from service.measuring.acquirer import Bus
 from service.measuring.recorder import Recorder
 from service.measuring.soundness import Soundness
 from service.measuring.timings import Timings
-from service.runtime.families import Rows, counter, gauge, histogram, plain_histogram
+from service.runtime.disk import S_PER_DAY, SpaceWatch
+from service.runtime.metrics import Rows, counter, gauge, histogram, plain_histogram
 from service.runtime.polls import TimedSource
-from service.runtime.space.growth import S_PER_DAY
-from service.runtime.space.watch import SpaceWatch
 
 MAX_REASONS = 24
 """Per unit; what is refused for any further reason is counted as `OTHER`."""

@@ -21,8 +21,8 @@ from service.live.commands import BaselineAction, FilmPlace, step_of
 from service.measuring.baseline_learning import Learner
 from service.measuring.baseline_versions import UnitStart, in_force, unit_start
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.settings.film_alarms import FilmAlarmSettings
-from service.settings.film_rules import film_rules_of
+from service.settings.core_values import film_rules_of
+from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
 from service.store.baselines import Versions
 from service.store.film_port import FilmStore, StoredStep

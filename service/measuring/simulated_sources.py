@@ -23,8 +23,11 @@ from acquisition.simulated.plant.unit import SimulatedUnit
 from core.baseline.history import StiffnessHistory
 from core.units import ns_from_s
 from service.settings.core_values import calibration_of, machine_of
-from service.settings.simulated_life import SimulatedDamageSettings
-from service.settings.simulation import SimulatedBearingSettings, SimulationSettings
+from service.settings.sources.simulated import (
+    SimulatedBearingSettings,
+    SimulatedDamageSettings,
+    SimulationSettings,
+)
 from service.settings.units import UnitSettings
 
 NOISES = {"gap_noise_um_rms", "velocity_noise_mm_s_rms", "acceleration_noise_m_s2_rms"}

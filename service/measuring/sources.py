@@ -20,19 +20,18 @@ from core.monitor.monitor import UnitMonitor
 from core.spectra.polls import PollTransform
 from service.measuring.simulated_sources import simulated_feed
 from service.runtime.polls import TimedSource
-from service.settings import modbus_sources, sources
-from service.settings.can import CanSettings
-from service.settings.can_devices import can_settings_of
+from service.settings.adapter_values import can_settings_of, link_fields
 from service.settings.core_values import analysis_of, calibration_of, machine_of
-from service.settings.modbus_devices import link_fields
-from service.settings.modbus_sources import (
+from service.settings.plant import AnalysisModel, PlantFile
+from service.settings.sources import devices
+from service.settings.sources.can import CanSettings
+from service.settings.sources.devices import (
     MappedDeviceSettings,
     ModbusFifoSettings,
     ModbusPolledSettings,
     ModbusVectorSettings,
     SlowDeviceSettings,
 )
-from service.settings.plant import AnalysisModel, PlantFile
 from service.settings.units import UnitSettings
 
 
@@ -161,9 +160,9 @@ def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
     """What the samples of a unit are analysed by: its rack may give vectors instead of them."""
     machine, settings, source = machine_of(unit), analysis_of(analysis), unit.source
     match source:
-        case modbus_sources.ModbusVectorSettings():
+        case devices.ModbusVectorSettings():
             return vector_monitor(source, machine, settings)
-        case modbus_sources.ModbusPolledSettings():
+        case devices.ModbusPolledSettings():
             return UnitMonitor(at_poll_rate(source, machine), settings)
         case _:
             return UnitMonitor(machine, settings)
@@ -179,13 +178,13 @@ def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
     return {
         unit.id: [row.channel for row in unit.source.rows]
         for unit in plant.unit
-        if isinstance(unit.source, modbus_sources.ModbusVectorSettings)
+        if isinstance(unit.source, devices.ModbusVectorSettings)
     }
 
 
 def retry_s(unit: UnitSettings) -> float:
     """How soon a unit's lost link is tried again: as often as it is looked at, but no storm."""
-    if isinstance(unit.source, modbus_sources.ModbusFifoSettings):
+    if isinstance(unit.source, devices.ModbusFifoSettings):
         return QUEUE_RETRY_S
     period_s: float = getattr(unit.source, "poll_period_s", DEFAULT_RETRY_S)
     return period_s
@@ -203,21 +202,21 @@ def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
 def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock) -> SampleSource:
     source = unit.source
     match source:
-        case sources.ModbusRingSettings():
+        case devices.ModbusRingSettings():
             return RingSource(_ring_settings(source), calibration, clock)
-        case modbus_sources.ModbusFifoSettings():
+        case devices.ModbusFifoSettings():
             return fifo_source(source, calibration, clock)
-        case modbus_sources.ModbusPolledSettings():
+        case devices.ModbusPolledSettings():
             return polled_source(source, machine_of(unit), calibration, clock)
-        case modbus_sources.ModbusVectorSettings():
+        case devices.ModbusVectorSettings():
             return vector_source(source, machine_of(unit), calibration, clock)
         case CanSettings():
             return CanSource(can_settings_of(unit, source), calibration, clock)
-        case sources.SimulatedSettings():
+        case devices.SimulatedSettings():
             return SimulatedSource(simulated_feed(unit, clock), calibration, clock)
 
 
-def _ring_settings(source: sources.ModbusRingSettings) -> RingSettings:
+def _ring_settings(source: devices.ModbusRingSettings) -> RingSettings:
     return RingSettings(
         **link_fields(source),
         function=source.function,

@@ -8,7 +8,7 @@ from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.measuring.sources import WatchedUnit
-from service.runtime.durations import Durations
+from service.runtime.metrics import Durations
 from service.runtime.polls import TimedSource
 
 ASSESSMENT_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0)

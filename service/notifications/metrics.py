@@ -6,7 +6,7 @@ from prometheus_client.metrics_core import Metric
 
 from core.units import NS_PER_S
 from service.notifications.sender import ReceiverView
-from service.runtime.families import gauge
+from service.runtime.metrics import gauge
 
 RECEIVER = ("receiver",)
 

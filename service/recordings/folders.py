@@ -11,7 +11,7 @@ from acquisition.recordings.manifest import BLOCKS, MANIFEST, SAMPLES
 from acquisition.recordings.writer import INCOMPLETE
 from core.alarms.alarm import AlarmEvent
 from core.units import NS_PER_S
-from service.runtime.whole_files import write_whole
+from service.runtime.files import write_whole
 
 KIND = "continuous"
 """Last word of a stretch's name, where a capture has the kind of its alarm."""

@@ -17,7 +17,7 @@ from acquisition.recordings.summary import RecordingSummary, summary_of
 from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 from service.recordings.folders import ALARM, FILES, KIND, finished, n_bytes_of, unit_of
-from service.runtime.zipped import Sink, zipped
+from service.runtime.files import Sink, zipped
 from service.store.waveform_port import WaveformKind
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,119}")

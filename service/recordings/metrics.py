@@ -6,7 +6,7 @@ from prometheus_client.metrics_core import Metric
 
 from service.recordings.continuous_recorder import Tape
 from service.recordings.keeper import WaveformKeeper
-from service.runtime.families import counter, gauge
+from service.runtime.metrics import counter, gauge
 
 
 def recording_metrics(tape: Tape | None, recordings: WaveformKeeper | None) -> Iterator[Metric]:

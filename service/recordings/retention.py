@@ -22,8 +22,7 @@ from service.recordings.folders import (
     set_aside,
 )
 from service.recordings.index import Index, Unread, again, inspected
-from service.runtime.space.disk import Measure
-from service.runtime.space.limits import SpaceLimits
+from service.runtime.disk import Measure, SpaceLimits
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
 

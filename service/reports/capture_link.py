@@ -11,7 +11,7 @@ from service.recordings.folders import ALARM
 from service.reports.document import FilePart, file_part
 from service.reports.folders import CAPTURE, places
 from service.reports.parts import EvidencePart
-from service.runtime.whole_files import write_whole
+from service.runtime.files import write_whole
 
 
 class CapturePart(EvidencePart):

@@ -15,7 +15,7 @@ from service.reports.parts import (
     Moment,
     Sha256,
 )
-from service.runtime.whole_files import CHUNK
+from service.runtime.files import CHUNK
 
 FORMAT = "padwatch-evidence"
 VERSION = 1

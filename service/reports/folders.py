@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from core.alarms.alarm import AlarmEvent
+from service.runtime.files import write_whole
 from service.runtime.times import compact
-from service.runtime.whole_files import write_whole
 
 DOCUMENT, CAPTURE = "evidence.json", "capture.json"
 

@@ -20,8 +20,8 @@ from service.reports.folders import clear_leftovers, note_beginning, place_of
 from service.reports.room import EvidenceRoom
 from service.reports.snapshot import Camera, Snapshot
 from service.reports.writer import EvidenceWriter
+from service.runtime.files import write_whole
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.whole_files import write_whole
 from service.settings.configuration import Configuration
 from service.store.port import StoreError
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from service.settings.configuration import Configuration
-from service.settings.origin import Origin
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from pathlib import Path
 from acquisition.clock import Clock
 from core.units import DAY_NS
 from service.reports.folders import INCOMPLETE, REMOVED, Place, places, removed
+from service.runtime.files import sync_folder, write_whole
 from service.runtime.times import compact
-from service.runtime.whole_files import sync_folder, write_whole
 
 MAX_REMOVED = 10_000
 """Names that are remembered of each unit."""

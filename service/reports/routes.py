@@ -34,8 +34,8 @@ from service.reports.keeper import EvidenceKeeper
 from service.reports.report.case import read_case
 from service.reports.report.page import POLICY, report_page
 from service.reports.tables import TableError
+from service.runtime.files import zipped
 from service.runtime.times import rfc3339
-from service.runtime.zipped import zipped
 from service.settings.alarm_kinds import ALARM_KINDS
 from service.store.access.identities import Permission
 

@@ -16,7 +16,7 @@ from service.reports.parts import ComparisonPart
 from service.reports.room import EvidenceLimits
 from service.reports.snapshot import Snapshot
 from service.reports.tables import ORBITS, SPECTRA, TREND, orbits_table, spectra_table, trend_table
-from service.runtime.whole_files import sync_folder, write_synced
+from service.runtime.files import sync_folder, write_synced
 from service.store.film_port import FilmQuery, FilmStore
 
 

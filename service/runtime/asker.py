@@ -1,4 +1,4 @@
-"""Whether anybody still waits for what is worked on, so that nothing is worked on for nobody."""
+"""Request scope: whether the client of the current request is still connected."""
 
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 @dataclass
 class Asker:
-    """Who waits for an answer; looked at from other threads."""
+    """Connection state of a client; read from other threads."""
 
     has_gone: bool = False
 
 
 ASKER: ContextVar[Asker | None] = ContextVar("asker", default=None)
-"""Of the request that is answered; None where the program works for itself. Threads that are
-started with `asyncio.to_thread` see that of their request."""
+"""Client of the current request; None outside requests. Threads started with `asyncio.to_thread`
+inherit the value of their request."""

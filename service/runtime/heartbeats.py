@@ -1,4 +1,4 @@
-"""Whether every loop of the program is alive: each says by when it will be heard again."""
+"""Heartbeats: liveness of every loop of the program; each announces its next beat."""
 
 import math
 from collections.abc import Awaitable, Callable
@@ -7,55 +7,55 @@ from typing import Protocol, runtime_checkable
 from acquisition.clock import Clock
 
 PATIENCE_S = 60.0
-"""How much longer than it has said a loop may be silent: a slow disk is no stuck loop."""
+"""Tolerance for a late beat: a slow disk does not make a loop stuck."""
 
 
 class Pulse(Protocol):
-    """What a loop tells of itself."""
+    """Receiver of the heartbeats of one loop."""
 
     def beat(self, after_s: float = 0.0) -> None:
-        """Say that it is alive, and what it does next takes no longer than this and `PATIENCE_S`.
+        """Report that the loop is alive and announce its next beat.
 
         Parameters
         ----------
         after_s
-            How long it is going to wait, or what it does may take.
+            Longest time until the next beat; `PATIENCE_S` is added.
         """
         ...
 
     def rest(self) -> None:
-        """Say that it is alive, and waits for something that may never come."""
+        """Report that the loop is alive and waits without limit."""
         ...
 
 
 Loop = Callable[[Pulse], Awaitable[None]]
-"""Something that runs until it is cancelled, and is heard."""
+"""A coroutine function that runs until it is cancelled and sends heartbeats."""
 
 
 @runtime_checkable
 class Audible(Protocol):
-    """Something that can be heard working, while one task works with it."""
+    """An object that sends heartbeats on behalf of the task that uses it."""
 
     def listen(self, pulse: Pulse) -> None:
-        """Let the task that calls this be heard of while it works."""
+        """Send the heartbeats of the calling task to ``pulse`` from now on."""
         ...
 
 
 class Unheard:
-    """The pulse of a loop that nobody listens to."""
+    """Heartbeat receiver that ignores all beats."""
 
     def beat(self, after_s: float = 0.0) -> None:
-        """Say nothing."""
+        """Do nothing."""
 
     def rest(self) -> None:
-        """Say nothing."""
+        """Do nothing."""
 
 
 UNHEARD = Unheard()
 
 
 class HeardPulse:
-    """What is known of one loop."""
+    """State of one loop: its last beat and when the next is due."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -64,38 +64,38 @@ class HeardPulse:
         self._has_ended = False
 
     def beat(self, after_s: float = 0.0) -> None:
-        """Note a beat."""
+        """Record a beat."""
         self._heard_s = self._clock.monotonic_s()
         self._due_s = self._heard_s + after_s + PATIENCE_S
 
     def rest(self) -> None:
-        """Note a beat with nothing to do after it."""
+        """Record a beat after which none is due."""
         self._heard_s, self._due_s = self._clock.monotonic_s(), math.inf
 
     def end(self) -> None:
-        """Note that the loop is over."""
+        """Record that the loop has ended."""
         self._has_ended = True
 
     @property
     def trouble(self) -> str | None:
-        """What is wrong with the loop; None if nothing is."""
+        """Why the loop is not alive; None if it is."""
         if self._has_ended:
             return "has ended"
         now_s = self._clock.monotonic_s()
         if now_s > self._due_s:
-            return f"stuck: not heard of for {now_s - self._heard_s:.0f} s"
+            return f"stuck: no heartbeat for {now_s - self._heard_s:.0f} s"
         return None
 
 
 class Heartbeats:
-    """The loops that must run for as long as the program does."""
+    """Liveness of the loops that must run as long as the program."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._pulses: dict[str, HeardPulse] = {}
 
     async def tend(self, name: str, run: Loop) -> None:
-        """Run a loop and listen to it; once it has returned, it counts as dead."""
+        """Run a loop and record its heartbeats; a loop that returns counts as dead."""
         pulse = self._pulses[name] = HeardPulse(self._clock)
         try:
             await run(pulse)
@@ -103,15 +103,15 @@ class Heartbeats:
             pulse.end()
 
     def release(self, *names: str) -> None:
-        """Let loops go that have done their work."""
+        """Remove loops that have finished as planned."""
         for name in names:
             self._pulses.pop(name, None)
 
     def look(self) -> dict[str, str | None]:
-        """What is wrong with each loop, by name; None where nothing is."""
+        """Return the fault of each loop by name, None where a loop is alive."""
         return {name: pulse.trouble for name, pulse in self._pulses.items()}
 
     @property
     def troubles(self) -> dict[str, str]:
-        """What is wrong with those loops that are dead or stuck."""
+        """Faults of the loops that are dead or stuck, by name."""
         return {name: trouble for name, trouble in self.look().items() if trouble}

@@ -1,4 +1,4 @@
-"""What a poll takes: the time in which a source works between two waits for its next one."""
+"""Poll durations: the time in which a source works between two waits."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -9,17 +9,17 @@ from weakref import WeakKeyDictionary
 from acquisition.clock import Clock
 from acquisition.source import SampleSource, refused_frames_of
 from core.samples.blocks import SampleBlock
-from service.runtime.durations import Durations
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.metrics import Durations
 
 POLL_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0)
-"""A reply comes within milliseconds on a plant's network, and within a time-out at worst."""
+"""From a reply within milliseconds on a plant's network up to a time-out."""
 
 
 class PollClock:
-    """A source's clock that notes what the source does between its waits, each task apart.
+    """Clock of a source that measures the time between the source's waits, separately per task.
 
-    Whoever reads the source looks at it again and again, and so is heard of.
+    The task that reads the source calls the clock repeatedly; each call is also a heartbeat.
     """
 
     def __init__(self, clock: Clock) -> None:
@@ -30,16 +30,16 @@ class PollClock:
         self.polls = Durations(POLL_BOUNDS_S, clock)
 
     def now_ns(self) -> int:
-        """UTC nanoseconds since 1970."""
+        """Return UTC nanoseconds since 1970."""
         return self._clock.now_ns()
 
     def monotonic_s(self) -> float:
-        """Seconds that never step."""
+        """Return monotonic seconds."""
         self._beat()
         return self._clock.monotonic_s()
 
     async def sleep(self, duration_s: float) -> None:
-        """Wait; what went before, since the wait before this one, was a poll."""
+        """Wait; the time since the task's previous wait was a poll."""
         task = asyncio.current_task()
         self._beat(duration_s)
         if task is None:
@@ -51,23 +51,23 @@ class PollClock:
         self._woken_s[task] = self._clock.monotonic_s()
 
     def listen(self, pulse: Pulse) -> None:
-        """Let the task that calls this be heard of whenever it looks at the clock."""
+        """Send a heartbeat whenever the calling task reads the clock."""
         self._pulse, self._reader = pulse, asyncio.current_task()
 
     def _beat(self, after_s: float = 0.0) -> None:
-        # what asks another device beside, or listens to a bus in a thread, is not the reader
+        # tasks that poll another device, or a thread that reads a bus, are not the reader
         if self._reader is not None and _current_task() is self._reader:
             self._pulse.beat(after_s)
 
     def forget(self) -> None:
-        """Begin anew: what lies between two connections is no poll."""
+        """Start anew: the time between two connections is not a poll."""
         task = asyncio.current_task()
         if task is not None:
             self._woken_s.pop(task, None)
 
 
 def _current_task() -> asyncio.Task[Any] | None:
-    """The task that runs; None in a thread without an event loop."""
+    """Return the current task; None in a thread without an event loop."""
     try:
         return asyncio.current_task()
     except RuntimeError:
@@ -75,12 +75,12 @@ def _current_task() -> asyncio.Task[Any] | None:
 
 
 class TimedSource:
-    """A source whose polls are timed.
+    """A source whose polls are measured.
 
     Parameters
     ----------
     make
-        Makes the source, which is to wait by this clock.
+        Creates the source with the clock that it must wait by.
     """
 
     def __init__(self, make: Callable[[Clock], SampleSource], clock: Clock) -> None:
@@ -88,22 +88,22 @@ class TimedSource:
         self._source = make(self._clock)
 
     def listen(self, pulse: Pulse) -> None:
-        """Let the task that calls this, and reads the source, be heard of while it does."""
+        """Send the heartbeats of the calling task, which reads the source, to ``pulse``."""
         self._clock.listen(pulse)
 
     @property
     def polls(self) -> Durations:
-        """What polls took so far."""
+        """Durations of the polls so far."""
         return self._clock.polls
 
     @property
     def refused_frames(self) -> Mapping[str, int]:
-        """Frames that the source has not used, by reason."""
+        """Frames that the source dropped, by reason."""
         return refused_frames_of(self._source)
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link, as the source does, and raises."""
+        """Open the link of the source; errors are the source's."""
         self._clock.forget()
         async with self._source.connect() as blocks:
             yield blocks

@@ -1,4 +1,4 @@
-"""What the service manager is told: systemd's notification protocol (sd_notify(3))."""
+"""Notification of the service manager by systemd's protocol, sd_notify(3)."""
 
 import os
 import socket
@@ -12,12 +12,12 @@ US_PER_S = 1e6
 
 
 class ServiceManager:
-    """Sends datagrams to whoever started the program; to nobody if that did not ask for any.
+    """Sends notifications to the service manager, if it asked for them.
 
     Parameters
     ----------
     environment
-        Where it looks for ``NOTIFY_SOCKET``, ``WATCHDOG_USEC`` and ``WATCHDOG_PID``.
+        Source of ``NOTIFY_SOCKET``, ``WATCHDOG_USEC`` and ``WATCHDOG_PID``.
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
@@ -27,11 +27,11 @@ class ServiceManager:
 
     @property
     def listens(self) -> bool:
-        """Whether there is anybody to tell."""
+        """Whether a service manager receives notifications."""
         return self._address is not None
 
     def tell(self, **assignments: str) -> None:
-        """Send one datagram, never waiting; a manager that does not take it is logged once.
+        """Send one datagram without waiting; log the first that is not accepted.
 
         Parameters
         ----------
@@ -54,7 +54,7 @@ class ServiceManager:
 
 
 def _address(named: str) -> str | None:
-    """The socket's address: a path, or an abstract name that is written with an @."""
+    """Return the socket's address: a path, or an abstract name that begins with @."""
     if named.startswith("@"):
         return "\0" + named[1:]
     if named.startswith("/"):
@@ -65,7 +65,7 @@ def _address(named: str) -> str | None:
 
 
 def _watchdog_s(environment: Mapping[str, str]) -> float | None:
-    """Longest time without a sign of life, if the manager wants any from this process."""
+    """Return the watchdog's interval, None if it does not watch this process."""
     if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
         return None
     given = environment.get("WATCHDOG_USEC", "")
@@ -73,7 +73,7 @@ def _watchdog_s(environment: Mapping[str, str]) -> float | None:
 
 
 def _one_line(value: str) -> str:
-    """A line break would begin another assignment."""
+    """Join lines: a line break would begin another assignment."""
     return " ".join(value.split())
 
 

@@ -13,9 +13,10 @@ from service.settings.limits import (
     SpanLimitSettings,
     TemperatureLimitSettings,
     VectorChangeLimitSettings,
+    VectorReferenceSettings,
     VelocityLimitSettings,
+    ZonesSettings,
 )
-from service.settings.zones import VectorReferenceSettings, ZonesSettings
 
 
 class BearingAlarmSettings(Settings):

@@ -1,17 +1,53 @@
-"""Waveform and slow channels of a unit."""
+"""Waveform and slow channels of a unit, and the slow-roll runout of a channel."""
 
+import cmath
 import math
 from enum import StrEnum
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AwareDatetime, Field, StringConstraints, model_validator
 
 from acquisition.delivery.calibration import COUNTS_FULL_SCALE
-from core.machine.channel import Measurand
-from core.units import STANDARD_GRAVITY_M_S2
+from core.machine.channel import Measurand, SlowRollVector
+from core.units import NS_PER_S, STANDARD_GRAVITY_M_S2
 from service.settings.base import Identifier, MisfitError, MissingError, Settings
-from service.settings.response import ResponseSettings
-from service.settings.slow_roll import ProbeName, SlowRollSettings
+from service.settings.transducers import ResponseSettings
+
+ProbeName = Annotated[str, StringConstraints(min_length=1, max_length=80)]
+"""Serial number or any other mark that tells one probe from the next."""
+
+
+class SlowRollSettings(Settings):
+    """A slow-roll vector: what a probe read at 1× while the shaft turned too slowly to vibrate."""
+
+    um_pk: Annotated[float, Field(ge=0.0, le=1000.0)]
+    """Amplitude, µm zero-to-peak; example: 8.0."""
+
+    phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)]
+    """Phase of the displacement along the bearing's axis when the mark passes the key-phase
+    pick-up, degrees, positive where it leads. An instrument that shows phase lag, from the pulse to
+    the next positive peak (API 670), gives this with the other sign. Example: 30.0."""
+
+    speed_rpm: Annotated[float, Field(gt=0.0, le=1500.0)]
+    """Speed at which it was read, r/min; used only up to a quarter of the rated speed; example:
+    8.0."""
+
+    taken: AwareDatetime
+    """When it was read, with offset; example: 2026-03-01T10:00:00Z."""
+
+    probe: ProbeName
+    """The probe that read it. Another one sees another surface: then it is not used. Example:
+    "SN123"."""
+
+    def vector(self, channel: str) -> SlowRollVector:
+        """The vector as the numerics see it."""
+        return SlowRollVector(
+            channel=channel,
+            probe=self.probe,
+            phasor_um_pk=cmath.rect(self.um_pk, math.radians(self.phase_deg)),
+            speed_rpm=self.speed_rpm,
+            taken_ns=round(self.taken.timestamp()) * NS_PER_S,
+        )
 
 
 class Transducer(StrEnum):

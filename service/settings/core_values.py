@@ -1,15 +1,33 @@
-"""From the plant file's settings to the plain values that core and adapters take."""
+"""Settings of units as values of core: machine, calibration, analysis, alarm and film rules."""
 
 from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from core.alarms.judgements import OrderVector, VectorReference
+from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.statistics import ChatterRule
+from core.change.settings import FilmRules
 from core.checks.sensor_checks import SensorLimits
+from core.limits import Limits, ZoneLimits
 from core.machine.channel import Channel
-from core.machine.unit import Bearing, BearingAccuracy, GapAccuracy, Unit
+from core.machine.unit import Bearing, BearingAccuracy, Estimator, GapAccuracy, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.stiffness.dynamic_lines import DynamicSettings, LineSelection
+from core.units import ns_from_s
+from service.settings.alarms import AlarmSettings
 from service.settings.bearings import BearingSettings
 from service.settings.channels import ChannelSettings
+from service.settings.films import FilmAlarmSettings
+from service.settings.limits import (
+    GapLimitSettings,
+    LimitSettings,
+    VectorReferenceSettings,
+    ZoneSettings,
+    ZoneTableSettings,
+    states_of,
+)
 from service.settings.plant import AnalysisModel
-from service.settings.response import response_of
+from service.settings.sources.devices import ModbusVectorSettings
+from service.settings.storage import Origin
+from service.settings.transducers import response_of
 from service.settings.units import UnitSettings
 
 ACCURACY_KEYS = {
@@ -130,3 +148,125 @@ def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
             overlap=settings.overlap,
         ),
     )
+
+
+ZONE_DEADBAND = 0.05
+"""Of the boundary between A and B, where no deadband is given."""
+
+
+def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitRules:
+    """What is watched on a unit; of a replay neither the link nor the clock."""
+    is_live = origin is Origin.LIVE
+    is_judged = is_live and alarms.clock == "judged"
+    return UnitRules(
+        channel=rule_of(alarms.channel_on_delay_s, alarms.channel_off_delay_s),
+        slow_channel=rule_of(alarms.slow_channel_on_delay_s, alarms.channel_off_delay_s),
+        bearings={bearing.id: _bearing_rules(bearing) for bearing in unit.bearing},
+        clock_offset=_clock_limit(alarms.max_clock_offset_s, 30.0) if is_judged else None,
+        clock_drift=_clock_limit(alarms.max_clock_drift_ppm, 60.0) if is_judged else None,
+        time_stamps=rule_of(0.0, 600.0) if is_judged else None,
+        link=rule_of(alarms.link_lost_after_s, 0.0) if is_live else None,
+    )
+
+
+def chatter_rule_of(alarms: AlarmSettings) -> ChatterRule:
+    """What counts as chattering."""
+    return ChatterRule(alarms.chattering_activations, ns_from_s(alarms.chattering_window_s))
+
+
+def references_of(unit: UnitSettings) -> list[VectorReference]:
+    """Vectors of the plant file that 1× is compared with."""
+    return [
+        VectorReference(unit.id, bearing.id, state, _vectors(reference))
+        for bearing in unit.bearing
+        for reference in bearing.alarms.order1_reference
+        for state in states_of(reference.states)
+    ]
+
+
+def _vectors(reference: VectorReferenceSettings) -> dict[str, OrderVector]:
+    return {place: OrderVector(*vector) for place, vector in reference.vectors().items()}
+
+
+def _bearing_rules(bearing: BearingSettings) -> BearingRules:
+    alarms, zones = bearing.alarms, bearing.alarms.zones
+    return BearingRules(
+        shaft_order1=_limits(alarms.shaft_order1_um_pk),
+        oil_temperature=_limits(alarms.oil_temperature_c),
+        shaft_overall=_limits(alarms.shaft_overall_um_pp),
+        bearing_overall=_limits(alarms.bearing_overall_mm_s_rms),
+        eccentricity=_limits(alarms.eccentricity_ratio),
+        gap=_limits(alarms.gap_um),
+        shaft_change=_limits(alarms.shaft_order1_change_um_pk),
+        bearing_change=_limits(alarms.bearing_order1_change_um_pk),
+        shaft_zones=_zones(zones.shaft_um_pp),
+        orbit_zones=_zones(zones.shaft_max_um_pk),
+        bearing_zones=_zones(zones.bearing_mm_s_rms),
+    )
+
+
+def _limits(found: LimitSettings | None) -> LimitRule | None:
+    if found is None:
+        return None
+    rule = rule_of(found.on_delay_s, found.off_delay_s, is_latching=found.latching)
+    tables = tuple(
+        (table.region(found.states), _values(found.within(table))) for table in found.table
+    )
+    return LimitRule(_values(found), rule, states_of(found.states), tables)
+
+
+def _values(found: LimitSettings) -> Limits:
+    below = (
+        (found.alert_below, found.danger_below)
+        if isinstance(found, GapLimitSettings)
+        else (None, None)
+    )
+    return Limits(found.alert, found.danger, found.deadband, *below)
+
+
+def _zones(found: ZoneSettings | None) -> LimitRule | None:
+    if found is None:
+        return None
+    tables = tuple((table.region(table.states), _table(table)) for table in found.table)
+    rule = rule_of(found.on_delay_s, found.off_delay_s, is_latching=found.latching)
+    return LimitRule(None, rule, tables=tables)
+
+
+def _table(table: ZoneTableSettings) -> ZoneLimits:
+    deadband = ZONE_DEADBAND * table.a_b if table.deadband is None else table.deadband
+    return ZoneLimits.between(table.a_b, table.b_c, table.c_d, deadband)
+
+
+def _clock_limit(limit: float, delay_s: float) -> LimitRule:
+    """A tenth of the limit is its deadband."""
+    return LimitRule(Limits(limit, deadband=limit / 10), rule_of(delay_s, delay_s))
+
+
+def film_rules_of(unit: UnitSettings, settings: FilmAlarmSettings) -> FilmRules | str:
+    """How the films of a unit are watched, or why they cannot be."""
+    if unit.power_channel is None or unit.rated_power_mw is None:
+        return "operating states need power_channel and rated_power_mw"
+    estimators = {
+        bearing.id: watched_estimator(unit, bearing)
+        for bearing in unit.bearing
+        if bearing.oil_temperature is not None
+    }
+    if not estimators:
+        return "conditions need the oil_temperature of a bearing"
+    return FilmRules(
+        estimators=estimators,
+        grid=settings.baseline.settings().grid,
+        operating=settings.operating.limits(unit.rated_speed_rpm, unit.rated_power_mw),
+        change=settings.change.limits(),
+        reading_ns=ns_from_s(settings.reading_period_s),
+        time_lapse=settings.time_lapse,
+    )
+
+
+def watched_estimator(unit: UnitSettings, bearing: BearingSettings) -> Estimator:
+    """Whose stiffness is compared: one and the same, so that like meets like."""
+    if bearing.watched_estimator is not None:
+        return bearing.watched_estimator
+    if isinstance(unit.source, ModbusVectorSettings):
+        return Estimator.RATIO_ORDER1  # all that amplitudes alone can give
+    return bearing.preference[0]

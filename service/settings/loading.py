@@ -1,18 +1,148 @@
-"""Read a plant file; a wrong one is refused with file, line, key, value and what is allowed."""
+"""Reading a plant file: its JSON schema, and one sentence for each mistake."""
 
 import json
 import re
 import tomllib
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from acquisition.delivery.small_file import read_small_file
-from service.settings.mistakes import is_echo, located, sentence
+from service.settings.base import MisfitError, MissingError, SecretMisfitError
 from service.settings.plant import PlantFile
-from service.settings.positions import line_of
-from service.settings.response import FOLDER
+from service.settings.toml_file import Location, line_of
+from service.settings.transducers import FOLDER
+
+
+@cache
+def plant_file_schema() -> dict[str, Any]:
+    """JSON schema of a plant file, with meaning, limits and defaults of every key."""
+    return PlantFile.model_json_schema()
+
+
+def description(location: Sequence[int | str]) -> str:
+    """Meaning of a key, in one line; empty if it is unknown."""
+    node: dict[str, Any] = plant_file_schema()
+    text = ""
+    for part in location:
+        step = _step(node, part)
+        if step is None:
+            return ""
+        text = str(step.get("description", ""))
+        node = step
+    return " ".join(text.split())
+
+
+def known_keys(location: Sequence[int | str]) -> list[str]:
+    """Keys that a table of the plant file may have."""
+    node: dict[str, Any] | None = plant_file_schema()
+    for part in location:
+        node = _step(node, part) if node is not None else None
+    return sorted({key for option in _options(node or {}) for key in option.get("properties", {})})
+
+
+def _step(node: dict[str, Any], part: int | str) -> dict[str, Any] | None:
+    for option in _options(node):
+        if isinstance(part, int) and "items" in option:
+            items: dict[str, Any] = option["items"]
+            return items
+        if isinstance(part, str) and part in option.get("properties", {}):
+            properties: dict[str, dict[str, Any]] = option["properties"]
+            return properties[part]
+    return None
+
+
+def _options(node: dict[str, Any]) -> list[dict[str, Any]]:
+    """Follow references and alternatives down to schemas that say something themselves."""
+    if "$ref" in node:
+        name = str(node["$ref"]).rsplit("/", 1)[-1]
+        return _options(plant_file_schema()["$defs"][name])
+    alternatives = [*node.get("anyOf", ()), *node.get("oneOf", ())]
+    if alternatives:
+        return [leaf for option in alternatives for leaf in _options(option)]
+    return [node]
+
+
+MAX_SHOWN = 60
+"""Characters of a wrong value that are shown."""
+
+UNION_ERRORS = ("union_tag_invalid", "union_tag_not_found")
+
+
+def is_echo(error: ErrorDetails) -> bool:
+    """Whether a list is only called too short because its elements are wrong, as said elsewhere."""
+    return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
+
+
+def located(error: ErrorDetails, data: Mapping[str, Any]) -> Location:
+    """Where in the file a mistake is."""
+    location = _without_tags(error["loc"], data)
+    reason = error.get("ctx", {}).get("error")
+    if isinstance(reason, MisfitError):
+        location += reason.at
+    return (*location, "kind") if error["type"] in UNION_ERRORS else location
+
+
+def sentence(error: ErrorDetails, location: Location, data: Mapping[str, Any]) -> str:
+    """The mistake in words."""
+    key = "".join(_entry(part) for part in location).lstrip(".")
+    found, value = _value(data, location)
+    shown = f"{key} = {_shown(value)}"
+    meaning = description(location)
+    if error["type"] == "extra_forbidden":
+        return f"{shown}: unknown key; known here: {', '.join(known_keys(location[:-1]))}"
+    is_missing = isinstance(error.get("ctx", {}).get("error"), MissingError)
+    if error["type"] == "value_error" and not is_missing:
+        if isinstance(error["ctx"]["error"], SecretMisfitError):
+            return f"{key}: {error['ctx']['error']}"
+        return f"{shown if found else f'{key} (by default)'}: {error['ctx']['error']}"
+    if not found:
+        problem = f"{key} is missing"
+    elif error["type"] == "union_tag_invalid":
+        problem = f"{shown}: must be {error['ctx']['expected_tags'].replace(', ', ' or ')}"
+    else:
+        problem = f"{shown}: {error['msg']}"
+    return f"{problem} — {meaning}" if meaning else problem
+
+
+def _entry(part: int | str) -> str:
+    """One step of a place; a key may be any text, but a message stays one line."""
+    if isinstance(part, int):
+        return f"[{part + 1}]"
+    return f".{part}" if part.isprintable() else f".{part!r}"
+
+
+def _shown(value: Any) -> str:
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    text = value.isoformat() if isinstance(value, datetime) else text
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
+
+
+def _value(data: Any, location: Location) -> tuple[bool, Any]:
+    """Whether the file has something there, and what."""
+    for part in location:
+        inside = isinstance(data, dict) and part in data
+        listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
+        if not inside and not listed:
+            return False, None
+        data = data[part]
+    return True, data
+
+
+def _without_tags(location: Location, data: Any) -> Location:
+    """Drop what pydantic puts into a location beside the file's own keys: union tags."""
+    kept: Location = ()
+    for part in location:
+        _, table = _value(data, kept)
+        if not (isinstance(table, dict) and part not in table and table.get("kind") == part):
+            kept = (*kept, part)
+    return kept
+
 
 MAX_FILE_BYTES = 4_000_000
 """Far above any plant; keeps a wrong path (a device, a recording) from filling the memory."""

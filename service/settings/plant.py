@@ -1,4 +1,4 @@
-"""The whole plant file."""
+"""The plant file as a whole: plant, service, analysis and spectra."""
 
 import math
 from typing import Annotated, Self
@@ -6,23 +6,60 @@ from typing import Annotated, Self
 from pydantic import Field, StringConstraints, model_validator
 
 from core.units import hz_from_rpm
-from service.settings.access import AccessSettings, TlsSettings
-from service.settings.addresses import is_loopback
 from service.settings.alarms import AlarmSettings, CaptureSettings
 from service.settings.base import MisfitError, Settings, refuse_twice
-from service.settings.delivery import DeliverySettings
-from service.settings.evidence import EvidenceSettings
-from service.settings.film_alarms import FilmAlarmSettings
-from service.settings.http_limits import HostName, HttpLimitSettings
-from service.settings.modbus_sources import ModbusVectorSettings
-from service.settings.recording import RecordingSettings
-from service.settings.retention import RetentionSettings
-from service.settings.source_fit import require_lines_apart
-from service.settings.space import SpaceSettings
-from service.settings.spectra import SpectraSettings
-from service.settings.store import StoreSettings
-from service.settings.stream import StreamSettings
-from service.settings.units import UnitSettings
+from service.settings.films import FilmAlarmSettings
+from service.settings.notifications import DeliverySettings
+from service.settings.processes import (
+    AccessSettings,
+    HostName,
+    HttpLimitSettings,
+    StreamSettings,
+    TlsSettings,
+    is_loopback,
+)
+from service.settings.sources.devices import ModbusVectorSettings
+from service.settings.storage import (
+    EvidenceSettings,
+    RecordingSettings,
+    RetentionSettings,
+    SpaceSettings,
+    StoreSettings,
+)
+from service.settings.units import UnitSettings, require_lines_apart
+
+EveryS = Annotated[float, Field(ge=1.0, le=86_400.0)]
+Count = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+class SpectraSettings(Settings):
+    """How many spectra of each bearing are kept; the newest ones densely, and older ones sparsely.
+
+    A spectrum of 25 Hz at the standard settings takes 4 kB of disk with its surroundings.
+    """
+
+    dense_every_s: EveryS = 60.0
+    """Time from one of the densely kept spectra to the next, s."""
+
+    n_dense: Count = 1440
+    """How many of these are kept of each bearing, the newest ones; 1440 are a day."""
+
+    sparse_every_s: EveryS = 600.0
+    """Time from one of the sparsely kept spectra to the next, s; at least dense_every_s."""
+
+    n_sparse: Count = 52_560
+    """How many of these are kept; 52560 are a year, and 0.2 GB for each bearing."""
+
+    n_lines: Annotated[int, Field(ge=8, le=20_000)] = 1000
+    """Most lines of a spectrum that are kept, from the lowest frequency on."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.sparse_every_s < self.dense_every_s:
+            limit = f"must not be below dense_every_s, {self.dense_every_s:g}"
+            raise MisfitError(limit, "sparse_every_s")
+        return self
+
 
 MIN_SEGMENT_TURNS = 8
 """A Hann taper spreads a line over two bins to each side; the vortex is a quarter turn away from

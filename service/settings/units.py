@@ -1,28 +1,150 @@
-"""A generating unit in the plant file: its bearings, channels and where its samples come from."""
+"""A generating unit, and whether its source, channels and alarms fit each other."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
 from acquisition.delivery.calibration import BLOCK_SAMPLES
-from service.settings.alarm_fit import require_alarm_fit
+from core.alarms.alarm import PLANT
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
-from service.settings.bearings import (
-    CHANNEL_KEYS,
-    GAP_KEYS,
-    OPTIONAL_CHANNEL_KEYS,
-    BearingSettings,
-)
+from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS, BearingSettings
 from service.settings.channels import ChannelSettings, SlowChannelSettings, Transducer
-from service.settings.modbus_sources import (
+from service.settings.sources.can import CanSettings
+from service.settings.sources.devices import (
+    ModbusFifoSettings,
     ModbusPolledSettings,
     ModbusVectorSettings,
+    SimulatedSettings,
     SlowDeviceSettings,
+    SourceSettings,
 )
-from service.settings.simulation import SimulationSettings
-from service.settings.source_fit import require_source_fit
-from service.settings.sources import SimulatedSettings, SourceSettings
+from service.settings.sources.modbus import ModbusLinkSettings
+from service.settings.sources.simulated import SimulationSettings
+
+
+def require_source_fit(
+    source: SourceSettings,
+    beside: SlowDeviceSettings | None,
+    channels: Sequence[str],
+    slow: Sequence[str],
+) -> None:
+    """Refuse a source that lacks a channel, or a second device that gives none.
+
+    Parameters
+    ----------
+    beside
+        The device that slow channels are polled from, if there is one.
+    channels, slow
+        Ids of the unit's waveform and slow channels.
+
+    Raises
+    ------
+    MisfitError
+        Saying which, and what is needed.
+    """
+    if beside is not None:
+        beside.require_fit(slow)
+    own = [id_ for id_ in slow if beside is None or id_ not in beside.mapped_channels]
+    match source:
+        case ModbusVectorSettings() | ModbusPolledSettings():
+            source.require_fit(channels, own)
+        case ModbusFifoSettings():
+            source.fifo_layout(len(channels))
+        case CanSettings():
+            source.check_channels(channels, own)
+
+
+def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]]) -> None:
+    """Refuse a serial line that two devices of the plant file are read on: it has one master.
+
+    Parameters
+    ----------
+    readers
+        Where in the file each device stands, and its settings.
+
+    Raises
+    ------
+    MisfitError
+        Naming who reads it already.
+    """
+    taken: dict[str, tuple[int | str, ...]] = {}
+    for at, device in readers:
+        if not isinstance(device, ModbusLinkSettings) or device.device in (None, "pty"):
+            continue
+        line = str(device.device)
+        if line in taken:
+            _, number, key = taken[line]
+            raise MisfitError(
+                f"is read by {key} of unit[{int(number) + 1}] already: a serial line has one"
+                " source; give each its own, or read the others over a gateway, with host",
+                *at,
+                "device",
+            )
+        taken[line] = at
+
+
+FROM_WAVEFORMS = ("shaft_overall_um_pp", "bearing_overall_mm_s_rms")
+"""Limits of what a rack that gives amplitudes does not give."""
+
+ZONES = ("shaft_um_pp", "shaft_max_um_pk", "bearing_mm_s_rms")
+
+
+def require_alarm_fit(
+    unit: str,
+    source: SourceSettings,
+    key_phase: str | None,
+    channels: Iterable[ChannelSettings],
+    bearings: Sequence[BearingSettings],
+) -> None:
+    """Refuse limits of what is not measured.
+
+    Raises
+    ------
+    MisfitError
+        With the place of the first.
+    """
+    if unit == PLANT:
+        raise MisfitError("is kept for alarms of the whole plant; choose another", "id")
+    is_rack = isinstance(source, ModbusVectorSettings)
+    probes = {c.id for c in channels if c.transducer is Transducer.PROXIMITY_PROBE}
+    for number, bearing in enumerate(bearings):
+        at = ("bearing", number, "alarms")
+        if is_rack:
+            _require_no_waveforms(bearing, at)
+        else:
+            _require_gaps(bearing, probes, at)
+            _require_phase(bearing, key_phase, at)
+
+
+def _require_no_waveforms(bearing: BearingSettings, at: tuple[str | int, ...]) -> None:
+    words = 'needs waveforms, which a source of kind "modbus_vector" does not give'
+    for key in FROM_WAVEFORMS:
+        if getattr(bearing.alarms, key) is not None:
+            raise MisfitError(words, *at, key)
+    for key in ZONES:
+        if getattr(bearing.alarms.zones, key) is not None:
+            raise MisfitError(words, *at, "zones", key)
+
+
+def _require_gaps(bearing: BearingSettings, probes: set[str], at: tuple[str | int, ...]) -> None:
+    in_x = bearing.gap_x is not None or bearing.shaft_x in probes
+    in_y = bearing.gap_y is not None or bearing.shaft_y in probes
+    if bearing.alarms.gap_um is not None and not (in_x or in_y):
+        raise MisfitError("needs a proximity probe or a slow channel gap_x or gap_y", *at, "gap_um")
+    if bearing.alarms.eccentricity_ratio is not None and not (in_x and in_y):
+        words = "needs the gaps in x and in y: proximity probes, or slow channels gap_x and gap_y"
+        raise MisfitError(words, *at, "eccentricity_ratio")
+
+
+def _require_phase(
+    bearing: BearingSettings, key_phase: str | None, at: tuple[str | int, ...]
+) -> None:
+    for number, reference in enumerate(bearing.alarms.order1_reference):
+        for place, vector in reference.vectors().items():
+            if len(vector) == 2 and key_phase is None:
+                words = "phase needs the unit's key_phase; without it give the amplitude alone"
+                raise MisfitError(words, *at, "order1_reference", number, place)
 
 
 class UnitSettings(Settings):

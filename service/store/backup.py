@@ -13,8 +13,8 @@ from itertools import islice
 from pathlib import Path
 
 from core.units import s_from_ns
-from service.runtime.durable import create_private, put_in_place, sync_folder
-from service.settings.origin import Origin
+from service.runtime.files import create_private, put_in_place, sync_folder
+from service.settings.storage import Origin
 from service.store.access.identities import KeyState
 from service.store.access.port import AccessStore
 from service.store.highwater.adopting import adopt_copy

@@ -3,8 +3,8 @@
 import asyncio
 
 from acquisition.clock import Clock
-from service.runtime.background import LOOK_S, TroubleLog, rest, rest_after
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import LOOK_S, TroubleLog, rest, rest_after
 from service.store.integrity_port import Integrity
 from service.store.port import StoreError
 from service.store.retention.limits import RetentionLimits

@@ -15,9 +15,9 @@ from rigs.command_line import OPEN
 
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import People
-from service.app.stores import open_store
-from service.cli.access import access_of
-from service.cli.offline.demo.past import fill
+from service.app.storage import open_store
+from service.cli.accounts import access_of
+from service.cli.offline.demo_history import fill
 from service.measuring.simulated_sources import simulated_history
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile

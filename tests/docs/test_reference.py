@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from rigs.command_line import padwatch
 
-from service.settings.import_mapping import ImportMapping
-from service.settings.schema import plant_file_schema
+from service.settings.loading import plant_file_schema
+from service.settings.sources.mapping import ImportMapping
 
 REFERENCE = Path(__file__).parents[2] / "docs" / "reference"
 

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from acquisition.simulated.plant.films import Film
-from service.cli.offline.validation import paper
-from service.cli.offline.validation.comparison import (
+from service.cli.offline import validation as paper
+from service.cli.offline.validation import (
     Row,
     errors,
     measured_rows,

@@ -23,8 +23,8 @@ from core.condition.operating_state import OperatingLimits, OperatingState
 from core.machine.unit import Estimator
 from core.quality import Reason
 from service.settings.loading import PlantFileError, load_plant_file
-from service.settings.origin import Origin
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.settings.units import UnitSettings
 from service.store.postgres.address import PostgresAddress
 from service.store.postgres.database import PostgresDatabase

@@ -7,8 +7,8 @@ import os
 import pytest
 
 from acquisition.errors import LinkError
-from service.app.daq_program import obeyed, run_daq
-from service.cli.daq_process import held_lines
+from service.app.simulated_daq import obeyed, run_daq
+from service.cli.daq import held_lines
 
 
 class Device:

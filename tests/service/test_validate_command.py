@@ -5,7 +5,7 @@ import typer
 from typer.testing import CliRunner
 
 from service.cli import validate as command
-from service.cli.offline.validation import paper
+from service.cli.offline import validation as paper
 
 
 def runner_result(*arguments: str) -> tuple[int, str]:

@@ -2,7 +2,7 @@
 
 from starlette.types import Scope
 
-from service.settings.addresses import is_loopback
+from service.settings.processes import is_loopback
 
 PASSED_ON = (b"forwarded", b"x-forwarded-for", b"x-real-ip", b"via")
 """Headers of a proxy: what it passes on may come from anywhere."""

@@ -6,7 +6,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.http.refusals import BUSY, NO_ANSWER
 from service.runtime.asker import ASKER, Asker
-from service.settings.http_limits import HttpLimitSettings
+from service.settings.processes import HttpLimitSettings
 
 
 class BoundedAnswers:

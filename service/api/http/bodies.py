@@ -5,7 +5,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.api.http.json_depth import is_deeper_than
 from service.api.http.refusals import BODY_TOO_LARGE, NOT_UTF8, TOO_DEEP, Refusal
-from service.settings.http_limits import HttpLimitSettings
+from service.settings.processes import HttpLimitSettings
 
 
 class TooLargeError(Exception):

@@ -9,7 +9,7 @@ from starlette.types import ASGIApp
 from service.api.http.answers import BoundedAnswers
 from service.api.http.connections import Connections
 from service.api.http.guard import guarded
-from service.settings.http_limits import HttpLimitSettings
+from service.settings.processes import HttpLimitSettings
 
 STOP_S = 2
 """When uvicorn gives up what the server has not given up before, which logs a traceback."""

@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Callable
 from typing import Protocol
 
-from service.settings.http_limits import HttpLimitSettings
+from service.settings.processes import HttpLimitSettings
 
 MAX_UNSENT_BYTES = 64 * 1024 * 1024
 """Answers that wait for slow readers, all together; beyond it the largest are given up."""

@@ -9,7 +9,7 @@ from service.api.http.bodies import WholeBodies
 from service.api.http.head import HeadRequests
 from service.api.http.hosts import KnownHosts
 from service.api.http.security_headers import SecurityHeaders
-from service.settings.http_limits import HttpLimitSettings
+from service.settings.processes import HttpLimitSettings
 
 
 def guarded(answers: BoundedAnswers, limits: HttpLimitSettings, hosts: Iterable[str]) -> ASGIApp:

@@ -6,7 +6,7 @@ from prometheus_client.metrics_core import Metric
 
 from service.api.load.strain import Refused
 from service.api.load.watch import LoadWatch
-from service.runtime.families import counter, gauge
+from service.runtime.metrics import counter, gauge
 
 KINDS = (Refused.HISTORY, Refused.VIEWS)
 

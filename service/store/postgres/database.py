@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.database import Connection, Unreadable
 from service.store.postgres.address import PostgresAddress
 from service.store.postgres.connection import PostgresConnection

@@ -1,6 +1,6 @@
 """Bringing a PostgreSQL database to the newest schema."""
 
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store import schema
 from service.store.port import StoreError
 from service.store.postgres.connection import Session

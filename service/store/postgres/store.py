@@ -3,7 +3,7 @@
 import time
 from pathlib import Path
 
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.access.audit_entries import Deed, acting
 from service.store.access.audit_verification import AuditHead, write_head
 from service.store.audit_chain import newest_of

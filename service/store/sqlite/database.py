@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.database import Connection, Unreadable
 from service.store.highwater.commits import CommitMarks
 from service.store.highwater.file import MarkFile, mark_path

@@ -2,7 +2,7 @@
 
 import sqlite3
 
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store import schema
 from service.store.port import StoreError
 

@@ -4,7 +4,7 @@ import sqlite3
 from pathlib import Path
 from threading import Lock
 
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.access.audit_verification import head_path
 from service.store.audit_chain import begin_head
 from service.store.integrity import Marked

@@ -4,7 +4,7 @@ from typing import Any
 
 from service.api.auth.application import GuardedApi
 from service.api.context import Context
-from service.app.application import application
+from service.app.web import application
 from service.reports.routes import EvidenceDesk
 
 _DOCUMENTS: dict[frozenset[str], dict[str, Any]] = {}

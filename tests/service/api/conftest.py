@@ -26,9 +26,9 @@ from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.api.auth.desk import AccessDesk
 from service.api.context import Context
-from service.app.captures import captures_of
-from service.app.evidence import (
+from service.app.storage import (
     built_configuration,
+    captures_of,
     evidence_desk,
     evidence_folders,
     evidence_of,
@@ -46,8 +46,8 @@ from service.recordings.segment import CaptureFile
 from service.reports.keeper import EvidenceKeeper
 from service.reports.routes import EvidenceDesk
 from service.settings.core_values import analysis_of, calibration_of, machine_of
-from service.settings.origin import Origin
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.store.access.identities import Role
 from service.store.sqlite import SqliteStore
 

@@ -11,7 +11,7 @@ from jsonschema_rs import Draft202012Validator
 from pydantic import BaseModel
 
 from service.api.auth.application import GuardedApi
-from service.app.application import application
+from service.app.web import application
 
 Operations = list[tuple[str, dict[str, Any]]]
 

@@ -11,7 +11,7 @@ from core.samples.blocks import DeviceClock, SampleBlock, StampFault
 from core.samples.gaps import Gap, SampleAccount
 from service.live.live_view import LinkState
 from service.settings.configuration import Configuration
-from service.settings.schema import plant_file_schema
+from service.settings.loading import plant_file_schema
 from service.store.port import UnitGap
 
 

@@ -10,7 +10,7 @@ from service.api.alarm_views import alarm_list_model
 from service.api.shared import SharedAnswer
 from service.live.live_view import LinkState
 from service.runtime.asker import ASKER, Asker
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 
 RANGE = "start=2026-01-01T00:00:00Z&end=2026-02-01T00:00:00Z"
 

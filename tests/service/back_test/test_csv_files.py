@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from service.cli.offline.back_test import csv_lines
-from service.cli.offline.back_test.csv_rows import csv_batches
-from service.cli.offline.back_test.file_columns import ReadingsError
+from service.cli.offline import backtest_tables as csv_lines
+from service.cli.offline.backtest_cells import ReadingsError
+from service.cli.offline.backtest_tables import csv_batches
 
 Text = Callable[..., str]
 Line = Callable[..., str]

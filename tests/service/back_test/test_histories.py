@@ -7,8 +7,8 @@ import pyarrow as pa
 import pytest
 
 from core.baseline.history import ReadingOutcome
-from service.cli.offline.back_test.file_columns import LINE, TEXTS
-from service.cli.offline.back_test.histories import histories_of
+from service.cli.offline.backtest_cells import LINE, TEXTS
+from service.cli.offline.backtest_histories import histories_of
 
 STEP_NS = 600_000_000_000
 PLACES = {("U1", "UJB"), ("U1", "LJB"), ("U2", "UJB")}

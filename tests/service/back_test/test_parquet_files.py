@@ -11,10 +11,10 @@ import pyarrow.parquet as pq
 import pytest
 from rigs.tiers import fast_and_long
 
-from service.cli.offline.back_test.file_columns import ReadingsError
-from service.cli.offline.back_test.histories import Place
-from service.cli.offline.back_test.parquet_rows import parquet_batches
-from service.cli.offline.back_test.reading import read_histories
+from service.cli.offline.backtest_cells import ReadingsError
+from service.cli.offline.backtest_files import read_histories
+from service.cli.offline.backtest_histories import Place
+from service.cli.offline.backtest_tables import parquet_batches
 
 N_ROWS = 20
 UJB: Place = ("U1", "UJB")
@@ -148,7 +148,7 @@ def test_a_file_that_is_cut_off_anywhere_or_has_too_many_rows_is_refused(
     for size in range(4, len(whole), 97):
         path.write_bytes(whole[:size])
         assert refusal(path) == "not a complete Parquet file"
-    monkeypatch.setattr("service.cli.offline.back_test.parquet_rows.MAX_ROWS", N_ROWS - 1)
+    monkeypatch.setattr("service.cli.offline.backtest_tables.MAX_ROWS", N_ROWS - 1)
     assert refusal(written()) == "20 rows; at most 19 are read"
 
 

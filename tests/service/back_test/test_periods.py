@@ -6,9 +6,9 @@ import pytest
 from core.change.backtest import DecisionHistory
 from core.limits import AlarmLevel
 from core.units import DAY_NS
-from service.cli.offline.back_test.alarm_stretches import alarm_stretches
-from service.cli.offline.back_test.arguments import event_of, time_ns_of
-from service.cli.offline.back_test.periods import Learning, MachineEvent, Period, periods_of
+from service.cli.offline.backtest import event_of, time_ns_of
+from service.cli.offline.backtest_bearing import Learning, MachineEvent, Period, periods_of
+from service.cli.offline.backtest_report import alarm_stretches
 
 DAYS = np.arange(100) * DAY_NS
 

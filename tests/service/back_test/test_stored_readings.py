@@ -16,8 +16,8 @@ from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
 from core.quality import Reason
-from service.cli.offline.back_test import stored
-from service.cli.offline.back_test.reading import read_histories
+from service.cli.offline import backtest_files as stored
+from service.cli.offline.backtest_files import read_histories
 from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000

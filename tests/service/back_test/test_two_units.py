@@ -20,13 +20,11 @@ from core.change.settings import ChangeLimits
 from core.change.shaft_response import film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
 from core.units import DAY_NS
-from service.cli.offline.back_test.bearing_run import BackTestRules
-from service.cli.offline.back_test.exporting import export_baselines
-from service.cli.offline.back_test.file_columns import ReadingsError
-from service.cli.offline.back_test.histories import BearingRows, Place
-from service.cli.offline.back_test.periods import Learning, MachineEvent
-from service.cli.offline.back_test.reading import read_histories
-from service.cli.offline.back_test.running import Found, run_back_test
+from service.cli.offline.backtest import Found, export_baselines, run_back_test
+from service.cli.offline.backtest_bearing import BackTestRules, Learning, MachineEvent
+from service.cli.offline.backtest_cells import ReadingsError
+from service.cli.offline.backtest_files import read_histories
+from service.cli.offline.backtest_histories import BearingRows, Place
 from service.runtime.times import rfc3339
 from service.store.documents import baseline_from_json
 

@@ -12,7 +12,7 @@ import pytest
 from rigs.memory_folder import path_in_memory  # noqa: F401 - a fixture
 
 from core.samples.gaps import Gap
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.backup import BackupError, back_up, checked, restore
 from service.store.port import UnitGap
 from service.store.schema import MIGRATIONS

@@ -15,7 +15,7 @@ from service.api.auth.backoff import Backoff
 from service.api.auth.doors import Doors, LoggedIn, Refusal
 from service.api.auth.passwords import Hashing
 from service.cli.commands import app
-from service.runtime.made_by import made_by
+from service.runtime.process import made_by
 from service.store.access.identities import Identity, Role
 from service.store.access.port import AccessStore
 from service.store.audit_port import AuditQuery

@@ -15,7 +15,7 @@ from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
 from service.cli.probe import app
-from service.settings.map_file import load_map_file
+from service.settings.sources.register_map import load_map_file
 
 MAPS = Path(__file__).parents[3] / "deploy" / "maps"
 GATEWAY = MAPS / "slow-gateway.toml"

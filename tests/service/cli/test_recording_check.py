@@ -14,10 +14,9 @@ from acquisition.clock import SystemClock
 from acquisition.delivery.calibration import RawBlock
 from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
-from service.app.stores import open_store
-from service.app.waveforms import waveform_keeper
+from service.app.storage import open_store, waveform_keeper
+from service.settings.adapter_values import recorded_unit
 from service.settings.loading import load_plant_file
-from service.settings.recorded_units import recorded_unit
 
 START_NS = 1_767_225_600_000_000_000
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from rigs.command_line import padwatch
 
-from service.cli.serve import NEEDS_POSTGRESQL
+from service.cli.run import NEEDS_POSTGRESQL
 
 NO_STREAM = "no [stream]: give it one, with the servers of NATS, or use `padwatch run`"
 

@@ -9,8 +9,8 @@ from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.summary import summary_of
-from service.app import pressure
-from service.app.pressure import Pressure
+from service.app import service_health as pressure
+from service.app.service_health import Pressure
 from service.measuring.acquirer import Bus
 from service.recordings import continuous_recorder as tape
 from service.recordings import continuous_recorder as unit_tape

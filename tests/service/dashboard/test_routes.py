@@ -17,7 +17,7 @@ from service.dashboard import edition as told
 from service.dashboard.assets import Asset, pages, plotly
 from service.dashboard.edition import edition
 from service.dashboard.routes import dashboard_router
-from service.settings.http_limits import HttpLimitSettings
+from service.settings.processes import HttpLimitSettings
 
 FILES = f"/static/{edition()}/"
 AS_IS = {"Accept-Encoding": "identity"}

@@ -20,7 +20,7 @@ from service.notifications.message import Composer, Plant, Surroundings
 from service.notifications.routing import Route, Router
 from service.notifications.sender import Receiver, Sender
 from service.notifications.webhook import Webhook, WebhookTarget
-from service.settings.delivery import TOLD
+from service.settings.notifications import TOLD
 from service.store.sqlite import SqliteStore
 
 PATIENCE_S = 30.0

@@ -10,7 +10,7 @@ from core.baseline.history import StiffnessHistory
 from core.change.decision import JUDGED, Verdict
 from core.machine.unit import Estimator
 from core.units import NS_PER_S
-from service.cli.offline.demo.past import fill, without_past
+from service.cli.offline.demo_history import fill, without_past
 from service.measuring.simulated_sources import simulated_history
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile

@@ -13,16 +13,15 @@ from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.quality import Reading
-from service.app.captures import captures_of
-from service.app.evidence import evidence_folders, evidence_of
+from service.app.storage import captures_of, evidence_folders, evidence_of
 from service.live.live_view import LinkState, LiveView
 from service.measuring.films import FilmKeeper, film_keeper
 from service.reports.archive import EvidenceArchive
 from service.reports.capture_link import CapturePart, linked
 from service.settings.core_values import machine_of
 from service.settings.loading import load_plant_file
-from service.settings.origin import Origin
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000

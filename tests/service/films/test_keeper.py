@@ -25,7 +25,7 @@ from service.live.commands import (
     Thaw,
 )
 from service.measuring.films import FilmKeeper
-from service.settings.film_alarms import FilmAlarmSettings
+from service.settings.films import FilmAlarmSettings
 from service.store.film_port import BaselineStep, FilmHistory, FilmQuery
 from service.store.sqlite import SqliteStore
 

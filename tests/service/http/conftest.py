@@ -13,7 +13,7 @@ from service.api.http.config import GuardedConfig
 from service.api.http.protocol import GuardedProtocol
 from service.api.http.server import GuardedServer
 from service.runtime.asker import ASKER, Asker
-from service.settings.http_limits import HttpLimitSettings
+from service.settings.processes import HttpLimitSettings
 
 PATIENCE_S = 20.0
 """Ends a test that would hang; none waits for it otherwise."""

@@ -12,7 +12,7 @@ from starlette.responses import PlainTextResponse
 from service.api.http.config import GuardedConfig
 from service.api.http.server import GuardedServer
 from service.api.http.tls import server_tls
-from service.settings.http_limits import HttpLimitSettings
+from service.settings.processes import HttpLimitSettings
 
 LARGE_MIB = 64
 

@@ -20,7 +20,7 @@ from core.quality import Reason, bad
 from core.samples.blocks import DeviceClock, Rejection, SampleBlock
 from core.samples.gaps import SampleAccount
 from service.api.http.listening import listen
-from service.app.program import Performance, run_service
+from service.app.service import Performance, run_service
 from service.measuring.simulated_sources import simulated_feed
 from service.measuring.sources import WatchedUnit, monitor_of
 from service.runtime.polls import TimedSource

@@ -12,8 +12,8 @@ from acquisition.clock import Clock
 from core.samples.blocks import SampleBlock
 from service.measuring.counters import MAX_REASONS, bounded
 from service.measuring.timings import Timings
-from service.runtime.durations import Durations
 from service.runtime.heartbeats import Unheard
+from service.runtime.metrics import Durations
 from service.runtime.polls import PollClock, TimedSource
 
 

@@ -8,8 +8,8 @@ from structlog.testing import capture_logs
 
 from acquisition.clock import Clock
 from core.units import DAY_NS
-from service.app.retention import retention_limits
-from service.settings.retention import RetentionSettings
+from service.app.storage import retention_limits
+from service.settings.storage import RetentionSettings
 from service.store.loops import LOOK_S, RETAINING_PERIOD_S, RETAINING_REST_SHARE, Retaining
 from service.store.port import StoreError
 from service.store.retention.limits import RetentionLimits

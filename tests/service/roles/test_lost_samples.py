@@ -13,7 +13,7 @@ from service.cluster.replica_state import ReplicaAlarms
 from service.measuring.alarm_engine import AlarmEngine, alarm_engine
 from service.measuring.service_alarms import ServiceHealth
 from service.settings.loading import load_plant_file
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.sqlite import SqliteStore
 
 LOST = Alarm(AlarmIdentity(PLANT, "U2", "samples_lost"))

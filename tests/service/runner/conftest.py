@@ -29,7 +29,7 @@ from service.measuring.recorder import FILE, ParkedRows, Recorder
 from service.measuring.sources import WatchedUnit
 from service.recordings.around_alarms import Captures, CaptureSettings
 from service.recordings.segment import MakeWriter
-from service.settings.film_alarms import FilmAlarmSettings
+from service.settings.films import FilmAlarmSettings
 from service.store.sqlite import SqliteStore
 
 RATE_HZ = 100.0

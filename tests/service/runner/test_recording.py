@@ -24,7 +24,7 @@ from core.limits import AlarmLevel, Judgement
 from core.monitor.assessment import Assessment
 from core.samples.gaps import Gap
 from service.api.context import Context
-from service.app.application import application
+from service.app.web import application
 from service.measuring import recorder as recording
 from service.measuring.commands import InProcess
 from service.measuring.recorder import FILE, Findings, NotStoredError, ParkedRows, Recorder

@@ -13,7 +13,7 @@ from service.api.auth.backoff import OF_ACCOUNT, Backoff
 from service.api.auth.doors import Doors, LoggedIn, NotLoggedIn, Refusal
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import People, create_key
-from service.settings.addresses import Doorway, why_closed
+from service.settings.processes import Doorway, why_closed
 from service.store.access.identities import Identity, Means, Permission, Role, SessionLimits, digest
 from service.store.access.port import AccessStore
 from service.store.access.tables import MAX_SESSIONS

@@ -18,12 +18,12 @@ from core.condition.operating_state import STEADY, OperatingState
 from core.limits import Limits
 from core.machine.unit import Bearing
 from core.monitor.catalogue import CATALOGUE
-from service.app.captures import captures_of
+from service.app.storage import captures_of
 from service.measuring.service_alarms import ServiceHealth, ServiceRules
 from service.settings.alarm_kinds import ALARM_KINDS, SERVICE_KINDS
-from service.settings.alarm_rules import chatter_rule_of, references_of, rules_of
-from service.settings.origin import Origin
+from service.settings.core_values import chatter_rule_of, references_of, rules_of
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 
 Changed = Callable[[str, str], tuple[str, int]]
 Mistakes = Callable[[str | bytes], list[str]]

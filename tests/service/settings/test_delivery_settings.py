@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from acquisition.clock import SystemClock
-from service.app.delivery import receivers_of, router_of
+from service.app.notifications import receivers_of, router_of
 from service.notifications.message import Surroundings
 from service.settings.loading import load_plant_file
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.outbox import nobody
 
 WEBHOOK = """

@@ -7,8 +7,8 @@ import pytest
 
 from acquisition.modbus.decoding import MapDecoder
 from core.spectra.polls import VectorPart, VectorRow
-from service.settings.import_mapping import ImportMapping
-from service.settings.map_file import load_map_file
+from service.settings.sources.mapping import ImportMapping
+from service.settings.sources.register_map import load_map_file
 from service.settings.toml_file import TomlFileError, load_toml
 
 CSV = """\

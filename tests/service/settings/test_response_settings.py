@@ -7,10 +7,15 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from core.machine.response import HighPass, Resonance, ResponseChain, ResponseTable
-from service.settings.calibration_sheet import SheetError, read_calibration_sheet
 from service.settings.core_values import machine_of
 from service.settings.loading import PlantFileError, load_plant_file
-from service.settings.response import FOLDER, ResponseSettings, response_of
+from service.settings.transducers import (
+    FOLDER,
+    ResponseSettings,
+    SheetError,
+    read_calibration_sheet,
+    response_of,
+)
 
 PARTS: TypeAdapter[tuple[ResponseSettings, ...]] = TypeAdapter(tuple[ResponseSettings, ...])
 

@@ -9,17 +9,17 @@ from pydantic import TypeAdapter, ValidationError
 
 from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters
 from core.spectra.polls import VectorPart, VectorRow
+from service.settings.adapter_values import identity_of
 from service.settings.base import MisfitError
-from service.settings.can import CanSettings
-from service.settings.expected_identity import identity_of
-from service.settings.modbus_identity import IdentitySettings
-from service.settings.modbus_sources import (
+from service.settings.sources.can import CanSettings
+from service.settings.sources.devices import (
     ModbusFifoSettings,
     ModbusPolledSettings,
     ModbusVectorSettings,
     SlowDeviceSettings,
 )
-from service.settings.response import FOLDER
+from service.settings.sources.modbus import IdentitySettings
+from service.settings.transducers import FOLDER
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
 SKF = "maps/vector-rack-skf-like.toml"

@@ -9,12 +9,9 @@ from pydantic import ValidationError
 
 from acquisition.clock import Clock
 from core.limits import AlarmLevel
-from service.app.space import space_limits
-from service.runtime.space.disk import DiskSpace, measure_disk
-from service.runtime.space.growth import Growth
-from service.runtime.space.limits import SpaceLimits
-from service.runtime.space.watch import SpaceWatch
-from service.settings.space import SpaceSettings
+from service.app.storage import space_limits
+from service.runtime.disk import DiskSpace, Growth, SpaceLimits, SpaceWatch, measure_disk
+from service.settings.storage import SpaceSettings
 
 GB = 10**9
 HOUR_S = 3600.0

@@ -9,7 +9,7 @@ from rigs.assessments import assessment
 from rigs.rolled_trends import n_rows
 from rigs.store_fixtures import Execute, at, gap, query
 
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.migrating import APPLICATION_IDS

@@ -12,8 +12,8 @@ from rigs.store_fixtures import Execute, at
 
 from service.live.live_view import LiveView
 from service.measuring.soundness import Soundness
-from service.runtime.background import LOOK_S
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats
+from service.runtime.periodic import LOOK_S
 from service.store.access.identities import Role, Session
 from service.store.audit_port import AuditQuery
 from service.store.loops import Scrubbing

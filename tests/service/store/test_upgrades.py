@@ -14,7 +14,7 @@ from rigs.store_fixtures import at, query
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store import schema
 from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError

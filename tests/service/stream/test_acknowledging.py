@@ -26,7 +26,7 @@ from harness.stream_rig import (
 from nats.aio.msg import Msg
 from nats.js.errors import NotFoundError
 
-from service.app.stores import open_store
+from service.app.storage import open_store
 from service.cluster import consumer as consuming
 from service.cluster.consumer import Consumer
 from service.cluster.session import consumer_name, stream_name, subject

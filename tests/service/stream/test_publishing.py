@@ -28,7 +28,7 @@ from service.cluster.session import (
 from service.live.live_view import LinkState
 from service.measuring.acquirer import LinkNews
 from service.settings.plant import PlantFile
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 
 WAIT_S = 30.0
 

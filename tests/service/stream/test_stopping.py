@@ -12,7 +12,7 @@ from service.cluster.consumer import Consumer
 from service.cluster.frames import UnitIdentity
 from service.cluster.publisher import Outgoing, Publisher
 from service.settings.plant import PlantFile
-from service.settings.stream import StreamSettings
+from service.settings.processes import StreamSettings
 
 SETTINGS = StreamSettings(servers=("nats://127.0.0.1:9",))
 

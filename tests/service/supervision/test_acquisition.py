@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
-from service.app.supervision import Supervision
+from service.app.process import Supervision
 from service.live.live_view import LinkState, LiveView
 from service.measuring.acquirer import Acquirer
 from service.measuring.sources import WatchedUnit

@@ -9,8 +9,8 @@ import httpx2
 import pytest
 
 from acquisition.clock import SystemClock
-from service.app.program import Performance, run_service
-from service.app.supervision import Supervision
+from service.app.process import Supervision
+from service.app.service import Performance, run_service
 from service.live.live_view import LinkState, LiveView
 from service.measuring.sources import live_units
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats, Pulse
@@ -98,8 +98,8 @@ async def test_a_stuck_loop_is_named_and_starves_the_watchdog_until_it_goes_on(
     await program.loops["alarms"].go_on()
     program.supervision.look()
 
-    assert program.beats.look() == {"record": "stuck: not heard of for 61 s", "alarms": None}
-    assert manager_socket.received == [{"STATUS": "record stuck: not heard of for 61 s"}]
+    assert program.beats.look() == {"record": "stuck: no heartbeat for 61 s", "alarms": None}
+    assert manager_socket.received == [{"STATUS": "record stuck: no heartbeat for 61 s"}]
 
     await program.loops["record"].go_on()
     program.supervision.look()
@@ -197,7 +197,7 @@ async def test_every_task_of_the_program_has_a_pulse(
     settings, clock = load_plant_file(plant), SystemClock()
     before, said = asyncio.all_tasks(), asyncio.Queue()
     stopped = asyncio.Event()
-    monkeypatch.setattr("service.app.program.stop_on_signals", lambda: stopped)
+    monkeypatch.setattr("service.app.service.stop_on_signals", lambda: stopped)
     listener = socket.create_server(("127.0.0.1", 0))
     performance = Performance(settings, live_units(settings, clock))
     service = asyncio.create_task(

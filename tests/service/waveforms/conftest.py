@@ -16,8 +16,7 @@ from core.machine.channel import Measurand
 from service.recordings.index import Index
 from service.recordings.keeper import WatchKeeping, WaveformKeeper
 from service.recordings.retention import Caretaker, Custody, Gauge, RoomLimits
-from service.runtime.space.disk import DiskSpace
-from service.runtime.space.limits import SpaceLimits
+from service.runtime.disk import DiskSpace, SpaceLimits
 from service.store.sqlite import SqliteStore
 from service.store.waveform_port import WaveformFile, WaveformKind
 

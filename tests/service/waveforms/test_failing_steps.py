@@ -11,7 +11,7 @@ import pytest
 
 from service.app.service_health import health_of
 from service.recordings.library import Shelf
-from service.runtime.space.disk import DiskSpace
+from service.runtime.disk import DiskSpace
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
 from service.store.waveforms import StoredWaveforms

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any
 
 from service.recordings.retention import NotOldFrom
-from service.runtime.space.disk import DiskSpace
+from service.runtime.disk import DiskSpace
 from service.store.waveform_port import WaveformFile, WaveformKind
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE

@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 
 from acquisition.clock import SystemClock
-from service.app.access import access_desk
 from service.app.replay import replayed_plant
-from service.settings.access import AccessSettings, TlsSettings
+from service.app.web import access_desk
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
+from service.settings.processes import AccessSettings, TlsSettings
 from service.store.access.identities import Role
 from service.store.sqlite import SqliteStore
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from acquisition.clock import SystemClock
-from service.app.audit_trail import ServiceTrail
-from service.settings.origin import Origin
+from service.app.service_audit import ServiceTrail
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditEntry
 from service.store.audit_port import AuditQuery
 from service.store.sqlite import SqliteStore

@@ -8,10 +8,10 @@ import pytest
 from acquisition.can.source import CanSource
 from acquisition.simulated.devices.can_shape import daq_dbc
 from service.measuring.simulated_sources import simulated_feed
-from service.settings.can import CanSettings
-from service.settings.can_devices import can_daq_of, can_settings_of, can_shape_of
+from service.settings.adapter_values import can_daq_of, can_settings_of, can_shape_of
 from service.settings.core_values import calibration_of
-from service.settings.response import FOLDER
+from service.settings.sources.can import CanSettings
+from service.settings.transducers import FOLDER
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
 PLACE = {"kind": "can", "interface": "slcan", "channel": "socket://127.0.0.1:0"}

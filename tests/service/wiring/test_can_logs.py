@@ -18,7 +18,7 @@ from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_frames import WireFrame
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_dbc, daq_settings
 from acquisition.simulated.feed import FeedEndedError
-from service.cli.offline.can_logs import CanLogDecoder
+from service.cli.offline.importing import CanLogDecoder
 
 START_S = 1_767_225_600
 

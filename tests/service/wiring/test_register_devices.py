@@ -14,8 +14,8 @@ from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.app.register_daqs import fifo_device, modbus_server, polled_device, vector_device
-from service.cli.offline.probes import link_settings_of
+from service.app.simulated_daq import fifo_device, modbus_server, polled_device, vector_device
+from service.cli.offline.probing import link_settings_of
 from service.measuring.simulated_sources import simulated_feed
 from service.measuring.sources import (
     at_poll_rate,
@@ -28,7 +28,7 @@ from service.measuring.sources import (
 )
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file
-from service.settings.modbus_sources import (
+from service.settings.sources.devices import (
     ModbusFifoSettings,
     ModbusPolledSettings,
     ModbusVectorSettings,

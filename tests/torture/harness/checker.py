@@ -27,7 +27,7 @@ from harness.lives import (
     uncovered,
 )
 from harness.watch import Watch
-from service.app.stores import open_store
+from service.app.storage import open_store
 from service.settings.loading import load_plant_file
 from service.store.port import Store
 

@@ -27,7 +27,7 @@ from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSett
 from acquisition.simulated.feed import Ledger
 from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.tape import environment, python
-from service.app.daq_program import run_daq
+from service.app.simulated_daq import run_daq
 
 
 class OfferedLog(Ledger):

@@ -13,7 +13,7 @@ from core.arrays import FloatArray
 from harness.bench import Bench
 from harness.checker import Findings
 from harness.ledger_plant import LedgerPlant
-from service.app.stores import DATABASE
+from service.app.storage import DATABASE
 
 LOOK_S = 2.0
 WARM_UP = 0.4

@@ -18,10 +18,10 @@ from core.units import NS_PER_S
 from harness.ledger_plant import LedgerPlant
 from harness.nats_server import NatsServer
 from harness.waiting import at_work
-from service.app.analyse_program import Analysing
-from service.app.analysis import analysis_on
-from service.app.ground import Ground, live_view
-from service.app.stores import open_store
+from service.app.cluster_processes import Analysing
+from service.app.measuring_process import analysis_on
+from service.app.process import Ground, live_view
+from service.app.storage import open_store
 from service.cluster.frames import Taken, decoded
 from service.cluster.ownership import Partition
 from service.cluster.publisher import Publisher
@@ -33,8 +33,8 @@ from service.measuring.timings import Timings
 from service.notifications.message import Around
 from service.runtime.heartbeats import Heartbeats
 from service.settings.loading import load_plant_file
-from service.settings.origin import Origin
 from service.settings.plant import PlantFile
+from service.settings.storage import Origin
 from service.store.port import Store
 from service.store.sqlite import SqliteStore
 

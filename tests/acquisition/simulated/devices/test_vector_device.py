@@ -21,7 +21,7 @@ from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow
-from service.settings.map_file import load_map_file
+from service.settings.sources.register_map import load_map_file
 
 RACK = Path(__file__).parents[4] / "deploy" / "maps" / "vector-rack-skf-like.toml"
 RATE_HZ, SPEED_RPM, K_B = 600.0, 92.3, 1.18e9

@@ -14,8 +14,7 @@ from rigs.described import described_app
 from service.api.auth.desk import AccessDesk
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import create_key
-from service.app.scrape import scrape
-from service.app.watched import Watched
+from service.app.metrics import Watched, scrape
 from service.measuring.acquirer import Bus
 from service.measuring.timings import Timings
 from service.store.access.identities import Role

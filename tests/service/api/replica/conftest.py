@@ -9,7 +9,7 @@ import pytest
 from rigs.described import described_app
 
 from core.alarms.alarm import PLANT
-from service.app.replica import Replica, replica_context, replica_on
+from service.app.serving_process import Replica, replica_context, replica_on
 from service.cluster.reported_commands import CarryingOut
 from service.cluster.reported_state import Reporter
 from service.runtime.heartbeats import Heartbeats

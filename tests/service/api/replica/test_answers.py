@@ -6,7 +6,7 @@ import pytest
 
 from core.alarms.alarm import AlarmState
 from core.limits import AlarmLevel
-from service.app.replica import replica_on
+from service.app.serving_process import replica_on
 from service.cluster.replica_state import NOBODY, SILENT_AFTER_S
 from service.live.live_view import LinkState
 from service.store.port import StoreError

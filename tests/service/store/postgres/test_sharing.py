@@ -14,7 +14,7 @@ from rigs.assessments import assessment
 from rigs.store_fixtures import Build
 
 from core.monitor.assessment import Assessment
-from service.settings.origin import Origin
+from service.settings.storage import Origin
 from service.store.access.audit_entries import Deed
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError

@@ -1,1 +1,0 @@
-"""The small HTTP server of processes without API and dashboard: is it alive, does it work."""

@@ -1,0 +1,107 @@
+"""Health page of a process without an API: /livez, /readyz and /metrics."""
+
+import asyncio
+import socket
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from fastapi import FastAPI, Response
+from fastapi.responses import JSONResponse
+from prometheus_client import exposition
+from prometheus_client.metrics_core import Metric
+
+from acquisition.clock import Clock
+from service.api.http.config import GuardedConfig
+from service.api.http.server import GuardedServer
+from service.runtime.heartbeats import Heartbeats
+from service.settings.processes import HttpLimitSettings
+
+TEXT = exposition.CONTENT_TYPE_PLAIN_0_0_4
+
+
+@dataclass(frozen=True)
+class Health:
+    """Contents of the health page of a process.
+
+    Parameters
+    ----------
+    checks
+        Fault of each part that must work; None if it works.
+    shown
+        Information that does not affect readiness, such as a disconnected device.
+    metrics
+        Metric families for Prometheus.
+    """
+
+    checks: Callable[[], Mapping[str, str | None]]
+    shown: Callable[[], Mapping[str, str]]
+    metrics: Callable[[], Iterable[Metric]]
+
+
+@dataclass(frozen=True)
+class _Families:
+    """Collector of the families, in place of a registry."""
+
+    families: Callable[[], Iterable[Metric]]
+
+    def collect(self) -> Iterable[Metric]:
+        """Return all families."""
+        return self.families()
+
+
+def health_app(health: Health) -> FastAPI:
+    """Build the application; it needs no login and shows no secrets."""
+    app = FastAPI(title="padwatch", docs_url=None, redoc_url=None, openapi_url=None)
+
+    @app.get("/livez")
+    async def livez() -> JSONResponse:
+        """Return 200 while the event loop runs."""
+        return JSONResponse({"status": "ok", "checks": {"event_loop": "turning"}})
+
+    @app.get("/readyz")
+    async def readyz() -> JSONResponse:
+        """Return 200 if all required parts work, 503 otherwise."""
+        checks = health.checks()
+        is_ready = not any(checks.values())
+        words = {name: trouble or "ok" for name, trouble in checks.items()}
+        body = {
+            "status": "ok" if is_ready else "not ready",
+            "checks": {**health.shown(), **words},
+        }
+        return JSONResponse(body, 200 if is_ready else 503)
+
+    @app.get("/metrics")
+    async def metrics() -> Response:
+        """Return the metrics in the text format of Prometheus."""
+        return Response(
+            exposition.generate_latest(_Families(health.metrics)), headers={"content-type": TEXT}
+        )
+
+    return app
+
+
+HOST = "127.0.0.1"
+"""Loopback only; other hosts use a proxy or an agent on this computer."""
+
+
+class HealthServer:
+    """Serves the health page on a socket."""
+
+    def __init__(self, health: Health, listener: socket.socket, clock: Clock) -> None:
+        config = GuardedConfig(health_app(health), HttpLimitSettings(), [HOST], clock.monotonic_s)
+        self._server, self._listener = GuardedServer(config), listener
+
+    def start(self, tasks: asyncio.TaskGroup, beats: Heartbeats) -> asyncio.Task[None]:
+        """Start the server; the task ends after `stop`."""
+        serve = partial(self._server.run_on, self._listener)
+        return tasks.create_task(beats.tend("health", serve), name="health")
+
+    async def started(self) -> None:
+        """Wait until the server answers."""
+        while not self._server.started:
+            await asyncio.sleep(0.01)
+
+    def stop(self) -> None:
+        """Stop accepting requests."""
+        self._server.should_exit = True

@@ -1,0 +1,238 @@
+"""The measuring part of a process: from blocks to results, alarms, evidence and messages."""
+
+import asyncio
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from core.alarms.alarm import AlarmNews
+from core.monitor.monitor import UnitMonitor
+from core.samples.blocks import SampleBlock
+from service.api.load.strain import LoadLimits
+from service.api.load.watch import LoadWatch
+from service.app.notifications import receivers_of
+from service.app.process import Ground
+from service.app.service_health import Pressure, health_of
+from service.app.storage import (
+    captures_of,
+    evidence_of,
+    retention_limits,
+    space_watch,
+    tape_of,
+    watch,
+    waveform_keeper,
+)
+from service.cluster.reported_commands import CarryingOut
+from service.cluster.reported_state import Reporter, process_name
+from service.measuring.acquirer import Bus
+from service.measuring.alarm_engine import WHOLE, AlarmEngine, Listener, PlantPart, alarm_engine
+from service.measuring.analyser import NO_MEMORIES, Analyser, UnitMemory
+from service.measuring.films import FilmKeeper, film_keeper
+from service.measuring.recorder import FILE, ParkedRows, Recorder
+from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.service_alarms import StreamLook
+from service.measuring.soundness import Soundness
+from service.measuring.sources import vector_rows
+from service.notifications.message import Around
+from service.notifications.sender import Deliveries
+from service.recordings.around_alarms import Captures
+from service.recordings.continuous_recorder import Tape
+from service.recordings.keeper import WaveformKeeper
+from service.reports.keeper import EvidenceKeeper
+from service.runtime.disk import SpaceWatch
+from service.runtime.heartbeats import Loop
+from service.settings.storage import Origin
+from service.store.loops import Retaining, Rolling, Scrubbing
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """Parts of the analysis; the caller feeds `analyser` and runs `recorder`."""
+
+    ground: Ground
+    part: PlantPart
+    analyser: Analyser
+    recorder: Recorder
+    deliveries: Deliveries
+    captures: Captures
+    tape: Tape
+    recordings: WaveformKeeper
+    alarms: AlarmEngine
+    films: FilmKeeper
+    evidence: EvidenceKeeper
+    references: ReferencesInForce
+    rolling: Rolling
+    retaining: Retaining
+    space: SpaceWatch
+    load: LoadWatch
+    soundness: Soundness
+
+    def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
+        """Start the background loops; they run until they are cancelled."""
+        beats, loops = self.ground.beats, self.own_loops
+        if self.part == WHOLE:  # no other process shares the plant
+            loops = {**loops, **self.shared_loops}
+        begun = [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
+        if self.part == WHOLE:
+            begun.append(tasks.create_task(self.deliveries.run(beats), name="deliver"))
+        return begun
+
+    @property
+    def own_loops(self) -> dict[str, Loop]:
+        """Loops that every process runs for its own units."""
+        loops: dict[str, Loop] = {
+            "references": self.references.run,
+            "alarms": self.alarms.run,
+            "captures": self.captures.run,
+            "tape": self.tape.run,
+            "evidence": self.evidence.run,
+            "space": self.space.run,
+            "load": self.load.run,
+            "soundness": self.soundness.run,
+        }
+        if self.ground.origin is Origin.LIVE:  # a replay is not the history of a machine
+            loops |= {"learn": self.films.run, "recordings": self.recordings.run}
+        return loops
+
+    @property
+    def shared_loops(self) -> dict[str, Loop]:
+        """Loops that one process runs for the whole plant, besides the delivery of messages."""
+        loops: dict[str, Loop] = {"gather": self.rolling.run}
+        if self.ground.origin is Origin.LIVE:
+            loops["retain"] = self.retaining.run
+            loops["scrub"] = Scrubbing(self.ground.store.integrity, self.ground.clock).run
+        return loops
+
+    async def close(self) -> None:
+        """Write all pending data; also called when a bug ends the program."""
+        await self.captures.close()
+        await self.recorder.flush()
+        await self.evidence.close()
+        await self.tape.close()
+        self.recordings.close()
+
+
+async def analysis_on(
+    ground: Ground,
+    monitors: Mapping[str, UnitMonitor],
+    bus: Bus,
+    around: Around,
+    part: PlantPart = WHOLE,
+    memories: Mapping[str, UnitMemory] = NO_MEMORIES,
+    stream: StreamLook | None = None,
+) -> Analysis:
+    """Build the parts of the analysis and resume where the service stopped.
+
+    Parameters
+    ----------
+    bus
+        Queue of blocks to the analysis.
+    around
+        Context of alarms for messages; receives the film monitors.
+    part
+        Units that this process is responsible for.
+    memories
+        State of units in memory, for units without a gap in their samples since.
+    stream
+        Status of the stream, if blocks come over a stream.
+
+    Raises
+    ------
+    StoreError
+        If stored state cannot be read; a start without it would lose it.
+    """
+    plant, origin, store, clock = ground.plant, ground.origin, ground.store, ground.clock
+    live = ground.live
+    soundness = Soundness(store, clock, live)
+    await soundness.look()  # before anything is written
+    if origin is Origin.LIVE:  # a replay starts anew and has no gap
+        for unit, monitor in monitors.items():
+            monitor.go_on(await asyncio.to_thread(store.reach, unit))
+    deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
+    commits = ground.timings.commits
+    recorder = Recorder(
+        store,
+        live,
+        clock,
+        ParkedRows(Path(plant.service.data_folder) / FILE),
+        told=deliveries.wake,
+        timed=commits.timed,
+        finds_again=stream is not None,
+    )
+    captures = captures_of(plant, origin, clock)
+    recordings = waveform_keeper(plant, store, clock)
+    load = LoadWatch(bus, LoadLimits(), clock)
+    pressure = Pressure(bus, recordings.is_full, lambda: bool(load.refused))
+    tape = tape_of(plant, origin, clock, pressure.look)
+    space = space_watch(plant, clock)
+    look = health_of(
+        monitors, live, recorder, captures, bus, space, load, tape, recordings, soundness, stream
+    )
+    alarms = await alarm_engine(
+        plant,
+        origin,
+        store,
+        recorder.put,
+        clock,
+        _listener(captures, tape),
+        vector_rows(plant),
+        look,
+        part,
+        {unit: memory.alarms for unit, memory in memories.items()},
+    )
+    machines = {unit: monitor.unit for unit, monitor in monitors.items()}
+    films = await film_keeper(plant, machines, store.films, clock)
+    for unit, memory in memories.items():
+        films.resume(unit, memory.films)
+    around.watch_films(films.newest)
+    evidence = evidence_of(plant, origin, live, films, store, captures, clock)
+    watch(evidence, alarms, captures, origin)
+    references = ReferencesInForce(monitors, store, clock)
+    await references.look()  # before the first result
+    return Analysis(
+        ground=ground,
+        part=part,
+        analyser=Analyser(monitors, live, recorder, alarms, films),
+        recorder=recorder,
+        deliveries=deliveries,
+        captures=captures,
+        tape=tape,
+        recordings=recordings,
+        alarms=alarms,
+        films=films,
+        evidence=evidence,
+        references=references,
+        rolling=Rolling(store.rollups, clock),
+        retaining=Retaining(store.retention, retention_limits(plant.retention), clock),
+        space=space,
+        load=load,
+        soundness=soundness,
+    )
+
+
+def _listener(captures: Captures, tape: Tape) -> Listener:
+    """Return a listener that passes every judged block to both recorders of samples."""
+
+    def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:
+        captures.take(block, news)
+        tape.take(block)
+
+    return listen
+
+
+def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> Mapping[str, Loop]:
+    """Return the loops that publish the state of units and carry out operators' commands.
+
+    Parameters
+    ----------
+    held
+        Returns the units of this process; `PLANT` if it also publishes alarms without a unit, and
+        `SHARED` if it does the shared work.
+    """
+    ground, process = analysis.ground, process_name()
+    store, parts = ground.store, (analysis.alarms, analysis.films)
+    reporter = Reporter(
+        process, ground.plant.unit, held, ground.live, *parts, store.unit_states, ground.clock
+    )
+    carrying_out = CarryingOut(process, held, *parts, analysis.recorder, store, ground.clock)
+    return {"report": reporter.run, "commands": carrying_out.run}

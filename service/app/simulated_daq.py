@@ -1,0 +1,317 @@
+"""The simulated DAQ: devices of the units of a plant file, and the program that runs them."""
+
+import asyncio
+import json
+import os
+import signal
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import AsyncExitStack, suppress
+from enum import StrEnum
+from pathlib import Path
+
+from acquisition.clock import Clock
+from acquisition.delivery.calibration import UnitCalibration
+from acquisition.errors import AcquisitionError
+from acquisition.simulated.devices.fifo_device import FifoDevice
+from acquisition.simulated.devices.map_device import MapDevice, VectorDevice
+from acquisition.simulated.devices.modbus_device import ModbusDevice
+from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTcpServer
+from acquisition.simulated.devices.modbus_server import ModbusServer
+from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
+from acquisition.simulated.devices.server import DaqServer
+from acquisition.simulated.feed import SampleFeed
+from core.machine.unit import Unit
+from service.settings.adapter_values import can_daq_of
+from service.settings.core_values import calibration_of, machine_of
+from service.settings.plant import PlantFile
+from service.settings.sources.can import CanSettings
+from service.settings.sources.devices import (
+    ModbusFifoSettings,
+    ModbusPolledSettings,
+    ModbusRingSettings,
+    ModbusVectorSettings,
+    SimulatedSettings,
+    SourceSettings,
+)
+from service.settings.sources.modbus import ModbusLinkSettings
+from service.settings.units import UnitSettings
+
+Tell = Callable[[str], None]
+
+MAX_COUNT = 1_000_000
+"""Largest count of one command; each fault takes a place in a queue."""
+
+_STANDARD_INPUT = 0
+
+
+async def run_daq(servers: Mapping[str, DaqServer], tell: Tell, *, controlled: bool) -> None:
+    """Serve until SIGINT or SIGTERM, or until standard input ends.
+
+    Prints lines of JSON: first the endpoint of each unit, later ``{"ended": unit}`` when the
+    recording of a unit ends, and the answer to each command.
+
+    Parameters
+    ----------
+    controlled
+        Whether commands are read from standard input, whose end then ends the DAQ.
+
+    Raises
+    ------
+    AcquisitionError
+        If a server cannot listen, or fails later.
+    """
+    stopped = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stopped.set)
+    async with AsyncExitStack() as stack:
+        for server in servers.values():
+            await stack.enter_async_context(server)
+        tell(json.dumps({unit: dict(server.endpoint) for unit, server in servers.items()}))
+        try:
+            await _serve_all(servers, tell, stopped, controlled)
+        except ExceptionGroup as errors:
+            _, others = errors.split(AcquisitionError)
+            raise errors if others else errors.exceptions[0] from None
+
+
+async def _serve_all(
+    servers: Mapping[str, DaqServer], tell: Tell, stopped: asyncio.Event, controlled: bool
+) -> None:
+    async with asyncio.TaskGroup() as tasks:
+        running = [tasks.create_task(_serve(*entry, tell)) for entry in servers.items()]
+        if controlled:
+            running.append(tasks.create_task(_obey(servers, tell, stopped)))
+        await stopped.wait()
+        for task in running:
+            task.cancel()
+
+
+async def _serve(unit: str, server: DaqServer, tell: Tell) -> None:
+    await server.run()
+    tell(json.dumps({"ended": unit}))
+
+
+async def _obey(servers: Mapping[str, DaqServer], tell: Tell, stopped: asyncio.Event) -> None:
+    lines: asyncio.Queue[str] = asyncio.Queue()
+    reading = (asyncio.get_running_loop(), lines.put_nowait)
+    threading.Thread(target=_read_lines, args=reading, daemon=True, name="commands").start()
+    while line := await lines.get():
+        tell(json.dumps(obeyed(servers, line)))
+    stopped.set()
+
+
+def _read_lines(loop: asyncio.AbstractEventLoop, hear: Callable[[str], None]) -> None:
+    """Pass standard input on line by line, then an empty line; event loops cannot read files.
+
+    Lines are dropped once the event loop is closed.
+    """
+    with suppress(RuntimeError):
+        with suppress(OSError), open(os.dup(_STANDARD_INPUT), errors="replace") as lines:
+            for line in lines:
+                loop.call_soon_threadsafe(hear, line)
+        loop.call_soon_threadsafe(hear, "")
+
+
+def obeyed(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
+    """Execute one command: ``UNIT FAULT [COUNT]``.
+
+    Returns
+    -------
+    dict
+        The command under "done", or the reason of its refusal under "refused".
+    """
+    words = line.split()
+    if len(words) not in (2, 3) or (len(words) == 3 and not words[2].isdecimal()):
+        return {"refused": f"{line.strip()!r} is not UNIT FAULT [COUNT]"}
+    unit, fault, *count = words
+    if count and int(count[0]) > MAX_COUNT:
+        return {"refused": f"COUNT is {count[0]}, at most {MAX_COUNT}"}
+    if unit not in servers:
+        return {"refused": f"no unit {unit} here; there are {', '.join(servers)}"}
+    try:
+        servers[unit].inject(fault, *map(int, count))
+    except LookupError as error:
+        return {"refused": str(error.args[0])}
+    return {"done": " ".join(words)}
+
+
+VECTOR_WINDOW_S = 10.0
+"""Analysis window of a simulated rack: fifteen turns of a slow machine."""
+
+
+def polled_device(
+    source: ModbusPolledSettings,
+    unit: Unit,
+    calibration: UnitCalibration,
+    feed: SampleFeed,
+    *,
+    on_demand: bool,
+) -> MapDevice:
+    """Build a device whose registers hold the newest sample of a feed."""
+    rows = [channel.id for channel in unit.channels]
+    device = MapDevice(feed, source.registers, rows, calibration, unit.id)
+    device.on_demand = on_demand
+    return device
+
+
+def vector_device(
+    source: ModbusVectorSettings,
+    unit: Unit,
+    calibration: UnitCalibration,
+    feed: SampleFeed,
+    *,
+    on_demand: bool,
+) -> VectorDevice:
+    """Build a rack that computes vectors from a feed at each poll.
+
+    Raises
+    ------
+    LookupError
+        If the unit has no speed channel.
+    """
+    if unit.speed_channel is None:
+        raise LookupError(f"a simulated rack of unit {unit.id} needs its speed_channel")
+    step_samples = max(1, round(min(source.poll_period_s, 1.0) * calibration.rate_hz))
+    window_samples = max(1, round(VECTOR_WINDOW_S * calibration.rate_hz))
+    device = VectorDevice(
+        feed,
+        source.registers,
+        source.rows,
+        calibration,
+        channels=[channel.id for channel in unit.channels],
+        speed_channel=unit.speed_channel,
+        unit=unit.id,
+        step_samples=step_samples,
+        window_samples=max(window_samples, step_samples),
+    )
+    device.on_demand = on_demand
+    return device
+
+
+def fifo_device(
+    source: ModbusFifoSettings, unit: Unit, feed: SampleFeed, *, on_demand: bool
+) -> FifoDevice:
+    """Build a device that queues the samples of a feed."""
+    device = FifoDevice(feed, source.fifo_layout(len(unit.channels)), unit.id)
+    device.on_demand = on_demand
+    return device
+
+
+def modbus_server(
+    device: ModbusDevice, source: ModbusLinkSettings, clock: Clock | None, *, patient: bool
+) -> ModbusServer:
+    """Build the server of a device at the address of a source, on TCP or a serial line.
+
+    Parameters
+    ----------
+    clock
+        Paces the device; without one it produces as fast as its reader reads.
+    patient
+        Whether time starts with the reader's first request.
+    """
+    if source.host is not None:
+        return ModbusTcpServer(device, clock, source.host, source.port, patient=patient)
+    line = None if source.device in (None, "pty") else Path(source.device)
+    return ModbusRtuServer(device, clock, line, patient=patient)
+
+
+def daq_of(
+    unit: UnitSettings, feed: SampleFeed, clock: Clock | None, *, recorded: bool
+) -> DaqServer:
+    """Build a DAQ of the kind that a unit's source reads.
+
+    Parameters
+    ----------
+    clock
+        Paces the device; without one it produces as fast as its reader reads.
+    recorded
+        Whether the feed is a recording: the device waits for its reader and loses nothing.
+
+    Raises
+    ------
+    ConfigError
+        If the unit does not fit into such a device.
+    LookupError
+        If the unit's source reads no device.
+    """
+    source, machine = unit.source, machine_of(unit)
+    on_demand = clock is None
+    match source:
+        case ModbusRingSettings():
+            device = RingDevice(feed, unit.id, _ring_shape(unit, source))
+            device.on_demand, device.patient = on_demand, recorded
+            return modbus_server(device, source, clock, patient=recorded)
+        case ModbusFifoSettings():
+            queue = fifo_device(source, machine, feed, on_demand=on_demand)
+            return modbus_server(queue, source, clock, patient=recorded)
+        case ModbusPolledSettings():
+            registers = polled_device(
+                source, machine, calibration_of(unit), feed, on_demand=on_demand
+            )
+            return modbus_server(registers, source, clock, patient=recorded)
+        case ModbusVectorSettings():
+            rack = vector_device(source, machine, calibration_of(unit), feed, on_demand=on_demand)
+            return modbus_server(rack, source, clock, patient=recorded)
+        case CanSettings():
+            return can_daq_of(unit, source, feed, clock, patient=recorded)
+        case SimulatedSettings():
+            raise LookupError(f'the source of unit {unit.id} is of kind "simulated": no DAQ')
+
+
+def _ring_shape(unit: UnitSettings, source: ModbusRingSettings) -> RingDeviceSettings:
+    """Return the ring of the unit's simulation, otherwise slots as long as its blocks."""
+    if unit.simulation is None:
+        return RingDeviceSettings(
+            base_address=source.base_address, samples_per_slot=unit.block_samples
+        )
+    return RingDeviceSettings(
+        base_address=source.base_address,
+        samples_per_slot=unit.simulation.samples_per_slot,
+        n_slots=unit.simulation.n_slots,
+    )
+
+
+_LOOPBACK = "127.0.0.1"
+
+
+STALE_AFTER_S = 5.0
+"""Silence after which a finished run ends; longer than a start takes."""
+
+
+class Wire(StrEnum):
+    """Protocol and transport."""
+
+    MODBUS_TCP = "modbus_tcp"
+    MODBUS_RTU = "modbus_rtu"
+    CAN = "can"
+    CAN_FD = "can_fd"
+
+
+def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
+    """Return the plant with all units behind DAQs on this wire, at addresses still to be set."""
+    units = tuple(
+        # where each sample is a poll, the recording has the rate of the polls
+        unit.model_copy(update={"source": _source(wire), "rate_hz": unit.sampling_hz})
+        for unit in plant.unit
+    )
+    return plant.model_copy(update={"unit": units})
+
+
+def _source(wire: Wire) -> SourceSettings:
+    """Polls follow each other quickly: how long a replay takes is a matter of its speed."""
+    if wire in (Wire.CAN, Wire.CAN_FD):
+        return CanSettings(
+            kind="can",
+            interface="slcan",
+            channel=f"socket://{_LOOPBACK}:0",
+            fd=wire is Wire.CAN_FD,
+            profile="padwatch_int16",
+            stale_after_s=STALE_AFTER_S,
+            when_full="wait",
+        )
+    where = {"host": _LOOPBACK, "port": 0} if wire is Wire.MODBUS_TCP else {"device": "pty"}
+    return ModbusRingSettings(
+        kind="modbus_ring", **where, poll_period_s=0.02, timeout_s=2.0, stale_after_s=STALE_AFTER_S
+    )

@@ -1,0 +1,314 @@
+"""Storage of a plant file: store, recordings, evidence, retention and disk watch."""
+
+from collections.abc import Callable
+from functools import partial
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from acquisition.clock import Clock
+from acquisition.recordings.writer import RecordingWriter
+from core.units import DAY_NS
+from service.api.downloads import Downloads
+from service.app.recordings import recording_writer
+from service.live.live_view import LiveView
+from service.measuring.alarm_engine import AlarmEngine
+from service.measuring.films import FilmKeeper
+from service.recordings.around_alarms import Captures, CaptureSettings
+from service.recordings.continuous_recorder import Shed, Tape
+from service.recordings.folders import place_of
+from service.recordings.index import Index
+from service.recordings.keeper import WatchKeeping, WaveformKeeper
+from service.recordings.retention import Caretaker, Custody, Gauge, RoomLimits
+from service.recordings.segment import MakeWriter, TapeSettings
+from service.reports.archive import EvidenceArchive
+from service.reports.capture_link import captures_in_use
+from service.reports.keeper import EvidenceFolders, EvidenceKeeper
+from service.reports.maker import Maker
+from service.reports.room import EvidenceLimits, EvidenceRoom
+from service.reports.routes import EvidenceDesk
+from service.reports.snapshot import Camera
+from service.reports.writer import EvidenceWriter
+from service.runtime.disk import SpaceLimits, SpaceWatch, measure_disk
+from service.settings.adapter_values import recorded_unit
+from service.settings.configuration import Configuration, built_from, configuration_of
+from service.settings.core_values import analysis_of, film_rules_of
+from service.settings.plant import PlantFile, SpectraSettings
+from service.settings.sources.devices import ModbusVectorSettings
+from service.settings.storage import Origin, RetentionSettings, SpaceSettings
+from service.settings.units import UnitSettings
+from service.store.access.audit_verification import head_path
+from service.store.audit import Trail
+from service.store.outbox import Address, nobody
+from service.store.port import Store
+from service.store.retention.limits import RetentionLimits
+from service.store.spectra_port import SpectraLimits, TierLimits
+from service.store.sqlite import SqliteStore
+from service.store.sqlite.trail import file_trail
+from service.store.waveform_port import WaveformKind
+
+if TYPE_CHECKING:
+    from service.store.postgres.address import PostgresAddress
+
+DATABASE = "padwatch.sqlite3"
+
+
+def database_path(plant: PlantFile) -> Path:
+    """Return the path of the plant's database file, whether it exists or not."""
+    return Path(plant.service.data_folder) / DATABASE
+
+
+def has_store(plant: PlantFile) -> bool:
+    """Return whether the database exists; a database on a server must exist."""
+    return plant.store.postgresql is not None or database_path(plant).exists()
+
+
+def store_name(plant: PlantFile) -> str:
+    """Return the name of the plant's database for messages."""
+    if plant.store.postgresql is not None:
+        return _postgres_address(plant, plant.store.postgresql).name
+    return str(database_path(plant).absolute())
+
+
+def head_file(plant: PlantFile) -> Path:
+    """Return the file on this host that names the newest entry of the audit trail."""
+    if plant.store.postgresql is not None:
+        return head_path(Path(plant.service.data_folder) / "postgresql")
+    return head_path(database_path(plant))
+
+
+def open_store(plant: PlantFile, origin: Origin = Origin.LIVE, address: Address = nobody) -> Store:
+    """Open the plant's database: a file, created if missing, or a PostgreSQL database.
+
+    Parameters
+    ----------
+    address
+        Returns the recipients of an alarm event.
+
+    Raises
+    ------
+    StoreError
+        If the database cannot be used, or holds results of the other origin.
+    """
+    spectra = spectra_limits(plant.spectra)
+    if plant.store.postgresql is None:
+        return SqliteStore(database_path(plant), origin, address, spectra)
+    from service.store.postgres import PostgresStore  # imported late: slow to load
+
+    where = _postgres_address(plant, plant.store.postgresql)
+    return PostgresStore(where, head_file(plant), origin, address, spectra)
+
+
+def open_trail(plant: PlantFile) -> Trail:
+    """Open the audit trail of the plant's database for reading."""
+    if plant.store.postgresql is None:
+        return file_trail(database_path(plant))
+    from service.store.postgres.trail import server_trail
+
+    return server_trail(_postgres_address(plant, plant.store.postgresql), head_file(plant))
+
+
+def _postgres_address(plant: PlantFile, conninfo: str) -> "PostgresAddress":
+    from service.store.postgres.address import PostgresAddress
+
+    return PostgresAddress(conninfo, plant.store.password_path)
+
+
+def spectra_limits(settings: SpectraSettings) -> SpectraLimits:
+    """Return the limits of stored spectra."""
+    return SpectraLimits(
+        TierLimits(settings.dense_every_s, settings.n_dense),
+        TierLimits(settings.sparse_every_s, settings.n_sparse),
+        settings.n_lines,
+    )
+
+
+CAPTURES = "captures"
+
+BYTES_PER_GB = 1e9
+
+
+def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
+    """Build the captures of all units of a live plant; a replay plays recordings already."""
+    found = plant.capture
+    kept = origin is Origin.LIVE and found.samples == "kept"
+    # a vector rack has no samples
+    waveforms = [u for u in plant.unit if not isinstance(u.source, ModbusVectorSettings)]
+    units = waveforms if kept else []
+    settings = CaptureSettings(
+        pre_s=found.pre_s,
+        post_s=found.post_s,
+        max_s=found.max_s,
+        window_s=max((_window_s(plant, unit) for unit in units), default=0.0),
+    )
+    return Captures(
+        Path(plant.service.data_folder) / CAPTURES,
+        settings,
+        {unit.id: _writer_of(unit) for unit in units},
+        {unit.id: unit.sampling_hz for unit in units},
+        clock,
+    )
+
+
+def _window_s(plant: PlantFile, unit: UnitSettings) -> float:
+    """Return the length of an averaging window of a watched film; 0 if none is watched."""
+    if isinstance(film_rules_of(unit, plant.films), str):
+        return 0.0
+    analysis = analysis_of(plant.analysis)
+    n_samples = analysis.segment_samples + (analysis.n_segments - 1) * analysis.hop_samples
+    return n_samples / unit.sampling_hz
+
+
+def _writer_of(unit: UnitSettings) -> MakeWriter:
+    make: partial[RecordingWriter] = partial(recording_writer, unit)
+    return make
+
+
+RECORDINGS = "recordings"
+
+
+def recordings_folder(plant: PlantFile) -> Path:
+    """Return the folder of continuous recordings of a plant."""
+    return Path(plant.recording.folder or Path(plant.service.data_folder) / RECORDINGS)
+
+
+def tape_of(
+    plant: PlantFile, origin: Origin, clock: Clock, press: Callable[[], Shed | None]
+) -> Tape:
+    """Build the continuous recorder of the units of a live plant that are to be recorded."""
+    found = plant.recording
+    units = {
+        unit.id: recorded_unit(unit)
+        for unit in plant.unit
+        # a vector rack has no samples; a replay plays recordings already
+        if found.keeps(unit.id)
+        and origin is Origin.LIVE
+        and not isinstance(unit.source, ModbusVectorSettings)
+    }
+    settings = TapeSettings(60.0 * found.length_min, found.sync_s)
+    owned = [unit.id for unit in plant.unit] if origin is Origin.LIVE else []
+    return Tape(recordings_folder(plant), units, settings, clock, press, owned)
+
+
+EVIDENCE, CONFIGURATIONS = "evidence", "configurations"
+
+
+def evidence_folders(plant: PlantFile) -> EvidenceFolders:
+    """Return the folders of evidence of a plant."""
+    root = Path(plant.service.data_folder)
+    return EvidenceFolders(root / EVIDENCE, root / CAPTURES, root / CONFIGURATIONS)
+
+
+def evidence_desk(
+    plant: PlantFile, store: Store, keeper: EvidenceKeeper, clock: Clock, downloads: Downloads
+) -> EvidenceDesk:
+    """Build the service that hands out evidence."""
+    archive = EvidenceArchive(evidence_folders(plant), store)
+    return EvidenceDesk(archive, keeper, plant.evidence.trend_days, clock, downloads)
+
+
+def evidence_of(
+    plant: PlantFile,
+    origin: Origin,
+    live: LiveView,
+    films: FilmKeeper,
+    store: Store,
+    captures: Captures,
+    clock: Clock,
+) -> EvidenceKeeper:
+    """Build the collector of evidence; `watch` connects it to the alarms."""
+    limits, folders = limits_of(plant), evidence_folders(plant)
+    configuration = built_configuration(plant)
+    maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
+    writer = EvidenceWriter(folders.evidence, maker, store.films, limits)
+    camera = Camera({unit.id: unit for unit in plant.unit}, live, films)
+    room = EvidenceRoom(folders.evidence, limits, clock)
+    return EvidenceKeeper(folders, camera, writer, room, configuration, captures, clock)
+
+
+def watch(keeper: EvidenceKeeper, alarms: AlarmEngine, captures: Captures, origin: Origin) -> None:
+    """Connect the collector of evidence to the alarms; a replay collects no evidence."""
+    if origin is Origin.LIVE:
+        alarms.show(keeper.see)
+        captures.tell(keeper.captured)
+
+
+def built_configuration(plant: PlantFile) -> Configuration:
+    """Return the plant file as this build reads it, without secrets."""
+    return configuration_of(plant, version("padwatch"), built_from())
+
+
+def limits_of(plant: PlantFile) -> EvidenceLimits:
+    """Return the limits of stored evidence."""
+    found = plant.evidence
+    return EvidenceLimits(
+        max_bytes=round(found.max_gb * BYTES_PER_GB),
+        hard_max_bytes=round(found.hard_max_gb * BYTES_PER_GB),
+        keep_days=found.keep_days,
+        max_per_alarm=found.max_per_alarm,
+        trend_days=found.trend_days,
+    )
+
+
+def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:
+    """Build the watch of all disks with data of the plant; captures may have their own."""
+    data = Path(plant.service.data_folder)
+    folders = {"data": data, CAPTURES: data / CAPTURES, EVIDENCE: data / EVIDENCE}
+    if plant.recording.samples == "kept":
+        folders[RECORDINGS] = recordings_folder(plant)
+    return SpaceWatch(folders, space_limits(plant.space), clock)
+
+
+def space_limits(settings: SpaceSettings) -> SpaceLimits:
+    """Return the disk limits of the plant file."""
+    return SpaceLimits(
+        settings.alert_free_share,
+        settings.danger_free_share,
+        round(settings.alert_free_gb * BYTES_PER_GB),
+        round(settings.danger_free_gb * BYTES_PER_GB),
+    )
+
+
+def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> WaveformKeeper:
+    """Build the keeper of the recordings of a live plant."""
+    data, custody = Path(plant.service.data_folder), custody_of(plant)
+
+    def hire() -> Caretaker:
+        return Caretaker(custody, Index(store.waveforms, place_of(data)), clock)
+
+    return WaveformKeeper(custody.gauge, hire, clock, WatchKeeping(data))
+
+
+def custody_of(plant: PlantFile) -> Custody:
+    """Return the folders of recordings and the rules of their retention."""
+    data = Path(plant.service.data_folder)
+    room = RoomLimits(
+        continuous_bytes=round(plant.recording.max_gb * BYTES_PER_GB),
+        capture_bytes=round(plant.capture.max_gb * BYTES_PER_GB),
+        continuous_days=plant.recording.max_days,
+    )
+    roots = {
+        WaveformKind.CAPTURE: data / CAPTURES,
+        WaveformKind.CONTINUOUS: recordings_folder(plant),
+    }
+    return Custody(
+        roots=roots,
+        room=room,
+        gauge=Gauge(roots, space_limits(plant.space), measure_disk),
+        bound=partial(captures_in_use, data / EVIDENCE),
+    )
+
+
+def retention_limits(settings: RetentionSettings) -> RetentionLimits:
+    """Return the retention limits of the plant file; an age of 0 keeps data for ever."""
+    return RetentionLimits(
+        readings_ns=_age_ns(settings.readings_days),
+        minutes_ns=_age_ns(settings.minutes_days),
+        ten_minutes_ns=_age_ns(settings.ten_minutes_days),
+        films_ns=_age_ns(settings.films_days),
+        letters_ns=_age_ns(settings.messages_days),
+    )
+
+
+def _age_ns(days: float) -> int | None:
+    return round(days * DAY_NS) if days > 0.0 else None

@@ -1,0 +1,318 @@
+"""The back-test of all units of a file: run, list and export."""
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from core.baseline.baseline import BearingBaseline
+from core.baseline.history import ReadingOutcome, StiffnessHistory
+from core.change.shaft_response import ShaftResponse
+from core.condition.operating_state import STEADY
+from core.units import DAY_NS
+from service.cli.offline.backtest_bearing import (
+    BackTestRules,
+    BearingRun,
+    MachineEvent,
+    run_bearing,
+)
+from service.cli.offline.backtest_causes import UnitCauses
+from service.cli.offline.backtest_cells import ReadingsError
+from service.cli.offline.backtest_files import IDENTIFIER
+from service.cli.offline.backtest_histories import BearingRows, Place
+from service.cli.offline.backtest_report import (
+    AlarmReport,
+    BackTestReport,
+    ChangeReport,
+    FilmReport,
+    RateReport,
+    alarm_reports,
+    film_reports,
+)
+from service.store.documents import to_json
+
+YEAR_NS = 365.25 * DAY_NS
+APART = 2.0
+"""Largest ratio of a reading's length to the time between readings without a warning."""
+
+
+@dataclass
+class Found:
+    """Results of a back-test so far."""
+
+    films: list[FilmReport] = field(default_factory=list)
+    alarms: list[AlarmReport] = field(default_factory=list)
+    baselines: list[BearingBaseline] = field(default_factory=list)
+    responses: list[tuple[str, int, ShaftResponse]] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+    unit_years: float = 0.0
+
+    def rate(self) -> RateReport:
+        """Return the rate of alarms."""
+        n_alarms = len(self.alarms)
+        return RateReport(
+            unit_years=self.unit_years,
+            n_alarms=n_alarms,
+            n_danger=sum(alarm.level == "danger" for alarm in self.alarms),
+            alarms_per_unit_year=n_alarms / self.unit_years if self.unit_years else None,
+        )
+
+
+def run_back_test(
+    histories: Mapping[Place, BearingRows],
+    rules: BackTestRules,
+    advanced: Callable[[int], object] = lambda _: None,
+) -> Found:
+    """Learn and decide over all histories.
+
+    Parameters
+    ----------
+    advanced
+        Called with the number of further rows processed.
+
+    Raises
+    ------
+    ReadingsError
+        If an event names a bearing without readings, or operating states are unknown.
+    """
+    found = Found(doubts=list(_doubts(histories, rules)))
+    _check_events(histories, rules)
+    for unit, places in groupby(sorted(histories), key=lambda place: place[0]):
+        runs = []
+        for place in places:
+            runs.append(run_bearing(place, histories[place], rules))
+            advanced(sum(histories[place].n_rows))
+        _take_unit(found, unit, runs, rules)
+    found.alarms.sort(key=lambda a: (a.begin, a.unit, a.bearing, a.direction))
+    return found
+
+
+def _take_unit(found: Found, unit: str, runs: Sequence[BearingRun], rules: BackTestRules) -> None:
+    causes = UnitCauses(unit, runs, rules)
+    found.alarms += alarm_reports(runs, causes)
+    for run in runs:
+        found.films += film_reports(run)
+        found.baselines += [p.baseline for p in run.periods if p.baseline is not None]
+        found.doubts += [
+            f"{' '.join(run.place)} baseline {p.period.version}: {p.doubt}; the service would leave"
+            " it to an engineer"
+            for p in run.periods
+            if p.doubt
+        ]
+        found.doubts += [
+            f"{' '.join(run.place)} baseline {p.period.version}: {p.far}"
+            for p in run.periods
+            if p.far
+        ]
+        found.doubts += _unsettled(run)
+    found.responses += [
+        (unit, number, response)
+        for number, response in enumerate(causes.responses, start=1)
+        if response is not None
+    ]
+    found.unit_years += max(_compared_ns(run) for run in runs) / YEAR_NS
+
+
+def _unsettled(run: BearingRun) -> Iterator[str]:
+    """Yield why nothing was learned or judged, if the bearing never warmed up."""
+    n = int(np.isin(run.operation.state, [int(state) for state in STEADY]).sum())
+    if n and not run.operation.is_settled.any():
+        yield (
+            f"{' '.join(run.place)}: none of {n} readings at speed was settled, so that nothing was"
+            " learned or judged: each run ends before the oil temperature has settled"
+        )
+
+
+def _compared_ns(run: BearingRun) -> int:
+    """Return the time from the end of learning to the last reading, summed over periods."""
+    time_ns = run.rows.history.time_ns
+    return sum(
+        int(time_ns[p.period.end - 1] - time_ns[p.period.learned])
+        for p in run.periods
+        if p.period.learned < p.period.end
+    )
+
+
+def _check_events(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> None:
+    for event in rules.events:
+        if not any(event.is_about(*place) for place in histories):
+            name = event.unit + (f"/{event.bearing}" if event.bearing else "")
+            raise ReadingsError(f"event of {name}: there are no readings of it")
+
+
+def _doubts(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> Iterator[str]:
+    """Yield warnings about the validity of the results."""
+    told_h = rules.baseline.reading_h
+    for (unit, bearing), rows in histories.items():
+        history = rows.history
+        if len(history) > 1:
+            apart_h = float(np.median(np.diff(history.time_ns))) / 3.6e12
+            if not told_h / APART <= apart_h <= told_h * APART:
+                yield (
+                    f"{unit} {bearing}: readings are {60 * apart_h:.3g} min apart and are taken to"
+                    f" stand for {60 * told_h:.3g} min each; set reading_period_s"
+                )
+        if n := _without_condition(history):
+            yield (
+                f"{unit} {bearing}: {n} of {len(history)} readings have a good stiffness but no"
+                " eccentricity_ratio or no oil_temperature_c; they were neither learned nor judged"
+            )
+        if rules.baseline.uses_attitude and not np.isfinite(history.attitude_deg).any():
+            yield f"{unit} {bearing}: no attitude_deg, so that its baseline does without"
+
+
+def _without_condition(history: StiffnessHistory) -> int:
+    is_good = np.any(history.outcome == ReadingOutcome.MEASURED, axis=0)
+    is_known = np.isfinite(history.eccentricity_ratio) & np.isfinite(history.oil_temperature_c)
+    return int(np.sum(is_good & ~is_known))
+
+
+def export_baselines(found: Found, folder: Path) -> int:
+    """Write everything that was learned into a new folder; return how many files.
+
+    Raises
+    ------
+    OSError
+        If the folder exists, or cannot be written.
+    """
+    folder.mkdir(parents=True)
+    files = list(_files(found))
+    for name, text in files:
+        (folder / name).write_text(text, encoding="utf-8")
+    return len(files)
+
+
+def _files(found: Found) -> Iterator[tuple[str, str]]:
+    for baseline in found.baselines:
+        of = baseline.origin
+        yield f"{of.unit}-{of.bearing}-v{of.version}.json", to_json(baseline)
+    for unit, number, response in found.responses:
+        yield f"{unit}-shaft-response-v{number}.json", to_json(response)
+
+
+VERDICTS = {
+    "normal": "normal",
+    "alert": "alert",
+    "danger": "danger",
+    "gathering_evidence": "gathering",
+    "no_baseline": "no_basel.",
+    "insufficient_excitation": "no_excit.",
+    "bad_quality": "bad_qual.",
+    "transient": "transient",
+}
+
+
+def lines_of(report: BackTestReport) -> Iterator[str]:
+    """All of it."""
+    yield f"{report.file}: {report.rows} rows"
+    yield from (f"  doubtful: {doubt}" for doubt in report.doubts)
+    yield "\nReadings by verdict"
+    yield from _film_lines(report.films)
+    yield "\nBaselines"
+    yield from _baseline_lines(report.films)
+    yield f"\nAlarms: {len(report.alarms)}"
+    for alarm in report.alarms:
+        yield from _alarm_lines(alarm)
+    rate = report.rate
+    per_year = "—" if rate.alarms_per_unit_year is None else f"{rate.alarms_per_unit_year:.3f}"
+    yield (
+        f"\n{rate.n_alarms} alarms ({rate.n_danger} of danger) in {rate.unit_years:.2f} unit-years"
+        f" after learning: {per_year} per unit-year"
+    )
+    yield f"{report.readings_per_s:.0f} readings/s, {report.duration_s:.1f} s"
+
+
+def _film_lines(films: Sequence[FilmReport]) -> Iterator[str]:
+    heads = "".join(f"{word:>10}" for word in VERDICTS.values())
+    yield f"  {'film':<22}{'learning':>9}{heads}{'judged':>9}{'alarms':>8}"
+    for film in films:
+        counts = "".join(f"{film.verdicts[key]:>10}" for key in VERDICTS)
+        judged = "—" if film.judged_percent is None else f"{film.judged_percent:.1f} %"
+        yield f"  {_name(film):<22}{film.learning:>9}{counts}{judged:>9}{film.n_alarms:>8}"
+
+
+def _baseline_lines(films: Sequence[FilmReport]) -> Iterator[str]:
+    for film in films:
+        for found in film.baselines:
+            event = f" after {found.event!r}" if found.event else ""
+            said = f"  {_name(film):<22}{found.learned_from} to {found.learned_until}{event}: "
+            if not found.is_learned:
+                yield said + "too few readings to learn from"
+                continue
+            yield said + (
+                f"{found.cells_own} cells of its own, {found.cells_borrowed} borrowed,"
+                f" {found.cells_without_support} without support,"
+                f" scatter {found.scatter_percent:.2f} %, {found.rejected_percent:.1f} % rejected"
+            )
+
+
+def _alarm_lines(alarm: AlarmReport) -> Iterator[str]:
+    name = f"{alarm.unit} {alarm.bearing} {alarm.direction}"
+    yield f"  {alarm.begin} to {alarm.end or 'the last reading':<24} {name}, {alarm.level}"
+    danger = f", danger from {alarm.danger}" if alarm.danger else ""
+    yield f"    {_change(alarm.raised)}, at most {_change(alarm.largest)}{danger}"
+    found = alarm.condition
+    yield (
+        f"    {found.state}, eccentricity {_number(found.eccentricity_ratio, '.3f')},"
+        f" oil {_number(found.oil_temperature_c, '.1f')} °C"
+    )
+    yield f"    cause: {alarm.cause.cause} ({alarm.cause.reason})"
+    if alarm.later_cause.cause != alarm.cause.cause:
+        yield f"    a day later: {alarm.later_cause.cause} ({alarm.later_cause.reason})"
+
+
+def _change(found: ChangeReport) -> str:
+    return f"{found.percent:+.1f} ± {found.u_percent:.1f} % over {found.time_scale_h:g} h"
+
+
+def _number(value: float | None, form: str) -> str:
+    return "—" if value is None else format(value, form)
+
+
+def _name(film: FilmReport) -> str:
+    return f"{film.unit} {film.bearing} {film.direction}"
+
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+_EVENT = re.compile(
+    r"(?P<unit>[^\s/]+)(?:/(?P<bearing>[^\s/]+))?\s+(?P<time>\S+)(?:\s+(?P<text>.*))?"
+)
+MAX_TEXT = 200
+
+
+def time_ns_of(text: str) -> int:
+    """Nanoseconds since 1970.
+
+    Raises
+    ------
+    ValueError
+        If it is no time of ISO 8601, or has no offset from UTC: local time would be a guess.
+    """
+    try:
+        moment = datetime.fromisoformat(text)
+    except ValueError as error:
+        raise ValueError(f"{text!r:.60} is not a time like 2026-03-01T08:00:00Z") from error
+    if moment.tzinfo is None:
+        raise ValueError(f"{text!r:.60} needs an offset from UTC, such as a trailing Z")
+    return (moment - _EPOCH) // timedelta(microseconds=1) * 1000
+
+
+def event_of(text: str) -> MachineEvent:
+    """Read an event, written ``UNIT[/BEARING] TIME [WORDS]``.
+
+    Raises
+    ------
+    ValueError
+        If it is written otherwise.
+    """
+    found = _EVENT.fullmatch(text.strip())
+    names = [found["unit"], found["bearing"]] if found else []
+    if not found or not all(name is None or IDENTIFIER.fullmatch(name) for name in names):
+        example = "'U1 2026-03-01T08:00:00Z overhaul' or 'U1/UJB 2026-03-01T08:00:00Z new pads'"
+        raise ValueError(f"{text!r:.60} is not an event like {example}")
+    words = (found["text"] or "machine event")[:MAX_TEXT]
+    return MachineEvent(found["unit"], found["bearing"], time_ns_of(found["time"]), words)

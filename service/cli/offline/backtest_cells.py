@@ -1,0 +1,256 @@
+"""Columns of a file of readings, their values, and the errors found in them."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from core.arrays import TimeArray
+
+MAX_NAMED = 10
+"""Rows named in an error."""
+
+MAX_SHOWN = 40
+"""Characters of a wrong value that are shown."""
+
+
+class RowProblems:
+    """Problems by row, up to the number that an error names.
+
+    Parameters
+    ----------
+    line : (n,)
+        Number of each row in messages.
+    word
+        What `line` counts: "line" or "row".
+    """
+
+    def __init__(self, line: TimeArray, word: str = "line") -> None:
+        self._line, self._word = line, word
+        self._found: list[tuple[int, str]] = []
+        self._n_found = 0
+
+    def add(
+        self,
+        wrong: npt.NDArray[np.bool_ | np.int64],
+        text: str,
+        value: Callable[[int], Any] | None = None,
+    ) -> None:
+        """Add a problem of some rows, given by mask or number, with the value in each row."""
+        rows = np.flatnonzero(wrong) if wrong.dtype == np.bool_ else wrong
+        self._n_found += rows.size
+        lines = self._line[rows]
+        for n in np.argsort(lines, kind="stable")[:MAX_NAMED]:
+            words = text if value is None else f"{text} {shown(value(int(rows[n])))}"
+            self._found.append((int(lines[n]), words))
+
+    def refuse(self) -> None:
+        """Raise if there is any problem.
+
+        Raises
+        ------
+        ValueError
+            With line numbers.
+        """
+        if not self._found:
+            return
+        found = sorted(self._found)[:MAX_NAMED]
+        said = [f"{self._word} {line}: {text}" for line, text in found]
+        if self._n_found > len(found):
+            said.append(f"and {self._n_found - len(found)} more")
+        raise ValueError("; ".join(said))
+
+
+def shown(value: Any) -> str:
+    """Return a wrong value as messages show it."""
+    text = repr(value)
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
+
+
+TIME, TIME_NS, LINE = "time", "time_ns", "line"
+NAMES, OPTIONAL_NAMES = ("unit", "bearing", "direction", "quality"), ("state", "reason")
+STIFFNESS = ("k_n_per_m", "u_random")
+PER_BEARING = (
+    *("eccentricity_ratio", "oil_temperature_c", "speed_rpm", "power_mw"),
+    *("u_eccentricity", "attitude_deg"),
+)
+"""Columns that are the same for both directions."""
+
+AMPLITUDES = ("shaft_um_pk", "bearing_um_pk")
+NUMBERS = (*STIFFNESS, *PER_BEARING, *AMPLITUDES)
+REQUIRED = (*NAMES, *STIFFNESS, "eccentricity_ratio", "oil_temperature_c")
+"""Columns that a file must have beside the time; missing numbers of the others are NaN."""
+
+TEXTS = (*NAMES, *OPTIONAL_NAMES)
+HEADINGS = (TIME, *NAMES, *NUMBERS, *OPTIONAL_NAMES)
+"""All columns, in the order in which padwatch writes them."""
+
+SILENT = "insufficient_excitation"
+"""Quality, or reason, of a reading without enough motion to measure stiffness."""
+
+MAX_COLUMNS = 100
+MAX_ROWS = 40_000_000
+"""Rows of one file: 20 units of 3 bearings for 6 years; about 230 bytes of memory each."""
+
+
+class ReadingsError(Exception):
+    """A file of readings that cannot be used; the message says where it is wrong."""
+
+
+def check_headings(headings: Sequence[str]) -> None:
+    """Refuse headings that are missing, unknown or repeated.
+
+    Raises
+    ------
+    ReadingsError
+        Naming them.
+    """
+    if len(headings) > MAX_COLUMNS:
+        raise ReadingsError(f"{len(headings)} columns; at most {MAX_COLUMNS} are read")
+    problems = list(_problems(headings))
+    if problems:
+        raise ReadingsError("; ".join(problems))
+
+
+def schema_of(headings: Sequence[str]) -> Any:
+    """Schema of the rows of a file with these headings."""
+    texts = [(key, pa.string()) for key in TEXTS if key in headings]
+    numbers = [(key, pa.float64()) for key in NUMBERS if key in headings]
+    return pa.schema([(TIME_NS, pa.int64()), *texts, *numbers, (LINE, pa.int64())])
+
+
+def _problems(headings: Sequence[str]) -> Iterator[str]:
+    missing = [key for key in REQUIRED if key not in headings]
+    if TIME not in headings and TIME_NS not in headings:
+        missing.insert(0, f"{TIME} or {TIME_NS}")
+    if missing:
+        yield f"missing columns: {', '.join(missing)}"
+    unknown = [heading for heading in headings if heading not in (TIME_NS, *HEADINGS)]
+    if unknown:
+        yield f"unknown columns: {_listed(unknown)}; known are {TIME_NS}, {', '.join(HEADINGS)}"
+    twice = sorted({heading for heading in headings if headings.count(heading) > 1})
+    if twice:
+        yield f"columns that are there twice: {_listed(twice)}"
+    if TIME in headings and TIME_NS in headings:
+        yield f"both {TIME} and {TIME_NS}; one of them is the time"
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(shown(name) for name in names[:10]) + (", …" if len(names) > 10 else "")
+
+
+_UTC = pa.timestamp("ns", tz="UTC")
+_NO_TIME = "not a time of ISO 8601 with an offset from UTC, like 2026-03-01T08:00:00Z:"
+REASON, NO_REASON = "reason", "ok"
+"""Name of the column, and its value for a good reading."""
+
+_TIMES = "must be texts like 2026-03-01T08:00:00Z or timestamps with a zone; whole ns are time_ns"
+
+
+def converted(table: Any, line: Any, word: str) -> Any:
+    """Convert all columns of a table.
+
+    Parameters
+    ----------
+    line : (n,)
+        Number of each row in messages.
+    word
+        What the numbers count: "line" or "row".
+
+    Raises
+    ------
+    ReadingsError
+        Naming lines and values.
+    """
+    schema, problems = schema_of(table.column_names), RowProblems(line, word)
+    columns = []
+    for field in schema:
+        if field.name == LINE:
+            columns.append(pa.array(line))
+        elif field.name == TIME_NS:
+            columns.append(_time_ns(table, problems))
+        else:
+            convert = _text if field.type == pa.string() else _number
+            columns.append(convert(table.column(field.name), field.name, problems))
+    try:
+        problems.refuse()
+    except ValueError as error:
+        raise ReadingsError(str(error)) from error
+    return pa.record_batch(columns, schema=schema)
+
+
+def _time_ns(table: Any, problems: RowProblems) -> Any:
+    if TIME_NS in table.column_names:
+        column = _flat(table.column(TIME_NS))
+        if not (_is_text(column.type) or pa.types.is_integer(column.type)):
+            raise ReadingsError(f"column {TIME_NS} of type {column.type}: must be integers")
+        return _cast(column, pa.int64(), f"{TIME_NS} is no integer:", problems)
+    column = _flat(table.column(TIME))
+    is_stamp = pa.types.is_timestamp(column.type) and column.type.tz is not None
+    if not (_is_text(column.type) or is_stamp):
+        raise ReadingsError(f"column {TIME} of type {column.type}: {_TIMES}")
+    return _cast(column, _UTC, _NO_TIME, problems).cast(pa.int64())
+
+
+def _number(column: Any, key: str, problems: RowProblems) -> Any:
+    """Return a column of numbers, NaN where a number is missing."""
+    column, kind = _flat(column), column.type
+    is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)
+    if not (is_number or _is_text(kind)):
+        raise ReadingsError(f"column {key} of type {kind}: must be numbers")
+    return _cast(column, pa.float64(), f"{key} is no number:", problems, may_be_empty=True)
+
+
+def _text(column: Any, key: str, problems: RowProblems) -> Any:
+    kind = column.type
+    if not _is_text(kind.value_type if pa.types.is_dictionary(kind) else kind):
+        raise ReadingsError(f"column {key} of type {kind}: must be texts")
+    found = _flat(column.cast(pa.string()))
+    if key == REASON:
+        return found.fill_null(NO_REASON)
+    problems.add(_is_null(found), f"{key} is missing")
+    return found.fill_null("")
+
+
+def _cast(
+    column: Any, kind: Any, text: str, problems: RowProblems, may_be_empty: bool = False
+) -> Any:
+    """Convert a column at once; if that fails, find the wrong values one by one."""
+    if not may_be_empty:
+        problems.add(_is_null(column), f"{text} nothing")
+    try:
+        found = pc.cast(column, kind)
+    except pa.ArrowInvalid:
+        fits = [_fits(column.slice(row, 1), kind) for row in range(len(column))]
+        problems.add(~np.array(fits), text, lambda row: _said(column[row]))
+        found = pa.nulls(len(column), kind)
+    return found.fill_null(np.nan if pa.types.is_floating(kind) else 0)
+
+
+def _fits(value: Any, kind: Any) -> bool:
+    try:
+        pc.cast(value, kind)
+    except pa.ArrowInvalid:
+        return False
+    return True
+
+
+def _said(value: Any) -> Any:
+    """Return a value for a message; times may lie outside Python's range."""
+    is_stamp = pa.types.is_timestamp(value.type) and value.is_valid
+    return f"{value.value} {value.type.unit} since 1970" if is_stamp else value.as_py()
+
+
+def _is_null(column: Any) -> Any:
+    return column.is_null().to_numpy(zero_copy_only=False)
+
+
+def _flat(column: Any) -> Any:
+    return column.combine_chunks() if column.num_chunks == 1 else pa.concat_arrays(column.chunks)
+
+
+def _is_text(kind: Any) -> bool:
+    return bool(pa.types.is_string(kind) or pa.types.is_large_string(kind))

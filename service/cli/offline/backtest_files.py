@@ -1,0 +1,229 @@
+"""Readings for a back-test: from a file, or from the store into a file."""
+
+import re
+import stat
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.csv as pacsv
+import pyarrow.parquet as pq
+
+from acquisition.recordings.confined import ConfinedProcess
+from core.baseline.history import DIRECTIONS, ReadingOutcome
+from core.condition.operating_state import OperatingState
+from core.machine.unit import Estimator
+from core.units import DAY_NS
+from service.cli.offline.backtest_cells import (
+    AMPLITUDES,
+    LINE,
+    PER_BEARING,
+    SILENT,
+    TEXTS,
+    ReadingsError,
+    shown,
+)
+from service.cli.offline.backtest_child import WRONG_FILE
+from service.cli.offline.backtest_histories import BearingRows, Place, histories_of
+from service.cli.offline.backtest_tables import MAGIC
+from service.store.film_port import FilmHistory, FilmQuery, FilmStore
+
+MAX_NAMES = 2000
+"""Different names in a column: 200 units of at most 8 bearings."""
+
+IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
+"""Name of a unit or bearing, as in plant files."""
+
+_ENVIRONMENT = {"ARROW_DEFAULT_MEMORY_POOL": "system", "OPENBLAS_NUM_THREADS": "1"}
+"""Others take much address space, which is limited."""
+
+
+def read_histories(
+    path: Path,
+    places: Collection[Place] | None = None,
+    advanced: Callable[[int], object] = lambda _: None,
+) -> dict[Place, BearingRows]:
+    """Read a CSV or Parquet file.
+
+    Parameters
+    ----------
+    places
+        Units and bearings that there are; any, if not given.
+    advanced
+        Told how many more bytes of the file have been read.
+
+    Raises
+    ------
+    ReadingsError
+        If anything in it is wrong, with file and lines (CSV) or rows (Parquet), counted from 1.
+    """
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise ReadingsError("not a regular file")
+        with path.open("rb") as stream:
+            word = "row" if stream.read(len(MAGIC)) == MAGIC else "line"
+        return histories_of(_columns(path, word, advanced), places, word)
+    except OSError as error:
+        raise ReadingsError(f"{path}: {error.strerror}") from error
+    except (ReadingsError, ValueError) as error:
+        raise ReadingsError(f"{path}: {error}") from error
+
+
+def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mapping[str, Any]:
+    module, file = "service.cli.offline.backtest_child", str(path.absolute())
+    with closing(ConfinedProcess(module, file, environment=_ENVIRONMENT)) as process:
+        try:
+            gathered = _gathered(process, word, advanced)
+        except (pa.ArrowException, OSError):
+            raise ReadingsError(_why(process)) from None
+        if process.exit_code() != 0:
+            raise ReadingsError(_why(process))
+    columns = {}
+    for key in list(gathered):  # each is released as soon as it is joined
+        parts = gathered.pop(key)
+        if key in TEXTS:
+            columns[key] = pa.chunked_array(parts).unify_dictionaries().combine_chunks()
+        else:
+            columns[key] = np.concatenate(parts)
+    return columns
+
+
+def _gathered(
+    process: ConfinedProcess, word: str, advanced: Callable[[int], object]
+) -> dict[str, list[Any]]:
+    """Parts of each column: texts dictionary-encoded, numbers as numpy arrays."""
+    reader = pa.ipc.open_stream(process.output)
+    parts: dict[str, list[Any]] = {key: [] for key in reader.schema.names}
+    names: dict[str, set[str]] = {key: set() for key in parts if key in TEXTS}
+    before = 0
+    try:
+        while True:
+            batch, metadata = reader.read_next_batch_with_custom_metadata()
+            for key in parts:
+                if key in names:
+                    parts[key].append(pc.dictionary_encode(batch.column(key)))
+                    _check_names(key, parts[key][-1], names[key], batch.column(LINE), word)
+                else:
+                    parts[key].append(batch.column(key).to_numpy().copy())
+            n_bytes = int(metadata["n_bytes"])
+            advanced(n_bytes - before)
+            before = n_bytes
+    except StopIteration:
+        return parts
+
+
+def _check_names(key: str, column: Any, names: set[str], line: Any, word: str) -> None:
+    """Refuse names that no unit or bearing can have, and too many different ones."""
+    for code, name in enumerate(column.dictionary.to_pylist()):
+        if key in ("unit", "bearing") and not IDENTIFIER.fullmatch(name):
+            row = int(np.argmax(column.indices.to_numpy() == code))
+            raise ReadingsError(
+                f"{word} {line[row]}: {key} {shown(name)} must be letters, digits, dot,"
+                " dash or underscore, at most 32"
+            )
+        names.add(name)
+    if len(names) > MAX_NAMES:
+        raise ReadingsError(
+            f"more than {MAX_NAMES} different names in column {key} up to {word} {line[-1]}"
+        )
+
+
+def _why(process: ConfinedProcess) -> str:
+    words = process.last_words()
+    return words if process.exit_code() == WRONG_FILE else f"not readable: {words}"
+
+
+AT_ONCE_NS = 90 * DAY_NS
+"""Of one film, so that memory does not depend on how many years are stored."""
+
+SUFFIXES = (".csv", ".parquet")
+QUALITY = {
+    ReadingOutcome.MEASURED: "good",
+    ReadingOutcome.INSUFFICIENT_EXCITATION: SILENT,
+    ReadingOutcome.BAD_QUALITY: "bad",
+}
+
+
+def stored_histories(
+    films: FilmStore, place: Place, estimator: Estimator, start_ns: int, end_ns: int
+) -> Iterator[FilmHistory]:
+    """Read the readings of one film, oldest first, a few months at a time."""
+    first_ns = films.first_ns(*place, estimator)
+    if first_ns is None:
+        return
+    begin_ns = max(first_ns, start_ns)
+    for part_ns in range(begin_ns, end_ns, AT_ONCE_NS):
+        until_ns = min(part_ns + AT_ONCE_NS, end_ns)
+        found = films.history(FilmQuery(*place, estimator, part_ns, until_ns))
+        if len(found):
+            yield found
+
+
+def table_of(place: Place, found: FilmHistory) -> Any:
+    """Rows of both directions."""
+    return pa.concat_tables(_side(place, found, side) for side in range(len(DIRECTIONS)))
+
+
+def _side(place: Place, found: FilmHistory, side: int) -> Any:
+    history, n = found.history, len(found)
+    states = np.array([state.name.lower() for state in OperatingState])
+    qualities = np.array([QUALITY[evidence] for evidence in ReadingOutcome])
+    numbers = {
+        "k_n_per_m": np.exp(history.ln_k[side]),
+        "u_random": history.u_random[side],
+        **{key: getattr(history, key) for key in PER_BEARING},
+        **{key: getattr(history, key)[side] for key in AMPLITUDES},
+    }
+    return pa.table(
+        {
+            "time": pa.array(history.time_ns).cast(pa.timestamp("ns", tz="UTC")),
+            "unit": [place[0]] * n,
+            "bearing": [place[1]] * n,
+            "direction": [DIRECTIONS[side]] * n,
+            **{key: pa.array(column, from_pandas=True) for key, column in numbers.items()},
+            "state": states[found.state],
+            "quality": qualities[history.outcome[side]],
+        }
+    )
+
+
+class ReadingsFile:
+    """A CSV or Parquet file to be written; a context that leaves nothing behind if it fails.
+
+    Parameters
+    ----------
+    path
+        Whose suffix is one of `SUFFIXES`.
+
+    Raises
+    ------
+    OSError
+        If the file exists, or cannot be written.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._writer: Any = None
+        self._file = path.open("xb")
+
+    def __enter__(self) -> "ReadingsFile":
+        return self
+
+    def __exit__(self, kind: object, *_: object) -> None:
+        if self._writer is not None:
+            self._writer.close()
+        self._file.close()
+        if kind is not None:
+            self._path.unlink()
+
+    def write(self, table: Any) -> None:
+        """Add rows."""
+        if self._writer is None:
+            is_csv = self._path.suffix == ".csv"
+            make: Any = pacsv.CSVWriter if is_csv else pq.ParquetWriter
+            self._writer = make(self._file, table.schema)
+        self._writer.write_table(table)

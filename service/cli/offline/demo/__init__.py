@@ -1,1 +1,0 @@
-"""The demonstration: simulated units with a past."""

@@ -1,0 +1,255 @@
+"""Import of foreign files and CAN logs into recordings."""
+
+import math
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import closing
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from itertools import chain
+from pathlib import Path
+
+import can
+
+from acquisition.can.assembly import FrameAssembler
+from acquisition.can.compiler import compile_plan
+from acquisition.can.gate import FrameGate
+from acquisition.can.settings import CanSettings
+from acquisition.delivery.blocks import BlockGrid
+from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.units import slow_conversion, waveform_factor
+from acquisition.errors import ConfigError
+from acquisition.recordings.imports.job import (
+    ChannelColumn,
+    ColumnName,
+    CsvLayout,
+    ImportJob,
+    SlowColumn,
+    TimeAxis,
+)
+from acquisition.recordings.manifest import Manifest, read_manifest
+from acquisition.recordings.messages import MAX_DATA, Frames
+from acquisition.recordings.reading import imported_blocks, imported_frames
+from acquisition.recordings.writer import RecordingWriter
+from service.settings.adapter_values import can_settings_of, recorded_unit
+from service.settings.core_values import calibration_of
+from service.settings.sources.can import CanSettings as CanSourceSettings
+from service.settings.sources.mapping import (
+    ImportMapping,
+    MappedChannel,
+    MappedSlowChannel,
+    TimeSettings,
+)
+from service.settings.units import UnitSettings
+
+
+class CanLogDecoder:
+    """What a CAN source would have made of these frames, had it listened when they were logged.
+
+    A device that does not stamp its samples gets the stamps of the log.
+
+    Raises
+    ------
+    ConfigError
+        If DBC, settings and calibration do not fit together.
+    """
+
+    def __init__(self, settings: CanSettings, calibration: UnitCalibration) -> None:
+        plan = compile_plan(settings, calibration)
+        self._assembler = FrameAssembler(
+            plan,
+            n_channels=len(calibration.channels),
+            n_slow=len(calibration.slow),
+            rate_hz=calibration.rate_hz,
+            hold_s=settings.hold_s,
+        )
+        self._gate = FrameGate(plan, self._assembler.refused)
+
+    def take(self, frames: Frames) -> list[RawBlock]:
+        """Decode the next frames of a log.
+
+        Raises
+        ------
+        ConfigError
+            If they cannot all be those of one device.
+        """
+        blocks: list[RawBlock] = []
+        for time_ns, message in zip(frames["time_ns"].tolist(), _messages(frames), strict=True):
+            frame = self._gate.admit(message)
+            if frame is not None:
+                blocks += self._assembler.take([frame], time_ns)
+        if self._assembler.trouble:
+            raise ConfigError(self._assembler.trouble)
+        return blocks
+
+
+def log_decoder_of(unit: UnitSettings) -> CanLogDecoder | None:
+    """The decoder of a unit that reads CAN; None for others, which cannot read CAN logs.
+
+    Raises
+    ------
+    ConfigError
+        If DBC, settings and calibration do not fit together.
+    """
+    if not isinstance(unit.source, CanSourceSettings):
+        return None
+    return CanLogDecoder(can_settings_of(unit, unit.source), calibration_of(unit))
+
+
+def _messages(frames: Frames) -> Iterator[can.Message]:
+    rows = frames[["time_ns", "id", "extended", "fd", "length"]].tolist()
+    data = frames["data"].tobytes()
+    for n, (time_ns, id_, extended, fd, length) in enumerate(rows):
+        yield can.Message(
+            timestamp=time_ns / 1e9,
+            arbitration_id=id_,
+            is_extended_id=extended,
+            is_fd=fd,
+            dlc=length,
+            data=data[n * MAX_DATA : n * MAX_DATA + length],
+        )
+
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def import_job(mapping: ImportMapping, unit: UnitSettings) -> ImportJob:
+    """What the reader of a file needs to know.
+
+    Raises
+    ------
+    ConfigError
+        If a waveform channel of the unit is not mapped, a mapped one is not the unit's, or a
+        channel is mapped in a unit in which it is not measured.
+    """
+    channels = {channel.id: channel for channel in mapping.channel}
+    slow = {channel.id: channel for channel in mapping.slow_channel}
+    _require_known(slow, [c.id for c in unit.slow_channel], "slow channel", unit.id)
+    if channels:
+        known = [c.id for c in unit.channel]
+        _require_known(channels, known, "channel", unit.id)
+        missing = [id_ for id_ in known if id_ not in channels]
+        if missing:
+            raise ConfigError(f"channel {', '.join(missing)} of unit {unit.id} is not mapped")
+    csv = CsvLayout(**mapping.csv.model_dump()) if mapping.csv else CsvLayout()
+    return ImportJob(
+        format=mapping.format,
+        rate_hz=unit.rate_hz,
+        time=_time_axis(mapping.time),
+        channels=_channels(channels, unit) if channels else (),
+        slow=tuple(_slow(slow[c.id], c.unit) for c in unit.slow_channel if c.id in slow),
+        block_samples=unit.block_samples,
+        csv=csv,
+        bus=mapping.bus,
+    )
+
+
+def import_recording(
+    path: Path,
+    mapping: ImportMapping,
+    unit: UnitSettings,
+    folder: Path,
+    made_by: str,
+    *,
+    advanced: Callable[[float], None] = lambda _: None,
+) -> Manifest:
+    """Read a foreign file into a recording of a unit.
+
+    Parameters
+    ----------
+    advanced
+        Told the share of the file that has been read.
+
+    Raises
+    ------
+    ConfigError
+        If file, mapping and unit do not fit together, or the file is damaged; nothing is left
+        behind then.
+    """
+    job = import_job(mapping, unit)
+    decoder = None if job.channels else log_decoder_of(unit)
+    if not job.channels and decoder is None:
+        raise ConfigError(f'unit {unit.id} has no source of kind "can", whose DBC file is needed')
+    read = _decoded(path, job, decoder) if decoder else imported_blocks(path, job)
+    with closing(read) as blocks:
+        first = next(blocks, None)
+        if first is None:
+            raise ConfigError(f"{path}: has no samples of unit {unit.id}")
+        with RecordingWriter(folder, recorded_unit(unit), made_by, first_decides=True) as writer:
+            for block, done in chain([first], blocks):
+                writer.write(block if decoder else _with_all_slow(block, job, unit))
+                advanced(done)
+    return read_manifest(folder)
+
+
+def _decoded(
+    path: Path, job: ImportJob, decoder: CanLogDecoder
+) -> Generator[tuple[RawBlock, float]]:
+    grid, done = BlockGrid(job.block_samples), 0.0
+    for frames, done in imported_frames(path, job):
+        for raw in decoder.take(frames):
+            yield from ((block, done) for block in grid.put(raw))
+    yield from ((block, done) for block in grid.flush())
+
+
+def _with_all_slow(block: RawBlock, job: ImportJob, unit: UnitSettings) -> RawBlock:
+    """Slow channels that are not in the file have no value."""
+    found = dict(zip((column.id for column in job.slow), block.slow, strict=True))
+    return replace(block, slow=tuple(found.get(c.id, math.nan) for c in unit.slow_channel))
+
+
+def _channels(mapped: Mapping[str, MappedChannel], unit: UnitSettings) -> tuple[ChannelColumn, ...]:
+    found = []
+    for channel, calibration in zip(unit.channel, calibration_of(unit).channels, strict=True):
+        column = mapped[channel.id]
+        try:
+            factor = waveform_factor(channel.measurand, column.unit, calibration.unit_per_v)
+        except ConfigError as error:
+            raise ConfigError(f"channel {channel.id}: {error}") from error
+        found.append(
+            ChannelColumn(
+                id=channel.id,
+                place=ColumnName(column.column, column.group),
+                unit=column.unit,
+                factor=factor,
+                calibrated_per_count=calibration.unit_per_count,
+                per_count=column.unit_per_count,
+            )
+        )
+    return tuple(found)
+
+
+def _slow(column: MappedSlowChannel, channel_unit: str) -> SlowColumn:
+    try:
+        factor, offset = slow_conversion(channel_unit, column.unit)
+    except ConfigError as error:
+        raise ConfigError(f"slow channel {column.id}: {error}") from error
+    time = ColumnName(column.time_column, column.time_group) if column.time_column else None
+    place = ColumnName(column.column, column.group)
+    return SlowColumn(column.id, place, column.unit, factor, offset, time)
+
+
+def _time_axis(time: TimeSettings) -> TimeAxis:
+    start_ns = None if time.start is None else (time.start - _EPOCH) // timedelta(microseconds=1)
+    return TimeAxis(
+        kind=time.source,
+        utc_offset_s=_utc_offset_s(time.zone),
+        place=ColumnName(time.column, time.group) if time.column else None,
+        form=time.form or "elapsed_s",
+        start_ns=None if start_ns is None else start_ns * 1000,
+        tolerance=time.tolerance,
+    )
+
+
+def _utc_offset_s(zone: str) -> int:
+    if zone in ("UTC", ""):
+        return 0
+    hours, minutes = zone[1:].split(":")
+    offset_s = int(hours) * 3600 + int(minutes) * 60
+    return -offset_s if zone[0] == "-" else offset_s
+
+
+def _require_known(mapped: Mapping[str, object], known: list[str], kind: str, unit: str) -> None:
+    for id_ in mapped:
+        if id_ not in known:
+            words = ", ".join(known) or "none"
+            raise ConfigError(f"{kind} {id_} is mapped, but unit {unit} has {words}")

@@ -1,1 +1,0 @@
-"""Published figures beside padwatch's: the tables of Brito et al., rebuilt."""

@@ -1,0 +1,235 @@
+"""Free space of the disks that padwatch writes to: measurement, growth, limits and watch."""
+
+import asyncio
+import os
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquisition.clock import Clock
+from core.limits import WITHIN, AlarmLevel, Judgement, Limits, judge, unknown
+from core.quality import Reading
+from service.runtime.heartbeats import UNHEARD, Pulse
+
+
+@dataclass(frozen=True)
+class DiskSpace:
+    """Capacity and free space of the file system that holds a folder.
+
+    Parameters
+    ----------
+    device
+        Number of the file system; folders with the same number share its space.
+    total_bytes
+        Total capacity available to unprivileged users.
+    free_bytes
+        Free space available to unprivileged users, without the part reserved for root.
+    """
+
+    device: int
+    total_bytes: int
+    free_bytes: int
+
+    @property
+    def free_share(self) -> float:
+        """Free share of the capacity, 0 to 1."""
+        return self.free_bytes / self.total_bytes if self.total_bytes > 0 else 0.0
+
+
+Measure = Callable[[Path], DiskSpace]
+
+
+def measure_disk(folder: Path) -> DiskSpace:
+    """Measure the file system of a folder, or of its nearest parent that exists.
+
+    Raises
+    ------
+    OSError
+        If the file system cannot be read.
+    """
+    there = folder.absolute()
+    while not there.exists() and there != there.parent:
+        there = there.parent
+    found = os.statvfs(there)
+    n_taken = found.f_blocks - found.f_bfree
+    return DiskSpace(
+        device=there.stat().st_dev,
+        total_bytes=(n_taken + found.f_bavail) * found.f_frsize,
+        free_bytes=found.f_bavail * found.f_frsize,
+    )
+
+
+EVERY_S = 600.0
+OVER_S = 86_400.0
+"""The pace is a day's mean: captures follow alarms, backups run at night."""
+
+LEAST_S = 3600.0
+"""Shortest time that a pace is estimated from."""
+
+S_PER_DAY = 86_400.0
+
+
+class Growth:
+    """Pace at which a disk fills, from measurements of the last day."""
+
+    def __init__(self) -> None:
+        self._seen: deque[tuple[float, int]] = deque()
+
+    def note(self, space: DiskSpace, now_s: float) -> None:
+        """Add a measurement; ``now_s`` is monotonic."""
+        if not self._seen or now_s - self._seen[-1][0] >= EVERY_S:
+            self._seen.append((now_s, space.free_bytes))
+        while len(self._seen) > 2 and now_s - self._seen[1][0] >= OVER_S:
+            self._seen.popleft()
+
+    def days_until_full(self, space: DiskSpace, now_s: float) -> float | None:
+        """Return the days until the disk is full at the pace of the last day; None if unknown."""
+        if not self._seen:
+            return None
+        since_s, free_then = self._seen[0]
+        lasted_s, taken = now_s - since_s, free_then - space.free_bytes
+        if lasted_s < LEAST_S or taken <= 0:
+            return None
+        return space.free_bytes / taken * lasted_s / S_PER_DAY
+
+
+MOST_ALERT, MOST_DANGER = 0.25, 0.125
+"""Shares at which limits in bytes are capped, so that a small disk can be within limits."""
+
+DEADBAND_SHARE = 0.2
+"""Deadband as a share of the danger limit."""
+
+
+@dataclass(frozen=True)
+class SpaceLimits:
+    """Limits of free space; the limit that is reached first counts.
+
+    Parameters
+    ----------
+    alert_share, danger_share
+        Share of the disk, 0 to 1.
+    alert_bytes, danger_bytes
+        Bytes, for a disk of any size.
+    """
+
+    alert_share: float = 0.1
+    danger_share: float = 0.05
+    alert_bytes: int = 2_000_000_000
+    danger_bytes: int = 1_000_000_000
+
+    def of(self, total_bytes: int) -> Limits:
+        """Return the limits of the free share of a disk of this size."""
+        whole = max(total_bytes, 1)
+        alert = max(self.alert_share, min(self.alert_bytes / whole, MOST_ALERT))
+        danger = max(self.danger_share, min(self.danger_bytes / whole, MOST_DANGER))
+        return Limits(alert_below=alert, danger_below=danger, deadband=DEADBAND_SHARE * danger)
+
+
+PERIOD_S = 10.0
+GB = 1e9
+
+
+@dataclass(frozen=True)
+class DiskView:
+    """Newest measurement of one disk.
+
+    Parameters
+    ----------
+    name
+        Name of the first folder on the disk.
+    days_until_full
+        At the pace of the last day; None if unknown or not filling.
+    """
+
+    name: str
+    space: DiskSpace
+    days_until_full: float | None = None
+
+    def __str__(self) -> str:
+        space, days = self.space, self.days_until_full
+        found = f"{space.free_bytes / GB:.3g} of {space.total_bytes / GB:.3g} GB free"
+        return found if days is None else f"{found}, full in {days:.2g} days"
+
+
+class SpaceWatch:
+    """Measures the disks of some folders periodically, in a thread, since a disk may not answer.
+
+    Parameters
+    ----------
+    folders
+        Folders that padwatch writes to, by name.
+    measure
+        Measures the disk of a folder.
+    """
+
+    def __init__(
+        self,
+        folders: Mapping[str, Path],
+        limits: SpaceLimits,
+        clock: Clock,
+        measure: Measure = measure_disk,
+    ) -> None:
+        self._folders, self._limits, self._clock, self._measure = folders, limits, clock, measure
+        self._growth: dict[int, Growth] = {}
+        self._trouble: str | None = None
+        self.disks: tuple[DiskView, ...] = ()
+        """Newest measurements; empty before the first."""
+
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
+        """Measure until cancelled."""
+        while True:
+            pulse.beat(PERIOD_S)
+            await self.look()
+            await self._clock.sleep(PERIOD_S)
+
+    async def look(self) -> None:
+        """Measure all disks once."""
+        try:
+            found = await asyncio.to_thread(self._measured)
+        except OSError as error:
+            self._trouble = f"the free space of the disk cannot be measured: {error}"
+            return
+        self._trouble = None
+        first: dict[int, DiskView] = {}
+        for name, space in zip(self._folders, found, strict=True):
+            if space.device not in first:
+                first[space.device] = self._seen(name, space)
+        self.disks = tuple(first.values())
+
+    def condition(self, held: AlarmLevel | None) -> Judgement:
+        """Judge the fullest disk.
+
+        Parameters
+        ----------
+        held
+            Level of the condition before.
+        """
+        if self._trouble is not None:
+            return unknown(self._trouble)
+        found = [(self._judged(disk, held), disk) for disk in self.disks]
+        return max((one for one, _ in found), key=_urgency, default=WITHIN)
+
+    def __str__(self) -> str:
+        return self._trouble or "; ".join(f"{disk.name}: {disk}" for disk in self.disks)
+
+    def _measured(self) -> list[DiskSpace]:
+        return [self._measure(folder) for folder in self._folders.values()]
+
+    def _seen(self, name: str, space: DiskSpace) -> DiskView:
+        growth, now_s = self._growth.setdefault(space.device, Growth()), self._clock.monotonic_s()
+        growth.note(space, now_s)
+        return DiskView(name, space, growth.days_until_full(space, now_s))
+
+    def _judged(self, disk: DiskView, held: AlarmLevel | None) -> Judgement:
+        limits = self._limits.of(disk.space.total_bytes)
+        found = judge(Reading(disk.space.free_share), limits, held)
+        if found.level is None:
+            return found
+        return Judgement(
+            found.level, value=found.value, limit=found.limit, reason=f"{disk.name}: {disk}"
+        )
+
+
+def _urgency(condition: Judgement) -> tuple[int, float]:
+    return int(condition.level or 0), -(condition.value or 0.0)

@@ -1,0 +1,119 @@
+"""Files that are written whole and synced to the disk, and ZIP files made while they are sent."""
+
+import os
+import zipfile
+from collections.abc import Generator, Iterator, Mapping
+from contextlib import ExitStack
+from io import BytesIO, RawIOBase
+from pathlib import Path
+from typing import BinaryIO
+
+CHUNK = 1 << 20
+"""Bytes that are read at a time."""
+
+ASIDE = ".part"
+"""Suffix of a file that is still being written."""
+
+PRIVATE = 0o600
+
+STORED = (".parquet",)
+"""Suffixes of files that are compressed already."""
+
+
+def write_synced(path: Path, content: bytes) -> None:
+    """Write a file and sync its content to the disk."""
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file under a temporary name, sync it and rename it: it exists whole or not at all."""
+    aside = path.with_name(path.name + ASIDE)
+    try:
+        write_synced(aside, content)
+        aside.replace(path)
+    finally:
+        aside.unlink(missing_ok=True)
+    sync_folder(path.parent)
+
+
+def create_private(path: Path) -> None:
+    """Create an empty file that only its owner can read."""
+    os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, PRIVATE))
+
+
+def put_in_place(aside: Path, path: Path) -> None:
+    """Sync a finished file, rename it in one step and sync the rename."""
+    _sync(aside)
+    aside.replace(path)
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Sync the names in a folder to the disk."""
+    _sync(folder)
+
+
+def zipped(files: Mapping[str, Path | bytes]) -> Generator[bytes, None, None]:
+    """Yield a ZIP file in pieces, none of them empty.
+
+    All files are opened first, so a file that is removed meanwhile is still sent whole.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    """
+    sink = Sink()
+    with ExitStack() as opened:
+        streams = {name: opened.enter_context(_open(each)) for name, each in files.items()}
+        with zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, stream in streams.items():
+                info = zipfile.ZipInfo(name)
+                info.compress_type = (
+                    zipfile.ZIP_STORED if name.endswith(STORED) else zipfile.ZIP_DEFLATED
+                )
+                with archive.open(info, "w", force_zip64=True) as entry:
+                    while chunk := stream.read(CHUNK):
+                        entry.write(chunk)
+                        yield from sink.taken()
+        yield from sink.taken()
+
+
+class Sink(RawIOBase):
+    """Write-only stream that hands out what was written since the last call of `taken`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._pieces: list[bytes] = []
+
+    def writable(self) -> bool:
+        """Return true: the stream accepts writes."""
+        return True
+
+    def write(self, piece: object) -> int:
+        """Append a piece."""
+        content = bytes(piece)  # type: ignore[call-overload]
+        self._pieces.append(content)
+        return len(content)
+
+    def taken(self) -> Iterator[bytes]:
+        """Yield the bytes written since the last call, if there are any."""
+        content = b"".join(self._pieces)
+        self._pieces.clear()
+        if content:
+            yield content
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _open(each: Path | bytes) -> BinaryIO:
+    return BytesIO(each) if isinstance(each, bytes) else each.open("rb")

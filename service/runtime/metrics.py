@@ -1,0 +1,147 @@
+"""Metric families of a process, histograms of durations, and the text exposition."""
+
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import accumulate
+from threading import Lock
+
+from prometheus_client import exposition
+from prometheus_client.metrics_core import (
+    CounterMetricFamily,
+    GaugeMetricFamily,
+    HistogramMetricFamily,
+    Metric,
+)
+from prometheus_client.openmetrics import exposition as open_exposition
+from prometheus_client.registry import Collector
+
+from acquisition.clock import Clock
+
+
+@dataclass(frozen=True)
+class Seen:
+    """State of a histogram at one time.
+
+    Parameters
+    ----------
+    bounds_s
+        Upper bound of each bucket except the last, which is unbounded.
+    n_up_to
+        Cumulative count at each bound; the last entry counts all.
+    sum_s
+        Sum of all durations.
+    newest_s
+        Newest duration; None before the first.
+    """
+
+    bounds_s: tuple[float, ...]
+    n_up_to: tuple[int, ...]
+    sum_s: float
+    newest_s: float | None = None
+
+
+class Durations:
+    """Histogram of durations; thread-safe.
+
+    Parameters
+    ----------
+    bounds_s
+        Upper bounds of the buckets, increasing.
+
+    Raises
+    ------
+    ValueError
+        If the bounds do not increase.
+    """
+
+    def __init__(self, bounds_s: Sequence[float], clock: Clock) -> None:
+        if not bounds_s or list(bounds_s) != sorted(set(bounds_s)):
+            raise ValueError(f"bounds of buckets must rise: {list(bounds_s)}")
+        self._bounds_s, self._clock = tuple(bounds_s), clock
+        self._n_in = [0] * (len(bounds_s) + 1)
+        self._sum_s = 0.0
+        self._newest_s: float | None = None
+        self._lock = Lock()
+
+    def observe(self, duration_s: float) -> None:
+        """Add a duration."""
+        place = bisect_left(self._bounds_s, duration_s)
+        with self._lock:
+            self._n_in[place] += 1
+            self._sum_s += duration_s
+            self._newest_s = duration_s
+
+    @contextmanager
+    def timed(self) -> Iterator[None]:
+        """Add the duration of the body, unless it raises."""
+        began_s = self._clock.monotonic_s()
+        yield
+        self.observe(self._clock.monotonic_s() - began_s)
+
+    def seen(self) -> Seen:
+        """Return the current state."""
+        with self._lock:
+            n_up_to = tuple(accumulate(self._n_in))
+            return Seen(self._bounds_s, n_up_to, self._sum_s, self._newest_s)
+
+
+Rows = Iterable[tuple[tuple[str, ...], float]]
+"""Label values, in the order of the labels, with the sample value."""
+
+
+def gauge(name: str, meaning: str, labels: tuple[str, ...], rows: Rows) -> Metric:
+    """Return a gauge family."""
+    family = GaugeMetricFamily(f"padwatch_{name}", meaning, labels=labels)
+    for values, number in rows:
+        family.add_metric(values, number)
+    return family
+
+
+def counter(name: str, meaning: str, labels: tuple[str, ...], rows: Rows) -> Metric:
+    """Return a counter family; `_total` is added to its name."""
+    family = CounterMetricFamily(f"padwatch_{name}", meaning, labels=labels)
+    for values, number in rows:
+        family.add_metric(values, number)
+    return family
+
+
+def histogram(name: str, meaning: str, durations: Mapping[str, Durations]) -> Metric:
+    """Return a histogram family with the label `unit`."""
+    family = HistogramMetricFamily(f"padwatch_{name}", meaning, labels=("unit",))
+    for unit, its in durations.items():
+        seen = its.seen()
+        family.add_metric((unit,), buckets(seen), seen.sum_s)
+    return family
+
+
+def plain_histogram(name: str, meaning: str, durations: Durations) -> Metric:
+    """Return a histogram family without labels."""
+    seen = durations.seen()
+    return HistogramMetricFamily(f"padwatch_{name}", meaning, buckets(seen), seen.sum_s)
+
+
+def buckets(seen: Seen) -> list[tuple[str, float]]:
+    """Return the bounds as Prometheus writes them, each with its cumulative count."""
+    bounds = [*(repr(bound) for bound in seen.bounds_s), "+Inf"]
+    return [(bound, float(n)) for bound, n in zip(bounds, seen.n_up_to, strict=True)]
+
+
+TEXT = exposition.CONTENT_TYPE_PLAIN_0_0_4
+OPEN_METRICS = "application/openmetrics-text; version=1.0.0; charset=utf-8"
+
+
+def rendered(metrics: Collector, accept: str) -> tuple[bytes, str]:
+    """Return metrics as text, with its media type.
+
+    Parameters
+    ----------
+    accept
+        The request's ``Accept`` header. The library's own negotiation is not used: its media type
+        repeats parts of the header.
+    """
+    if "application/openmetrics-text" in accept.lower():
+        text: bytes = open_exposition.generate_latest(metrics)  # type: ignore[no-untyped-call]
+        return text, OPEN_METRICS
+    return exposition.generate_latest(metrics), TEXT

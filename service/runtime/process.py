@@ -1,0 +1,115 @@
+"""The process: event loop, signals, exit, memory allocation, logging, and its name in files."""
+
+import asyncio
+import ctypes
+import getpass
+import os
+import platform
+import signal
+import sys
+from collections.abc import Coroutine
+from contextlib import suppress
+from importlib.metadata import version
+from threading import Timer
+from typing import Any, NoReturn
+
+import structlog
+import uvloop
+
+TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
+"""Parameters of mallopt(3) in the GNU C library (malloc.h)."""
+
+LARGE_BYTES = 1 << 20
+
+
+def return_large_pieces() -> None:
+    """Return the memory of large arrays to the operating system as soon as they are freed.
+
+    By default the GNU C library raises its mmap threshold to the size of the largest freed block,
+    up to 32 MiB (mallopt(3)). Arrays of later results then lie on the heap between long-lived
+    blocks and fragment it, and the process keeps more memory than it uses. Another C library is
+    left unchanged.
+    """
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        for threshold in (MMAP_THRESHOLD, TRIM_THRESHOLD):
+            mallopt(threshold, LARGE_BYTES)
+
+
+LEAVE_S = 0.5
+"""Time that threads have to finish after the program has ended."""
+
+SWITCH_S = 0.001
+"""Switch interval of the interpreter: the event loop waits at most this long for a thread that
+computes. The default is five times as long, and every answer waits for it several times."""
+
+log = structlog.get_logger()
+
+
+def run_to_its_end(program: Coroutine[Any, Any, None]) -> None:
+    """Run a program that has written all its data when it returns.
+
+    The event loop would wait without limit for threads that still read or compute for cancelled
+    requests. A thread cannot be stopped, so the process exits after `LEAVE_S`.
+    """
+    sys.setswitchinterval(SWITCH_S)
+    return_large_pieces()
+    with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+        runner.run(program)
+        leaving = Timer(LEAVE_S, _leave_threads)
+        leaving.daemon = True
+        leaving.start()
+    leaving.cancel()
+
+
+def leave(code: int = 0) -> NoReturn:
+    """End the process now, without the finalizers of libraries and threads.
+
+    Finalizing takes longer than a stop may, and sometimes aborts: Arrow's threads may still run
+    when its parts are destroyed (apache/arrow#34314).
+    """
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # the reader has closed the pipe
+            stream.flush()
+    os._exit(code)
+
+
+def _leave_threads() -> None:
+    log.warning("exiting while threads are still running")
+    leave()
+
+
+def set_up_logging() -> None:
+    """Log to standard error: coloured lines on a terminal, JSON lines for a supervisor."""
+    on_terminal = sys.stderr.isatty()
+    structlog.configure(
+        processors=[
+            structlog.processors.add_log_level,
+            structlog.processors.TimeStamper(fmt="iso", utc=True),
+            structlog.dev.ConsoleRenderer() if on_terminal else structlog.processors.JSONRenderer(),
+        ],
+        logger_factory=structlog.PrintLoggerFactory(sys.stderr),
+    )
+
+
+def made_by() -> str:
+    """Return program, person and host, for the metadata of a file."""
+    return f"padwatch {version('padwatch')}, {person()}"[:200]
+
+
+def person() -> str:
+    """Return person and host."""
+    try:
+        name = getpass.getuser()
+    except (KeyError, OSError):  # a user of a container may have no name
+        name = f"user {os.getuid()}"
+    return f"{name} on {platform.node()}"
+
+
+def stop_on_signals() -> asyncio.Event:
+    """Return an event that SIGINT and SIGTERM set."""
+    stopped = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stopped.set)
+    return stopped

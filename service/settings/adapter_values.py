@@ -1,0 +1,231 @@
+"""Source settings as the values that the acquisition adapters take."""
+
+from pathlib import Path
+from typing import Any
+
+from acquisition.can.compiler import compile_plan
+from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
+from acquisition.clock import Clock
+from acquisition.delivery.calibration import COUNTS_FULL_SCALE
+from acquisition.delivery.units import UNIT_OF
+from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters, Identity
+from acquisition.modbus.transport import ConnectionUse, SerialTransport, TcpTransport, Transport
+from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
+from acquisition.simulated.devices.can_device import CanDevice
+from acquisition.simulated.devices.can_server import CanBusServer
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_settings
+from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
+from acquisition.simulated.devices.server import DaqServer
+from acquisition.simulated.feed import SampleFeed
+from service.settings.core_values import calibration_of
+from service.settings.sources import can as settings
+from service.settings.sources.devices import MappedDeviceSettings, ModbusRingSettings
+from service.settings.sources.modbus import (
+    IdentificationIdentity,
+    IdentitySettings,
+    ModbusLinkSettings,
+    SignatureIdentity,
+)
+from service.settings.units import UnitSettings
+
+
+def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSettings:
+    """What the CAN adapter has to be told of a unit."""
+    link = can_link_of(source)
+    others: dict[str, Any] = {
+        "hold_s": source.hold_s,
+        "stale_after_s": source.stale_after_s,
+        "queue_frames": source.receive_buffer,
+        "when_full": source.when_full,
+        "stamps": source.stamps,
+    }
+    units = tuple(UNIT_OF[channel.measurand] for channel in unit.channel)
+    if source.profile is not None:
+        return daq_settings(can_shape_of(unit, source), link, units, **others)
+    return CanSettings(
+        link=link,
+        dbc=source.dbc_path,
+        channels=tuple(
+            CanChannel(channel.id, engineering_unit, _listed(source.signals[channel.id]))
+            for channel, engineering_unit in zip(unit.channel, units, strict=True)
+        ),
+        slow=tuple(CanSlowChannel(s.id, s.unit, source.slow[s.id]) for s in unit.slow_channel),
+        counters=source.counters,
+        counter_counts=source.counter_counts,
+        frame_samples=source.frame_samples,
+        epoch=source.epoch,
+        ok_bits=source.ok_bits,
+        seconds=source.seconds,
+        microseconds=source.microseconds,
+        hold_samples=source.hold_samples,
+        **others,
+    )
+
+
+def can_link_of(source: settings.CanSettings) -> CanLinkSettings:
+    """How a bus is reached."""
+    return CanLinkSettings(
+        interface=source.interface,
+        channel=source.channel,
+        bitrate=source.bitrate,
+        fd=source.fd,
+        data_bitrate=source.data_bitrate,
+        options=source.options,
+    )
+
+
+def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
+    """The messages of the simulated CAN DAQ for a unit's channels.
+
+    Raises
+    ------
+    LookupError
+        If the unit's source does not read those messages.
+    """
+    if source.profile is None:
+        raise LookupError(
+            f"unit {unit.id} reads CAN by its own DBC; a simulated DAQ sends profile"
+            ' "padwatch_int16" or "padwatch_float32"'
+        )
+    floats = source.profile == "padwatch_float32"
+    return CanShape(
+        channels=tuple(
+            DaqSignal(
+                c.id,
+                UNIT_OF[c.measurand] if floats else "V",
+                1.0 if floats else c.scale["full_scale_v"] / COUNTS_FULL_SCALE,
+            )
+            for c in unit.channel
+        ),
+        slow=tuple(DaqSignal(slow.id, slow.unit) for slow in unit.slow_channel),
+        fd=source.fd,
+        floats=floats,
+    )
+
+
+def can_daq_of(
+    unit: UnitSettings,
+    source: settings.CanSettings,
+    feed: SampleFeed,
+    clock: Clock | None,
+    *,
+    patient: bool,
+) -> DaqServer:
+    """A simulated CAN DAQ where the unit's source looks for it.
+
+    Parameters
+    ----------
+    clock
+        Paces the device; without one it produces as fast as its reader reads.
+    patient
+        Whether the device waits for its reader.
+
+    Raises
+    ------
+    ConfigError, LookupError
+        If the unit's source reads something else.
+    """
+    device = CanDevice(feed, can_shape_of(unit, source), unit.id, block_samples=unit.block_samples)
+    waiting: dict[str, Any] = {"on_demand": clock is None, "patient": patient}
+    if source.interface != "slcan":
+        return CanBusServer(
+            device,
+            clock,
+            interface=source.interface,
+            channel=source.channel,
+            options=source.options,
+            **waiting,
+        )
+    if source.channel == "pty" or source.channel.startswith("/"):
+        link = None if source.channel == "pty" else Path(source.channel)
+        return SlcanPtyServer(device, clock, link=link, **waiting)
+    host, _, port = source.channel.removeprefix("socket://").rpartition(":")
+    if not source.channel.startswith("socket://") or not port.isdecimal():
+        raise LookupError(
+            f"unit {unit.id}: channel {source.channel!r} is no place for a simulated DAQ; it can"
+            ' be "socket://127.0.0.1:0", "pty" or the path of a link to a pty'
+        )
+    return SlcanTcpServer(device, clock, host=host, port=int(port), **waiting)
+
+
+def _listed(signals: str | tuple[str, ...]) -> tuple[str, ...]:
+    return (signals,) if isinstance(signals, str) else signals
+
+
+def require_dbc_fits(unit: UnitSettings) -> None:
+    """Look into the DBC file of a unit that reads CAN, without opening a bus.
+
+    Raises
+    ------
+    ConfigError
+        Naming file, key, what was found and what is needed.
+    """
+    if isinstance(unit.source, settings.CanSettings):
+        compile_plan(can_settings_of(unit, unit.source), calibration_of(unit))
+
+
+def recorded_unit(unit: UnitSettings) -> RecordedUnit:
+    """Channels and calibration of a unit as they stand in the manifest of its recordings."""
+    return RecordedUnit(
+        unit=unit.id,
+        rate_hz=unit.sampling_hz,
+        channels=tuple(
+            RecordedChannel(id=channel.id, measurand=channel.measurand, **channel.scale)
+            for channel in unit.channel
+        ),
+        slow_channels=tuple(RecordedSlowChannel(**slow.model_dump()) for slow in unit.slow_channel),
+        block_samples=unit.block_samples,
+    )
+
+
+def identity_of(settings: IdentitySettings | None) -> Identity | None:
+    """What the device must answer; None if any will do."""
+    match settings:
+        case SignatureIdentity():
+            return ExpectedRegisters(
+                address=settings.address, words=settings.words, function=settings.function
+            )
+        case IdentificationIdentity():
+            return ExpectedIdentification(
+                vendor=settings.vendor,
+                product_code=settings.product_code,
+                revision=settings.revision,
+            )
+        case None:
+            return None
+
+
+RING_REQUESTS_IN_FLIGHT = 6
+"""What a poll of 12 channels takes."""
+
+
+def transport_of(source: ModbusLinkSettings) -> Transport:
+    """Where a Modbus device is: on the network, or on a serial line."""
+    if source.host is not None:
+        return TcpTransport(host=source.host, port=source.port)
+    return SerialTransport(
+        device=source.device or "",
+        baudrate=source.baudrate,
+        parity=source.parity,
+        stop_bits=source.stop_bits,
+    )
+
+
+def link_fields(source: ModbusLinkSettings) -> dict[str, Any]:
+    """How a device is reached and known, as every source's settings take it."""
+    use = source.connection if isinstance(source, MappedDeviceSettings) else ConnectionUse.KEPT
+    return {
+        "transport": transport_of(source),
+        "device_id": source.device_id,
+        "timeout_s": source.timeout_s,
+        "identity": identity_of(source.identity),
+        "connection": ConnectionUse(use),
+        "requests_in_flight": _requests_in_flight(source),
+    }
+
+
+def _requests_in_flight(source: ModbusLinkSettings) -> int:
+    if source.requests_in_flight is not None:
+        return source.requests_in_flight
+    is_ring = isinstance(source, ModbusRingSettings) and source.host is not None
+    return RING_REQUESTS_IN_FLIGHT if is_ring else 1

@@ -1,0 +1,1 @@
+"""Settings of sources: measuring devices, simulated machines and imported files."""

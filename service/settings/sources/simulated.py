@@ -1,0 +1,170 @@
+"""Simulated machines: their signals, their life and their damage."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import AwareDatetime, Field, model_validator
+
+from service.settings.base import MisfitError, Settings, refuse_twice
+
+
+class SimulatedDamageSettings(Settings):
+    """Damage to one bearing of a simulated life."""
+
+    bearing: Literal["UJB", "LJB", "TJB"]
+    """Which bearing."""
+
+    kind: Literal[
+        "stiffness_loss",
+        "clearance_growth",
+        "pivot_wear",
+        "oil_degradation",
+        "bracket_loosening",
+        "probe_gain",
+        "accelerometer_gain",
+    ]
+    """What goes wrong: with the film (the first four), the bracket or the transducers."""
+
+    size: Annotated[float, Field(gt=-1.0, lt=1.0)]
+    """Share that is lost in the end: of the film's stiffness, the oil's viscosity, the bracket's
+    stiffness; of a gain its relative change, with its sign. Example: 0.2."""
+
+    after_s: Annotated[float, Field(ge=0.0, le=3.2e7)] | None = None
+    """Sets in so long after the simulator's start, s."""
+
+    at: AwareDatetime | None = None
+    """Or sets in at this time. Example: 2026-03-01T12:00:00Z."""
+
+    ramp_s: Annotated[float, Field(ge=0.0, le=3.2e7)] = 0.0
+    """Time from onset to `size`, evenly, s; 0 is a step."""
+
+    directions: Annotated[tuple[Literal["x", "y"], ...], Field(min_length=1)] = ("x", "y")
+    """Whose transducers change, for gains."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if (self.after_s is None) == (self.at is None):
+            raise MisfitError("needs either after_s or at")
+        if self.size == 0.0 or (self.size < 0.0 and not self.kind.endswith("_gain")):
+            raise MisfitError("must be above 0; only gains may fall below", "size")
+        return self
+
+
+class SimulatedLifeSettings(Settings):
+    """A plant life: its readings of the past, and its samples from now on."""
+
+    life_seed: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = None
+    """Which life the machine lives, instead of fixed films. Even ones are of 92.3 r/min, odd ones
+    of 90.9 r/min. Starts and stops, load, oil and the shaft's place in its bearings follow from it.
+    """
+
+    held_load: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
+    """Share of 700 MW at which the machine is kept running from the day before the simulator's
+    start; without it, it may stand still. Example: 0.95."""
+
+    damage: tuple[SimulatedDamageSettings, ...] = ()
+    """What goes wrong with it."""
+
+
+class SimulatedBearingSettings(Settings):
+    """Oil film and shaft position of one simulated bearing."""
+
+    bearing: Literal["UJB", "LJB", "TJB"]
+    """Which of the rotor model's three bearings."""
+
+    k_xx_n_per_m: Annotated[float, Field(ge=1e6, le=1e12)]
+    """Direct film stiffness in x, N/m; damping follows as 0.0125 s times it. Example: 0.69e9."""
+
+    k_yy_n_per_m: Annotated[float, Field(ge=1e6, le=1e12)]
+    """Direct film stiffness in y, N/m."""
+
+    k_cross_n_per_m: Annotated[float, Field(ge=-1e12, le=1e12)] = 0.0
+    """Cross-coupled film stiffness k_xy = k_yx, N/m."""
+
+    centre_x_um: Annotated[float, Field(ge=-5000.0, le=5000.0)] = 0.0
+    """Mean position of the shaft centre in x, µm."""
+
+    centre_y_um: Annotated[float, Field(ge=-5000.0, le=5000.0)] = 0.0
+    """Mean position of the shaft centre in y, µm."""
+
+    centre_wander_um_rms: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
+    """Slow wander of the shaft centre in each direction, µm rms."""
+
+    oil_temperature_c: Annotated[float, Field(ge=0.0, le=120.0)] = 45.0
+    """Mean oil temperature, °C."""
+
+    oil_temperature_wander_c_rms: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
+    """Slow wander of the oil temperature, K rms."""
+
+
+OF_A_LIFE = ("held_load", "damage")
+"""Keys that mean nothing without `life_seed`."""
+
+FIXED = (
+    *("speed_rpm", "power_mw", "power_wander_mw_rms", "unbalance_grade_mm_s", "bearing"),
+    *("hydraulic_force_n_rms", "hydraulic_cutoff_hz", "rope_force_n", "rope_order"),
+)
+"""Keys that a life decides on."""
+
+NEEDED = ("speed_rpm", "power_mw", "bearing")
+"""Keys that are needed without one."""
+
+
+class SimulationSettings(SimulatedLifeSettings):
+    """A unit on the paper's ten-degree-of-freedom model, with fixed films or with a life."""
+
+    seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
+    """The same seed gives the same samples to the last bit."""
+
+    speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)] | None = None
+    """Running speed, r/min."""
+
+    power_mw: Annotated[float, Field(ge=-2000.0, le=2000.0)] | None = None
+    """Active power, MW."""
+
+    power_wander_mw_rms: Annotated[float, Field(ge=0.0, le=200.0)] = 0.0
+    """Slow wander of the active power, MW rms."""
+
+    unbalance_grade_mm_s: Annotated[float, Field(ge=0.0, le=40.0)] = 4.25
+    """ISO balance grade G in mm/s; G4.25 is a rotating force of 75.6 kN at 92.3 r/min."""
+
+    hydraulic_force_n_rms: Annotated[float, Field(ge=0.0, le=1e7)] = 0.0
+    """Broadband hydraulic force on the runner, N rms in each direction."""
+
+    hydraulic_cutoff_hz: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
+    """The hydraulic force is flat below this frequency; without it, white."""
+
+    rope_force_n: Annotated[float, Field(ge=0.0, le=1e7)] = 0.0
+    """Rotating force of the part-load vortex rope on the runner, N."""
+
+    rope_order: Annotated[float, Field(ge=0.1, le=0.9)] = 0.25
+    """Mean frequency of the rope in multiples of the running speed."""
+
+    gap_noise_um_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """White noise of the proximity probes, µm rms."""
+
+    velocity_noise_mm_s_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """White noise of velocity channels, mm/s rms."""
+
+    acceleration_noise_m_s2_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
+    """White noise of acceleration channels, m/s² rms."""
+
+    samples_per_slot: Annotated[int, Field(ge=1, le=4096)] = 50
+    """Samples per channel in a slot of the simulated DAQ's ring."""
+
+    n_slots: Annotated[int, Field(ge=2, le=4096)] = 64
+    """Slots of the simulated DAQ's ring; with 12 channels, 64 slots of 50 samples fit."""
+
+    bearing: Annotated[tuple[SimulatedBearingSettings, ...], Field(min_length=3, max_length=3)] = ()
+    """The three bearings UJB, LJB and TJB."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        for key in FIXED if self.life_seed is not None else OF_A_LIFE:
+            if key in self.model_fields_set:
+                why = "follows from life_seed" if self.life_seed is not None else "needs life_seed"
+                raise MisfitError(why, key)
+        for key in NEEDED if self.life_seed is None else ():
+            if key not in self.model_fields_set:
+                raise MisfitError("is needed, or life_seed instead", key)
+        refuse_twice(("bearing", n, "bearing", b.bearing) for n, b in enumerate(self.bearing))
+        return self

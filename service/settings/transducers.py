@@ -1,0 +1,191 @@
+"""Frequency response of a transducer: a model, or a calibration sheet in CSV."""
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Literal, Self, TypeAlias
+
+from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
+
+from acquisition.delivery.small_file import read_small_file
+from core.machine.response import (
+    BUTTERWORTH_DAMPING,
+    HighPass,
+    Resonance,
+    Response,
+    ResponseChain,
+    ResponseTable,
+)
+from service.settings.base import MisfitError, Settings
+
+COLUMNS = ("frequency_hz", "magnitude", "phase_deg")
+MAX_SHEET_BYTES = 1_000_000
+
+
+class SheetError(Exception):
+    """A calibration sheet that cannot be used; the message has file, line and what is wrong."""
+
+
+def read_calibration_sheet(path: Path) -> ResponseTable:
+    """Read a sheet whose first line names its columns and whose others are points.
+
+    Lines that begin with # and empty lines at the end count for nothing.
+
+    Raises
+    ------
+    SheetError
+        If the file cannot be read, a column or a value is missing, a number is none or not finite,
+        frequencies do not rise from above zero, or a magnitude is not above zero.
+    """
+    rows = _rows(path, _read(path))
+    number, header = next(rows, (1, []))
+    if sorted(header) != sorted(COLUMNS):
+        wanted = ", ".join(COLUMNS)
+        raise SheetError(f"{path}:{number}: columns must be {wanted}, got {', '.join(header)}")
+    points: list[tuple[float, ...]] = []
+    for number, cells in rows:
+        values = dict(zip(header, _numbers(path, number, header, cells), strict=True))
+        point = tuple(values[name] for name in COLUMNS)
+        _check(f"{path}:{number}", point, points)
+        points.append(point)
+    if len(points) < 2:
+        raise SheetError(f"{path}:{number}: needs two points or more, got {len(points)}")
+    frequency_hz, magnitude, phase_deg = zip(*points, strict=True)
+    return ResponseTable(frequency_hz, magnitude, phase_deg)
+
+
+def _read(path: Path) -> str:
+    try:
+        content = read_small_file(path, MAX_SHEET_BYTES)
+        return content.decode("utf-8-sig").rstrip()
+    except OSError as error:
+        raise SheetError(f"{path}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise SheetError(f"{path}:{line}: not UTF-8 text at byte {error.start}") from error
+
+
+def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
+    """Line numbers and cells."""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if line.startswith("#"):
+            continue
+        try:
+            yield number, [cell.strip() for cell in next(csv.reader([line]), [])]
+        except csv.Error as error:
+            raise SheetError(f"{path}:{number}: {error}") from error
+
+
+def _numbers(path: Path, number: int, header: list[str], cells: list[str]) -> list[float]:
+    if len(cells) != len(header):
+        raise SheetError(f"{path}:{number}: needs {len(header)} values, got {len(cells)}")
+    return [
+        _number(f"{path}:{number}: {name}", cell) for name, cell in zip(header, cells, strict=True)
+    ]
+
+
+def _number(place: str, cell: str) -> float:
+    if not cell:
+        raise SheetError(f"{place} is missing; leave out the whole point, or measure it")
+    try:
+        value = float(cell)
+    except ValueError as error:
+        raise SheetError(f"{place} must be a number, got {cell!r}") from error
+    if not math.isfinite(value):
+        raise SheetError(f"{place} must be finite, got {cell}")
+    return value
+
+
+def _check(place: str, point: tuple[float, ...], before: list[tuple[float, ...]]) -> None:
+    frequency_hz, magnitude, _ = point
+    if frequency_hz <= 0.0:
+        raise SheetError(f"{place}: frequency_hz must be above 0, got {frequency_hz:g}")
+    if before and frequency_hz <= before[-1][0]:
+        raise SheetError(
+            f"{place}: frequency_hz must rise from line to line,"
+            f" got {frequency_hz:g} after {before[-1][0]:g}"
+        )
+    if magnitude <= 0.0:
+        raise SheetError(f"{place}: magnitude must be above 0, got {magnitude:g}")
+
+
+FOLDER = "folder"
+"""Key of the validation context: where the plant file lies, and so the sheets it names."""
+
+
+class HighPassSettings(Settings):
+    """A lower frequency limit: of an accelerometer, a charge amplifier or a velocity pickup."""
+
+    kind: Literal["high_pass"]
+    """Always "high_pass"."""
+
+    corner_hz: Annotated[float, Field(ge=0.001, le=100.0)]
+    """Of order 1 the -3 dB frequency, of order 2 the natural frequency, Hz; example: 0.5."""
+
+    order: Literal[1, 2] = 1
+    """1 for a single time constant, 2 for a seismic mass or a double time constant."""
+
+    damping: Annotated[float, Field(ge=0.05, le=5.0)] = BUTTERWORTH_DAMPING
+    """Share of critical damping, of order 2 alone; default: -3 dB at the natural frequency."""
+
+    def response(self) -> Response:
+        """Describe the part as the numerics see it."""
+        return HighPass(self.corner_hz, self.order, self.damping)
+
+
+class ResonanceSettings(Settings):
+    """A mounted resonance, or any upper limit of second order."""
+
+    kind: Literal["resonance"]
+    """Always "resonance"."""
+
+    natural_hz: Annotated[float, Field(ge=1.0, le=1e6)]
+    """Natural frequency, Hz; example: 2500.0."""
+
+    damping: Annotated[float, Field(ge=0.001, le=5.0)]
+    """Share of critical damping; example: 0.02."""
+
+    def response(self) -> Response:
+        """Describe the part as the numerics see it."""
+        return Resonance(self.natural_hz, self.damping)
+
+
+class SheetSettings(Settings):
+    """A response measured by a calibration laboratory."""
+
+    kind: Literal["sheet"]
+    """Always "sheet"."""
+
+    file: Annotated[str, Field(min_length=1, max_length=1000)]
+    """CSV with columns frequency_hz, magnitude and phase_deg, seen from the plant file's folder;
+    magnitude is 1 where the nominal sensitivity is exact, phase is positive where the reading leads
+    the motion; example: "ujb_bearing_x.csv"."""
+
+    _table: ResponseTable = PrivateAttr()
+
+    @model_validator(mode="after")
+    def _check(self, info: ValidationInfo) -> Self:
+        folder = (info.context or {}).get(FOLDER, Path())
+        try:
+            self._table = read_calibration_sheet(folder / self.file)
+        except SheetError as error:
+            raise MisfitError(f"names a sheet that cannot be used: {error}", "file") from error
+        return self
+
+    def response(self) -> Response:
+        """Describe the part as the numerics see it."""
+        return self._table
+
+
+ResponseSettings: TypeAlias = Annotated[
+    HighPassSettings | ResonanceSettings | SheetSettings, Field(discriminator="kind")
+]
+"""One part of a response."""
+
+
+def response_of(parts: Sequence[ResponseSettings]) -> Response | None:
+    """Describe all parts together as the numerics see them; none is a flat response."""
+    if not parts:
+        return None
+    return ResponseChain(tuple(part.response() for part in parts))
