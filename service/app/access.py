@@ -1,7 +1,7 @@
 """Who may come in, by what a plant file says."""
 
 from acquisition.clock import Clock
-from service.api.auth.desk import AccessDesk
+from service.api.auth.authenticator import AccessDesk
 from service.settings.addresses import Doorway, is_loopback, why_closed
 from service.settings.plant import PlantFile
 from service.store.access.port import AccessStore

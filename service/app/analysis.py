@@ -8,8 +8,7 @@ from pathlib import Path
 from core.alarms.alarm import AlarmNews
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.api.load.strain import LoadLimits
-from service.api.load.watch import LoadWatch
+from service.api.load import LoadLimits, LoadWatch
 from service.app.captures import captures_of
 from service.app.delivery import receivers_of
 from service.app.evidence import evidence_of, watch

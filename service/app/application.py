@@ -2,12 +2,11 @@
 
 from fastapi import Depends
 
-from service.api.app import create_app
-from service.api.auth.application import GuardedApi
+from service.api.answers import EditionHeader
+from service.api.app import GuardedApi, create_app
 from service.api.context import Context
-from service.api.edition import EditionHeader
 from service.api.problems import refuse_unknown_parameters
-from service.dashboard.edition import edition
+from service.dashboard.assets import edition
 from service.dashboard.routes import dashboard_router
 from service.reports.desk import EvidenceDesk
 from service.reports.routes import evidence_router

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from acquisition.clock import Clock
-from service.api.auth.desk import AccessDesk
+from service.api.auth.authenticator import AccessDesk
 from service.api.auth.refusals import Refusals
 from service.api.context import Context
 from service.app.delivery import receivers_of

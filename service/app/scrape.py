@@ -8,7 +8,7 @@ from importlib.metadata import version
 from prometheus_client.metrics_core import Metric
 from prometheus_client.process_collector import ProcessCollector
 
-from service.api.load.metrics import load_metrics
+from service.api.load import load_metrics
 from service.app.watched import Watched
 from service.measuring.metrics.acquired import link_metrics, sample_metrics
 from service.measuring.metrics.judged import alarm_metrics, film_metrics, result_metrics

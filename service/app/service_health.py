@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 
-from service.api.load.watch import LoadWatch
+from service.api.load import LoadWatch
 from service.live.live_view import LiveView
 from service.measuring.alarms.health import LookAtHealth, ServiceHealth, StreamLook, enough_room
 from service.measuring.bus import Bus

@@ -7,12 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
-from service.api.auth.desk import AccessDesk
+from service.api.auth.authenticator import AccessDesk
 from service.api.auth.refusals import Refusals
 from service.api.context import Context
 from service.api.http.listening import url_of
 from service.api.http.server import GuardedServer
-from service.api.load.shedding import Shedding
+from service.api.load import Shedding
 from service.app.analysis import Analysis
 from service.app.application import application
 from service.app.evidence import evidence_folders

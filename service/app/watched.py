@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from acquisition.clock import Clock
-from service.api.load.watch import LoadWatch
+from service.api.load import LoadWatch
 from service.live.live_view import LiveView
 from service.measuring.alarms.engine import AlarmEngine
 from service.measuring.bus import Bus

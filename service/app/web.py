@@ -10,12 +10,10 @@ from urllib.parse import urlsplit
 from starlette.types import ASGIApp
 
 from acquisition.clock import Clock
-from service.api.http.config import GuardedConfig
-from service.api.http.listening import listen
+from service.api.http.listening import listen, server_tls, socket_file
+from service.api.http.middleware import TrustedProxy
+from service.api.http.protocol import GuardedConfig
 from service.api.http.server import GuardedServer
-from service.api.http.socket_file import socket_file
-from service.api.http.tls import server_tls
-from service.api.http.trusted_proxy import TrustedProxy
 from service.settings.plant import PlantFile
 
 HSTS = ("Strict-Transport-Security", "max-age=31536000")

@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 
 from core.machine.unit import Bearing
-from service.api.bearing_models import ReferenceModel, SetReferenceModel
-from service.api.bearing_views import reference_model, set_reference_model
-from service.api.models import ApiModel
+from service.api.routes.bearings import ReferenceModel, reference_model
+from service.api.routes.references import SetReferenceModel, set_reference_model
+from service.api.values import ApiModel
 from service.measuring.references import with_reference
 from service.store.gap_reference import GapReference
 

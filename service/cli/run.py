@@ -8,8 +8,7 @@ import typer
 
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
-from service.api.http.listening import PortInUseError
-from service.api.http.tls import CertificateError
+from service.api.http.listening import CertificateError, PortInUseError
 from service.app.access import ClosedError
 from service.app.program import Performance, run_service
 from service.app.web import listener_of

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from service.api.models import ApiModel, Time
+from service.api.values import ApiModel, Time
 
 
 class OccurrenceModel(ApiModel):

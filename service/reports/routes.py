@@ -9,13 +9,13 @@ import structlog
 from fastapi import APIRouter, Path, Query, Request, Response
 from fastapi.responses import HTMLResponse, StreamingResponse
 
-from service.api.alarm_routes import AlarmId
-from service.api.alarm_views import LEVEL_NAMES
 from service.api.auth.declared import needs
 from service.api.auth.gate import identity_of
 from service.api.context import Context
 from service.api.downloads import TooManyDownloadsError
 from service.api.problems import ProblemError, described_problems
+from service.api.routes.alarm_models import LEVEL_NAMES
+from service.api.routes.alarms import AlarmId
 from service.reports.archive import DamagedEvidenceError, EvidenceState, Occurrence
 from service.reports.desk import EvidenceDesk, Found
 from service.reports.document import Evidence

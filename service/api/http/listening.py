@@ -1,6 +1,12 @@
-"""The port of the HTTP server, taken before anything else is started."""
+"""What the HTTP server listens on: a port, a socket file, TLS."""
 
+import os
 import socket
+import ssl
+import stat
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
 
 
 class PortInUseError(Exception):
@@ -31,3 +37,88 @@ def url_of(listener: socket.socket, has_tls: bool = False) -> str:
     host, port = listener.getsockname()[:2]
     place = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
     return f"{'https' if has_tls else 'http'}://{place}/"
+
+
+MODE = 0o660
+"""For padwatch's user and its group, which the proxy's user is put into."""
+
+
+@contextmanager
+def socket_file(path: Path) -> Iterator[socket.socket]:
+    """Listen on a socket file; it is removed at the end.
+
+    Raises
+    ------
+    PortInUseError
+        If it cannot be made, is something else, or is listened on already.
+    """
+    _make_way(path)
+    with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as listener:
+        try:
+            before = os.umask(0o777 & ~MODE)
+            try:
+                listener.bind(str(path))
+            finally:
+                os.umask(before)
+            listener.listen(socket.SOMAXCONN)
+        except OSError as error:
+            raise PortInUseError(f"cannot listen on {path}: {error.strerror}") from error
+        try:
+            yield listener
+        finally:
+            path.unlink(missing_ok=True)
+
+
+def _make_way(path: Path) -> None:
+    """Remove what a service that was killed has left."""
+    try:
+        mode = path.lstat().st_mode
+    except OSError:
+        return  # binding says what is wrong
+    if not stat.S_ISSOCK(mode):
+        raise PortInUseError(f"cannot listen on {path}: it is something else than a socket")
+    with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as caller:
+        try:
+            caller.connect(str(path))
+        except ConnectionRefusedError:
+            path.unlink()
+        except OSError as error:
+            raise PortInUseError(f"cannot listen on {path}: {error.strerror}") from error
+        else:
+            raise PortInUseError(f"cannot listen on {path}: another program does")
+
+
+class CertificateError(Exception):
+    """A certificate or its key cannot be used; the message says which and why."""
+
+
+def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
+    """Read a certificate and its key; TLS 1.2 or newer.
+
+    Raises
+    ------
+    CertificateError
+        If a file cannot be read, is none, or the two do not belong together.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    context.set_alpn_protocols(["http/1.1"])
+    for path in (certificate, key):
+        _require_readable(path)
+    try:
+        # an empty passphrase, or OpenSSL would ask for one on the terminal
+        context.load_cert_chain(certificate, key, password="")
+    except (ssl.SSLError, ValueError) as error:
+        why = getattr(error, "reason", None) or str(error)
+        raise CertificateError(
+            f"service.tls: {certificate} and {key} are no certificate and its key: {why}"
+        ) from error
+    return context
+
+
+def _require_readable(path: Path) -> None:
+    try:
+        with path.open("rb") as file:
+            file.read(1)
+    except OSError as error:
+        raise CertificateError(f"service.tls: {path}: {error.strerror}") from error

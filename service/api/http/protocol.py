@@ -1,19 +1,19 @@
-"""Uvicorn's HTTP/1.1 protocol with deadlines, sizes and counts, which it has none of.
-
-Uvicorn closes a connection only that is silent *after* an answer: one that never finishes its
-headers or body, or never reads its answer, stays for ever.
-"""
+"""Uvicorn's HTTP/1.1 protocol with deadlines, sizes and counts."""
 
 import asyncio
+from collections.abc import Callable, Iterable
 from enum import Enum, auto
-from typing import Any
+from typing import Any, cast
 
 import httptools
+import uvicorn
+from starlette.types import ASGIApp
 from uvicorn._types import ASGI3Application
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 from uvicorn.server import ServerState
 
-from service.api.http.config import GuardedConfig
+from service.api.http.connections import Connections
+from service.api.http.middleware import ALWAYS, API_ONLY, BoundedAnswers, guarded
 from service.api.http.refusals import (
     FULL,
     HEAD_TOO_LARGE,
@@ -22,7 +22,49 @@ from service.api.http.refusals import (
     TOO_SLOW,
     Refusal,
 )
-from service.api.http.security_headers import ALWAYS, API_ONLY
+from service.settings.http_limits import HttpLimitSettings
+
+STOP_S = 2
+"""When uvicorn gives up what the server has not given up before, which logs a traceback."""
+
+
+class GuardedConfig(uvicorn.Config):
+    """Uvicorn's configuration, the open connections and the answers that are worked on.
+
+    Parameters
+    ----------
+    hosts
+        Names by which the service may be asked for, besides those of loopback and the settings.
+    now_s
+        Steady time in seconds, for the deadlines.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        limits: HttpLimitSettings,
+        hosts: Iterable[str],
+        now_s: Callable[[], float],
+        **options: Any,
+    ) -> None:
+        self.answers = BoundedAnswers(app, limits)
+        super().__init__(
+            cast(
+                Any, guarded(self.answers, limits, hosts)
+            ),  # Starlette and uvicorn name its type apart
+            http="service.api.http.protocol:GuardedProtocol",
+            ws="none",
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            lifespan="off",
+            proxy_headers=False,  # uvicorn would believe everybody on this computer
+            timeout_keep_alive=round(limits.keep_alive_s),
+            timeout_graceful_shutdown=STOP_S,
+            **options,
+        )
+        self.connections = Connections(limits, now_s)
+
 
 MAX_PIPELINED = 8
 """Requests that a client may send ahead of its answers; browsers send none."""

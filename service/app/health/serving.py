@@ -5,7 +5,7 @@ import socket
 from functools import partial
 
 from acquisition.clock import Clock
-from service.api.http.config import GuardedConfig
+from service.api.http.protocol import GuardedConfig
 from service.api.http.server import GuardedServer
 from service.app.health.page import Health, health_app
 from service.runtime.heartbeats import Heartbeats

@@ -10,7 +10,7 @@ from core.alarms.alarm import AlarmChange, AlarmState
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
-from service.api.alarm_names import AlarmChangeName, AlarmStateName
+from service.api.routes.alarm_models import AlarmChangeName, AlarmStateName
 
 RATES = "/api/v1/alarms/rates"
 LINK = "U1:link:link_lost"

@@ -14,7 +14,7 @@ from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD, Reading
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import CrossSpectrum
-from service.api.spectra_views import MAX_NUMBERS
+from service.api.routes.spectra import MAX_NUMBERS
 from service.settings.core_values import analysis_of, machine_of
 from service.settings.plant import PlantFile
 

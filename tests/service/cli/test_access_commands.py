@@ -11,8 +11,8 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
+from service.api.auth.authenticator import Doors, LoggedIn, Refusal
 from service.api.auth.backoff import Backoff
-from service.api.auth.doors import Doors, LoggedIn, Refusal
 from service.api.auth.passwords import Hashing
 from service.cli.commands import app
 from service.runtime.made_by import made_by

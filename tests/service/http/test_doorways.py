@@ -10,10 +10,8 @@ from typing import Any
 
 import pytest
 
-from service.api.http.listening import PortInUseError
-from service.api.http.socket_file import socket_file
-from service.api.http.tls import CertificateError, server_tls
-from service.api.http.trusted_proxy import TrustedProxy
+from service.api.http.listening import CertificateError, PortInUseError, server_tls, socket_file
+from service.api.http.middleware import TrustedProxy
 
 
 def test_nothing_older_than_tls_1_2_is_spoken(certificate: tuple[Path, Path]) -> None:

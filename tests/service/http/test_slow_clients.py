@@ -9,9 +9,9 @@ import pytest
 from rigs.tiers import covering
 from starlette.responses import PlainTextResponse
 
-from service.api.http.config import GuardedConfig
+from service.api.http.listening import server_tls
+from service.api.http.protocol import GuardedConfig
 from service.api.http.server import GuardedServer
-from service.api.http.tls import server_tls
 from service.settings.http_limits import HttpLimitSettings
 
 LARGE_MIB = 64

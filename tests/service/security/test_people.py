@@ -9,7 +9,7 @@ from argon2.low_level import Type
 from harness.places import Place
 
 from core.units import DAY_NS
-from service.api.auth.doors import Doors, LoggedIn, Refusal
+from service.api.auth.authenticator import Doors, LoggedIn, Refusal
 from service.api.auth.passwords import Hashing, PasswordRefusedError, new_password, plant_hasher
 from service.api.auth.people import SET_UP_S, People, create_key
 from service.store.access.acting import Acting, acting_as
