@@ -186,7 +186,7 @@ VITAL = re.compile(
     r"/(livez|readyz|metrics)"
     r"|/api/v1/alarms(/[^/]+)?"  # the list, and one of it
     r"|/api/v1/session"
-    r"|/(?!api/).*"  # the pages themselves, without which nobody sees an alarm
+    r"|/(?!api/).*"  # the pages, which show the alarms
 )
 """Paths that are never refused; neither are requests that change something."""
 

@@ -28,7 +28,7 @@ LoginName = Annotated[str, Field(max_length=4 * MAX_NAME, examples=["anna"])]
 
 
 Password = Annotated[
-    str, Field(max_length=4 * MAX_LENGTH, examples=["a sentence that nobody guesses"])
+    str, Field(max_length=4 * MAX_LENGTH, examples=["a long and unusual sentence"])
 ]
 
 

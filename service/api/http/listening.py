@@ -10,28 +10,28 @@ from pathlib import Path
 
 
 class PortInUseError(Exception):
-    """The HTTP port cannot be listened on; the message says which and why."""
+    """A port or socket file cannot be listened on; the message gives the reason."""
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Take the HTTP port.
+    """Listen on a port.
 
     Raises
     ------
     PortInUseError
-        If it cannot be had.
+        If that is not possible.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
-        # what Python adds in brackets repeats the address
+        # without the address, which Python repeats in brackets
         why = (error.strerror or str(error)).partition(" (")[0]
         raise PortInUseError(f"cannot listen on {host} port {port}: {why}") from error
 
 
 def url_of(listener: socket.socket, has_tls: bool = False) -> str:
-    """Where the service is found."""
+    """Return the URL of the service."""
     if listener.family == socket.AF_UNIX:
         return f"unix:{listener.getsockname()}"
     host, port = listener.getsockname()[:2]
@@ -40,17 +40,17 @@ def url_of(listener: socket.socket, has_tls: bool = False) -> str:
 
 
 MODE = 0o660
-"""For padwatch's user and its group, which the proxy's user is put into."""
+"""Mode of a socket file: padwatch's user and group, to which the proxy belongs."""
 
 
 @contextmanager
 def socket_file(path: Path) -> Iterator[socket.socket]:
-    """Listen on a socket file; it is removed at the end.
+    """Listen on a socket file, removed at the end; its mode decides who may connect.
 
     Raises
     ------
     PortInUseError
-        If it cannot be made, is something else, or is listened on already.
+        If it cannot be created, is no socket, or is in use.
     """
     _make_way(path)
     with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as listener:
@@ -70,13 +70,13 @@ def socket_file(path: Path) -> Iterator[socket.socket]:
 
 
 def _make_way(path: Path) -> None:
-    """Remove what a service that was killed has left."""
+    """Remove the socket file of a service that was killed."""
     try:
         mode = path.lstat().st_mode
     except OSError:
-        return  # binding says what is wrong
+        return  # bind reports the error
     if not stat.S_ISSOCK(mode):
-        raise PortInUseError(f"cannot listen on {path}: it is something else than a socket")
+        raise PortInUseError(f"cannot listen on {path}: it is not a socket")
     with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as caller:
         try:
             caller.connect(str(path))
@@ -89,16 +89,16 @@ def _make_way(path: Path) -> None:
 
 
 class CertificateError(Exception):
-    """A certificate or its key cannot be used; the message says which and why."""
+    """An unusable certificate or key; the message gives the reason."""
 
 
 def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
-    """Read a certificate and its key; TLS 1.2 or newer.
+    """Return a TLS context for a certificate and its key, TLS 1.2 or newer.
 
     Raises
     ------
     CertificateError
-        If a file cannot be read, is none, or the two do not belong together.
+        If a file is unreadable or invalid, or the key does not match.
     """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
     context.minimum_version = ssl.TLSVersion.TLSv1_2
@@ -106,7 +106,7 @@ def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
     for path in (certificate, key):
         _require_readable(path)
     try:
-        # an empty passphrase, or OpenSSL would ask for one on the terminal
+        # an empty passphrase keeps OpenSSL from prompting
         context.load_cert_chain(certificate, key, password="")
     except (ssl.SSLError, ValueError) as error:
         why = getattr(error, "reason", None) or str(error)

@@ -24,13 +24,13 @@ from service.settings.http_limits import HttpLimitSettings
 
 
 class HeadRequests:
-    """ASGI middleware that passes HEAD on as GET, and drops the body of the answer."""
+    """ASGI middleware that handles HEAD as GET without a body (RFC 9110, 9.3.2)."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on."""
+        """Forward a request."""
         if scope.get("method") != "HEAD":
             await self._app(scope, receive, send)
             return
@@ -44,19 +44,21 @@ class HeadRequests:
 
 
 HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::[0-9]{1,5})?")
-"""A name or an address, an IPv6 one in brackets, and perhaps a port."""
+"""Name, IPv4 address or bracketed IPv6 address, with an optional port."""
 
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
 class KnownHosts:
-    """ASGI middleware that refuses requests for anybody else.
+    """ASGI middleware that refuses requests for unknown hosts.
+
+    A page of another site can let its own name point to 127.0.0.1 (DNS rebinding); the Host header
+    still has that name.
 
     Parameters
     ----------
     hosts
-        Names and addresses, without port, besides those of loopback and the address that a client
-        came to: a page of another site has a name.
+        Names and addresses without port, besides loopback and the address of the server.
     """
 
     def __init__(self, app: ASGIApp, hosts: Iterable[str]) -> None:
@@ -64,7 +66,7 @@ class KnownHosts:
         self._known = {host.lower().strip("[]").rstrip(".") for host in (*LOOPBACK, *hosts)}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on if it is for this service."""
+        """Forward a request for this service."""
         asked = [value for name, value in scope["headers"] if name == b"host"]
         if len(asked) != 1 or not asked[0]:
             await NO_HOST.send(scope, send)
@@ -79,7 +81,7 @@ class KnownHosts:
 
 
 def _name(host: str) -> str:
-    """A Host header without its port; empty if it is malformed."""
+    """Return a Host header without its port; empty if it is malformed."""
     found = HOST.fullmatch(host)
     return found[1].strip("[]").rstrip(".").lower() if found else ""
 
@@ -91,23 +93,23 @@ ALWAYS = (
     (b"cross-origin-resource-policy", b"same-origin"),
     (b"permissions-policy", b"camera=(), geolocation=(), microphone=(), payment=(), usb=()"),
 )
-"""On every answer."""
+"""Headers of every answer."""
 
 API_ONLY = (
     (b"content-security-policy", b"default-src 'none'; base-uri 'none'; frame-ancestors 'none'"),
     (b"cache-control", b"no-store"),
 )
-"""Where an answer brings none of its own: the dashboard and the evidence report do."""
+"""Headers of answers without their own, which dashboard and evidence report have."""
 
 
 class SecurityHeaders:
-    """ASGI middleware that adds them where the application has not."""
+    """ASGI middleware that adds missing security headers."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, and complete what comes back."""
+        """Forward a request and add headers to the answer."""
 
         async def completed(message: Message) -> None:
             if message["type"] == "http.response.start":
@@ -123,13 +125,13 @@ FOR, PROTO = b"x-forwarded-for", b"x-forwarded-proto"
 
 
 class TrustedProxy:
-    """ASGI middleware for a server that only a trusted proxy can reach."""
+    """ASGI middleware for a unix socket behind a trusted proxy: client address and scheme."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on as one that comes from where the proxy says."""
+        """Forward a request with the client and scheme reported by the proxy."""
         if scope["type"] == "http":
             scope["client"] = _client(_last(scope, FOR))
             scope["scheme"] = "https" if _last(scope, PROTO).lower() == "https" else "http"
@@ -137,7 +139,7 @@ class TrustedProxy:
 
 
 def _last(scope: Scope, name: bytes) -> str:
-    """The last of a list in headers: the proxy has added it, what is before may be made up."""
+    """Return the last value of a list header, which the proxy added; others may be forged."""
     values = [value for found, value in scope["headers"] if found == name]
     return values[-1].decode("latin-1").rpartition(",")[2].strip() if values else ""
 
@@ -150,13 +152,13 @@ def _client(address: str) -> tuple[str, int] | None:
 
 
 TOKEN = re.compile(rb'"(?:[^"\\]++|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
-"""A string, or what remains of one that is not closed; or a bracket. Never goes back."""
+"""A string, closed or not, or a bracket; without backtracking."""
 
 
 def is_deeper_than(limit: int, text: bytes) -> bool:
-    """Whether lists and objects are nested deeper; the text need not be correct."""
+    """Whether lists and objects of a text, valid JSON or not, are nested too deeply."""
     if text.count(b"[") + text.count(b"{") <= limit:
-        return False  # as of all sound requests: cheaper than to look at each string
+        return False  # true of all usual requests, and cheaper than scanning strings
     depth = 0
     for match in TOKEN.finditer(text):
         first = text[match.start()]
@@ -170,20 +172,20 @@ def is_deeper_than(limit: int, text: bytes) -> bool:
 
 
 class TooLargeError(Exception):
-    """A body is larger than allowed."""
+    """A body above the limit."""
 
 
 class WholeBodies:
-    """ASGI middleware that reads a body before the application is asked.
+    """ASGI middleware that reads the whole body before it calls the application.
 
-    How long it may take is for the connection to say.
+    The connection limits the time for it.
     """
 
     def __init__(self, app: ASGIApp, limits: HttpLimitSettings) -> None:
         self._app, self._limits = app, limits
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on with its body in one piece."""
+        """Forward a request with its whole body."""
         try:
             body = await self._body(scope, receive)
         except TooLargeError:
@@ -226,12 +228,12 @@ class WholeBodies:
 
 def _says_more(length: bytes, limit: int) -> bool:
     digits = length.strip().lstrip(b"0")
-    # int() of very long numbers is slow, and refused from 4300 digits on
+    # int() of very long numbers is slow, and fails from 4300 digits
     return len(digits) > 18 or int(digits or b"0") > limit
 
 
 def _given(body: bytes, receive: Receive) -> Receive:
-    """The body once, then what the connection says."""
+    """Return a receiver of the body, then of the messages of the connection."""
     whole: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def given() -> Message:
@@ -241,9 +243,9 @@ def _given(body: bytes, receive: Receive) -> Receive:
 
 
 class BoundedAnswers:
-    """ASGI middleware that refuses one request too many, and gives up on what takes too long.
+    """ASGI middleware that limits the number of concurrent requests and the time of each.
 
-    Both count until an answer begins: from there on the connection watches the one who reads it.
+    Both limits end when an answer starts; then the connection limits the time.
     """
 
     def __init__(self, app: ASGIApp, limits: HttpLimitSettings) -> None:
@@ -252,7 +254,7 @@ class BoundedAnswers:
         self._deadlines: set[asyncio.Timeout] = set()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on if there is room for it."""
+        """Forward a request, or refuse it above the limit."""
         if self._n_running >= self._limits.max_requests:
             await BUSY.send(scope, send)
             return
@@ -261,13 +263,13 @@ class BoundedAnswers:
         try:
             is_answered = await self._answered(scope, receive, send)
         finally:
-            asker.has_gone = True  # a thread may still be at it
+            asker.has_gone = True  # a thread may still be working
             ASKER.reset(before)
         if not is_answered:
             await NO_ANSWER.send(scope, send)
 
     def give_up(self) -> None:
-        """Let no answer begin any more that has not begun."""
+        """Stop requests whose answers have not started."""
         for deadline in self._deadlines:
             deadline.reschedule(0.0)
 
@@ -277,7 +279,7 @@ class BoundedAnswers:
         async def watched(message: Message) -> None:
             nonlocal has_begun
             if deadline.expired():
-                return  # what is still said on the way out
+                return  # sent while the application is cancelled
             if not has_begun:
                 has_begun = True
                 self._n_running -= 1
@@ -302,9 +304,9 @@ class BoundedAnswers:
 
 
 def guarded(answers: BoundedAnswers, limits: HttpLimitSettings, hosts: Iterable[str]) -> ASGIApp:
-    """Put the rest of the defence before an application whose answers are bounded.
+    """Add the other middleware to an application with bounded answers.
 
-    Bodies come before the count of requests, so that slow senders use up nobody's place.
+    Bodies are read before requests are counted, so that slow senders take no place.
     """
     bodies = WholeBodies(answers, limits)
     return HeadRequests(SecurityHeaders(KnownHosts(bodies, hosts)))
