@@ -24,7 +24,7 @@ def written_as_date(text: object) -> object:
         If the text is a bare number.
     """
     if isinstance(text, str) and "-" not in text[1:]:
-        raise ValueError("write a time like 2026-11-21T08:00:00Z")
+        raise ValueError("a time is written like 2026-11-21T08:00:00Z")
     return text
 
 

@@ -110,9 +110,7 @@ def create_key(
     if not 1 <= days <= MAX_DAYS:
         raise AccessRefusedError(f"a key is valid for 1 to {MAX_DAYS} days, not for {days}")
     if role is Role.ADMIN and units:
-        raise AccessRefusedError(
-            "accounts belong to no unit; a key for some units cannot be an admin key"
-        )
+        raise AccessRefusedError("a key for some units cannot have the role admin")
     id_, shown = new_key()
     open_units = tuple(dict.fromkeys(units))
     expires_ns = now_ns + days * DAY_NS

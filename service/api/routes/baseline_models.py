@@ -271,7 +271,7 @@ class BaselineActionModel(ActorModel):
 def _only_text(value: object) -> object:
     """Reject numbers, whose epoch and unit are unknown."""
     if not isinstance(value, str):
-        raise ValueError("write a time like 2026-11-21T08:00:00Z")
+        raise ValueError("a time is written like 2026-11-21T08:00:00Z")
     return written_as_date(value)
 
 

@@ -402,8 +402,6 @@ def _n_samples(seconds: float, rate_hz: float, n_channels: int) -> int:
     n_samples = max(1, round(seconds * rate_hz))
     if n_samples * n_channels > MAX_NUMBERS:
         longest_s = MAX_NUMBERS / n_channels / rate_hz
-        detail = (
-            f"{seconds:g} s of {n_channels} channels are too long; the maximum is {longest_s:g} s"
-        )
+        detail = f"{seconds:g} s of {n_channels} channels are too long; at most {longest_s:g} s"
         raise ProblemError(422, "Wrong parameter", detail, "seconds")
     return n_samples

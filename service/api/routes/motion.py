@@ -396,5 +396,5 @@ def _unit_of(context: Context, kept: Kept) -> str:
 
 def _require_few(seconds: float, rate_hz: float) -> None:
     if seconds * rate_hz > MAX_SAMPLES:
-        detail = f"{seconds:g} s are too long; the maximum is {MAX_SAMPLES / rate_hz:g} s"
+        detail = f"{seconds:g} s are too long; at most {MAX_SAMPLES / rate_hz:g} s"
         raise ProblemError(422, "Wrong parameter", detail, "seconds")

@@ -11,9 +11,9 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from starlette.types import Message
 
-from service.api import answers as told
 from service.api.answers import EditionHeader
 from service.api.http.middleware import BoundedAnswers
+from service.dashboard import assets as told
 from service.dashboard.assets import Asset, edition, pages, plotly
 from service.dashboard.routes import dashboard_router
 from service.settings.http_limits import HttpLimitSettings

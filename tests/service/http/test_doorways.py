@@ -53,7 +53,7 @@ def test_a_socket_file_is_for_user_and_group_and_goes_at_the_end(tmp_path: Path)
 def test_nothing_else_is_ever_removed_for_a_socket(tmp_path: Path) -> None:
     path = tmp_path / "notes.txt"
     path.write_text("keep")
-    with pytest.raises(PortInUseError, match="something else"), socket_file(path):
+    with pytest.raises(PortInUseError, match="not a socket"), socket_file(path):
         pass
     running = tmp_path / "http.sock"
     with socket_file(running):
