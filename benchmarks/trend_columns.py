@@ -12,9 +12,8 @@ from collections.abc import Callable
 
 from core.monitor.catalogue import CATALOGUE
 from core.quality import Level
-from service.api.models import ApiModel, LevelName
-from service.api.trend_views import trend_model
-from service.api.views import LEVEL_NAMES
+from service.api.routes.trends import trend_model
+from service.api.values import LEVEL_NAMES, ApiModel, LevelName
 from service.store.port import Trend, TrendQuery, TrendSeries
 
 N_POINTS, N_QUANTITIES = 1000, 12

@@ -18,8 +18,8 @@ import numpy as np
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingState
 from core.monitor.catalogue import CATALOGUE
-from service.api.trend_groups import trend_groups
-from service.api.trend_views import trend_columns, trend_model
+from service.api.routes.trend_groups import trend_groups
+from service.api.routes.trends import trend_columns, trend_model
 from service.store.buckets import Summaries
 from service.store.port import TrendQuery
 from service.store.rollups.making import insert_cells

@@ -1,44 +1,120 @@
-"""The HTTP application: API, health and metrics."""
+"""The HTTP application: routers, gate, published description."""
 
+import asyncio
+import json
+from collections.abc import Mapping
 from importlib.metadata import version
+from threading import Lock
+from typing import Any
 
-from fastapi import Depends
+from fastapi import Depends, FastAPI, Request, Response
 
-from service.api.alarm_rate_routes import alarm_rate_router
-from service.api.alarm_routes import alarm_by_id_router, alarm_router, operation_router
-from service.api.audit_routes import audit_router
-from service.api.audit_trail import AuditTrail
-from service.api.auth.account_routes import account_router
-from service.api.auth.application import GuardedApi
-from service.api.auth.desk import AccessDesk
-from service.api.auth.key_routes import key_router
-from service.api.auth.refusals import Refusals
-from service.api.auth.session_routes import session_router
-from service.api.baseline_routes import baseline_action_router, baseline_router
-from service.api.bearing_routes import bearing_router, gap_router
-from service.api.centre_routes import centre_router
-from service.api.channel_routes import channel_router
-from service.api.configuration_routes import configuration_router
+from service.api.answers import OriginHeader, Revalidation, digest_of, tag_of
+from service.api.auth.accounts import account_router, key_router
+from service.api.auth.authenticator import AccessDesk
+from service.api.auth.declared import Declared, declared
+from service.api.auth.gate import Gate, require_declared
+from service.api.auth.refusals import AuditTrail, Refusals
+from service.api.auth.sessions import session_router
 from service.api.context import Context
-from service.api.delivery_routes import delivery_router
-from service.api.film_routes import film_router
-from service.api.health_routes import health_router
-from service.api.metrics_routes import metrics_router
-from service.api.motion_routes import motion_router, recorded_motion_router
-from service.api.order1_reference_routes import order1_reference_router
-from service.api.origin_header import OriginHeader
-from service.api.plant_routes import plant_router
+from service.api.health import health_router, metrics_router
+from service.api.openapi import describe_access, describe_answers
 from service.api.problems import (
     any_other_problem,
     install_problem_handlers,
     refuse_unknown_parameters,
 )
-from service.api.recording_routes import recording_router
-from service.api.reference_routes import reference_router
-from service.api.revalidation import Revalidation
-from service.api.source_routes import source_router
-from service.api.spectra_routes import spectra_router
-from service.api.trend_routes import trend_router
+from service.api.routes.alarm_rates import alarm_rate_router
+from service.api.routes.alarms import alarm_by_id_router, alarm_router, operation_router
+from service.api.routes.audit import audit_router
+from service.api.routes.baselines import baseline_action_router, baseline_router
+from service.api.routes.bearings import bearing_router
+from service.api.routes.channels import channel_router
+from service.api.routes.film_history import film_history_router
+from service.api.routes.films import film_router
+from service.api.routes.motion import motion_router, recorded_motion_router
+from service.api.routes.notifications import delivery_router
+from service.api.routes.overview import overview_router
+from service.api.routes.plant import configuration_router, gap_router, plant_router, source_router
+from service.api.routes.recordings import recording_router
+from service.api.routes.references import order1_reference_router, reference_router
+from service.api.routes.shaft_centre import centre_router
+from service.api.routes.spectra import spectra_router
+from service.api.routes.trends import trend_router
+
+
+class GuardedApi(FastAPI):
+    """FastAPI application whose routes all declare what they need, behind a gate.
+
+    Parameters
+    ----------
+    options
+        Options of FastAPI.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(dependencies=[Depends(require_declared)], **options)
+        self._declared: Mapping[str, Declared] = {}
+        self._describing, self._rendering = Lock(), Lock()
+        self._rendered: tuple[bytes, str] | None = None
+
+    def setup(self) -> None:
+        """Add the route of the OpenAPI document; FastAPI would render it for each request."""
+        if self.openapi_url:
+            self.add_route(self.openapi_url, self._published, include_in_schema=False)
+
+    def stand_behind(self, desk: AccessDesk) -> None:
+        """Add the gate; middleware added later runs before it."""
+        self.add_middleware(Gate, declared=lambda: self.declared, desk=desk)
+
+    def require_declarations(self) -> None:
+        """Collect the declarations of all routes; call this after the last route was added.
+
+        Raises
+        ------
+        UndeclaredRouteError
+            If a route has no declaration.
+        """
+        self._declared = declared(self)
+
+    @property
+    def declared(self) -> Mapping[str, Declared]:
+        """Needs of each operation by method and path."""
+        return self._declared
+
+    def openapi(self) -> dict[str, Any]:
+        """Return the OpenAPI document, made once after all routes were added.
+
+        Concurrent callers wait until it is complete.
+        """
+        with self._describing:
+            if self.openapi_schema is not None:
+                return self.openapi_schema
+            document: dict[str, Any] = super().openapi()
+            describe_access(document, self.declared)
+            describe_answers(document)
+            return document
+
+    def rendered(self) -> tuple[bytes, str]:
+        """Return the OpenAPI document as JSON and its entity tag, made once in about 0.3 s."""
+        with self._rendering:
+            if self._rendered is None:
+                document = _json(self.openapi())
+                self._rendered = document, tag_of(digest_of(document))
+            return self._rendered
+
+    async def _published(self, _: Request) -> Response:
+        # made in a thread, not on the event loop
+        rendered = self._rendered
+        if rendered is None:
+            rendered = await asyncio.to_thread(self.rendered)
+        document, tag = rendered
+        return Response(document, media_type="application/json", headers={"ETag": tag})
+
+
+def _json(document: dict[str, Any]) -> bytes:
+    return json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()
+
 
 DESCRIPTION = """
 Oil-film stiffness of hydrogenerator guide bearings, measured while the machine runs.
@@ -49,13 +125,13 @@ Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
 
 
 def create_app(context: Context) -> GuardedApi:
-    """Put the API together; pages and evidence are added by whoever has them."""
+    """Build the API; the caller adds pages and evidence."""
     app = GuardedApi(
         title="padwatch",
         version=version("padwatch"),
         description=DESCRIPTION,
         openapi_url="/api/v1/openapi.json",
-        docs_url=None,  # its pages would load scripts from elsewhere
+        docs_url=None,  # its pages load scripts from other sites
         redoc_url=None,
         responses=any_other_problem(),
     )
@@ -68,6 +144,7 @@ def create_app(context: Context) -> GuardedApi:
     install_problem_handlers(app)
     for router in (
         health_router(context),
+        overview_router(context),
         plant_router(context),
         channel_router(context),
         source_router(context),
@@ -80,6 +157,7 @@ def create_app(context: Context) -> GuardedApi:
         centre_router(context),
         reference_router(context),
         film_router(context),
+        film_history_router(context),
         baseline_router(context),
         baseline_action_router(context),
         alarm_router(context),

@@ -11,11 +11,11 @@ from service.store.access.audit_entries import AuditEntry
 HEADER = ("time", *(field.name for field in fields(AuditEntry)))
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "|", "%", "'", "＝", "＋", "－", "＠")
-"""A spreadsheet takes what begins so for more than text; the quote, so that it can be undone."""
+"""Beginnings of text that spreadsheets interpret; the quote, so that the guard is reversible."""
 
 
 def write_csv(file: TextIO, entries: Iterable[AuditEntry]) -> int:
-    """Write entries, one a row; return how many.
+    """Write one row per entry; return the number of rows.
 
     Text that a spreadsheet could take for a formula begins with a single quote.
     """
@@ -29,7 +29,7 @@ def write_csv(file: TextIO, entries: Iterable[AuditEntry]) -> int:
 
 
 def harmless(text: str) -> str:
-    """A text that no spreadsheet takes for a formula; what is no text is replaced."""
+    """Return text guarded against formulas; invalid characters are replaced."""
     text = text.encode("utf-8", "replace").decode("utf-8").replace("\0", "\ufffd")
     is_formula = text.lstrip(" \u00a0\ufeff").startswith(FORMULA) or text.startswith(FORMULA)
     return f"'{text}" if is_formula else text

@@ -1,32 +1,192 @@
-"""What the API's routes work with."""
+"""What the routes work with."""
 
 import pathlib
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Protocol
 
 from fastapi import Path
 from prometheus_client.registry import Collector
 
 from acquisition.clock import Clock
-from service.api.auth.desk import AccessDesk
+from core.alarms.alarm import Alarm
+from core.alarms.judgements import VectorReference
+from core.alarms.operation import Action
+from core.baseline.baseline import BearingBaseline
+from core.change.film_judge import FilmNews
+from core.change.settings import FilmRules
+from core.monitor.assessment import Assessment
+from core.quality import Reason
+from core.samples.blocks import SampleBlock
+from service.api.auth.authenticator import AccessDesk
 from service.api.auth.refusals import Refusals
-from service.api.delivery_look import DeliveryLook
 from service.api.downloads import Downloads
-from service.api.load.watch import LoadWatch
-from service.api.ports import CaptureLook, FilmBoard, LiveLook, Operators
+from service.api.load import LoadWatch
 from service.api.problems import ProblemError
 from service.live.alarm_board import AlarmBoard
+from service.live.commands import BaselineAction, FilmPlace
 from service.live.evidence import EvidenceStatus
+from service.live.live_view import CurrentBearing, UnitStatus
 from service.measuring.references_in_force import ReferencesInForce
+from service.notifications.sender import ReceiverView
 from service.recordings.continuous_recorder import Tape
 from service.runtime.disk import SpaceWatch
 from service.runtime.polls import TimedSource
 from service.settings.bearings import BearingSettings
 from service.settings.configuration import Configuration
+from service.settings.films import FilmAlarmSettings
 from service.settings.storage import Origin
 from service.settings.units import UnitSettings
 from service.store.port import Store
+
+
+class LiveLook(Protocol):
+    """Live state; see :class:`service.live.live_view.LiveView`."""
+
+    @property
+    def revision(self) -> int:
+        """Number that changes with every link change and result."""
+        ...
+
+    @property
+    def store_error(self) -> str | None:
+        """Why results are not stored or read; None if they are."""
+        ...
+
+    @property
+    def n_unstored(self) -> int:
+        """Number of dropped findings."""
+        ...
+
+    def status(self, unit: str) -> UnitStatus:
+        """Return the state of the source of a unit."""
+        ...
+
+    def blocks(self, unit: str) -> Sequence[SampleBlock]:
+        """Return the newest blocks of a unit; raise `NotHereError` if this process has none."""
+        ...
+
+    def newest_block(self, unit: str) -> SampleBlock | None:
+        """Return the newest block of a unit; None without one."""
+        ...
+
+    def why_no_samples(self, unit: str) -> Reason | None:
+        """Return why the newest samples of a unit are not current; None if they are."""
+        ...
+
+    def data_age_s(self, unit: str) -> float | None:
+        """Return the age of the newest block; None without one."""
+        ...
+
+    def assessment(self, unit: str, bearing: str) -> Assessment | None:
+        """Return the newest result with spectrum and orbit; raise as `blocks` does."""
+        ...
+
+    def current(self, unit: str, bearing: str) -> CurrentBearing:
+        """Return the newest result; values that are not current are missing."""
+        ...
+
+
+class FilmBoard(Protocol):
+    """The films of all bearings; see :class:`service.measuring.films.keeper.FilmKeeper`."""
+
+    @property
+    def unwatched(self) -> Mapping[str, str]:
+        """Why films are not watched, by unit."""
+        ...
+
+    @property
+    def settings(self) -> FilmAlarmSettings:
+        """Settings of film monitoring."""
+        ...
+
+    def rules(self, unit: str) -> FilmRules | None:
+        """Return the film rules of a unit; None if its films are not watched."""
+        ...
+
+    def place(self, unit: str, bearing: str) -> FilmPlace | None:
+        """Return a bearing with its estimator; None if it is not watched."""
+        ...
+
+    def newest(self, unit: str, bearing: str) -> FilmNews | None:
+        """Return the newest findings of a bearing."""
+        ...
+
+    def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
+        """Return the baseline in force of a bearing."""
+        ...
+
+
+class CaptureLook(Protocol):
+    """Samples around alarms; see :class:`service.recordings.capture.captures.Captures`."""
+
+    @property
+    def error(self) -> str | None:
+        """Why the newest recording failed; None if it did not."""
+        ...
+
+    @property
+    def trouble(self) -> str | None:
+        """Why samples are not recorded now."""
+        ...
+
+    @property
+    def n_running(self) -> int:
+        """Number of recordings in progress."""
+        ...
+
+    @property
+    def n_written(self) -> int:
+        """Number of recordings finished since the start."""
+        ...
+
+    @property
+    def being_made(self) -> Set[tuple[str, int]]:
+        """Alarms and occurrences of the recordings in progress."""
+        ...
+
+
+class Operators(Protocol):
+    """Carries out operations in the process that analyses the unit."""
+
+    async def operate(self, id_: str, action: Action) -> Alarm:
+        """Carry out an operation on an alarm; return the stored alarm.
+
+        Raises
+        ------
+        LookupError
+            If there is no such alarm.
+        ActionRefusedError
+            If the operation does not fit the state of the alarm.
+        NotCarriedOutError
+            If no process carries it out, or the disk does not answer.
+        """
+        ...
+
+    async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
+        """Carry out an action on the baselines of a bearing; it is stored on return.
+
+        Raises
+        ------
+        BaselineRefusedError
+            If the action does not fit the baselines.
+        NotCarriedOutError
+            If no process carries it out.
+        """
+        ...
+
+    async def refer_to(self, reference: VectorReference) -> None:
+        """Apply a 1× reference that was just stored."""
+        ...
+
+
+class DeliveryLook(Protocol):
+    """Receivers of alarm messages; see :class:`service.notifications.deliveries.Deliveries`."""
+
+    async def look(self) -> Sequence[ReceiverView]:
+        """Return the state of all receivers."""
+        ...
+
 
 UnitId = Annotated[str, Path(description="Identifier of a unit.", examples=["U1"])]
 BearingId = Annotated[str, Path(description="Identifier of a bearing.", examples=["UJB"])]
@@ -37,40 +197,40 @@ QuantityName = Annotated[
 
 @dataclass(frozen=True)
 class Context:
-    """The running service, as far as the API needs it.
+    """Parts of the running service that the API uses.
 
     Parameters
     ----------
     refresh_s
-        Time from one result to the next.
+        Period of results.
     evidence
-        How the evidence of alarms is kept; None where none is.
+        State of the evidence of alarms; None where none is kept.
     configuration
-        What the plant is configured as, without its secrets; None where none is kept.
+        Plant file without secrets; None where none is kept.
     metrics
-        What is told to Prometheus; None where nobody asks.
+        Metrics for Prometheus; None without metrics.
     loops
-        What is wrong with each loop of the program; None where nothing is.
+        Fault of each loop of the program; None if it is alive.
     stored_trouble
-        In what stored data are not what was stored; None as far as nothing is known to be wrong.
+        Known damage of stored data; None if there is none.
     checks
-        What readiness is told besides, by name; none of it makes the service unready.
+        Further checks of readiness by name; they are shown only.
     access
-        Tells who asks; None for one that asks nobody on this computer.
+        Identifies callers; None for one without logins on this computer.
     space
-        Knows how full the disks are; None where nobody looks.
+        Watch of the disks; None without one.
     load
-        Knows which questions are refused now; None where none ever are.
+        Requests refused under load; None if none ever are.
     tape
-        Continuous recording; None where this process records nothing.
+        Continuous recording; None if this process records nothing.
     recordings
-        Folders of recordings, that of captures first; None where none are kept.
+        Folders of recordings, starting with recordings around alarms; None without any.
     faults
-        Why each recording that is known to be damaged is, by name.
+        Faults of damaged recordings by name.
     refusals
-        Takes refused requests; None for a taker of the application's own.
+        Log of refused requests; None for one of the application's own.
     sources
-        Where samples come from, by unit; of those whose polls are timed.
+        Sources with timed polls, by unit.
     """
 
     plant_name: str
@@ -104,13 +264,13 @@ class Context:
     faults: Callable[[], Mapping[str, str]] = dict
 
     def unit(self, unit: str) -> UnitSettings:
-        """Look a unit up, or answer 404."""
+        """Return a unit; raise a problem of status 404 without it."""
         if unit not in self.units:
             raise ProblemError(404, "Unknown unit", f"there is no unit {unit!r} in this plant")
         return self.units[unit]
 
     def bearing(self, unit: str, bearing: str) -> BearingSettings:
-        """Look a bearing up, or answer 404."""
+        """Return a bearing; raise a problem of status 404 without it."""
         for settings in self.unit(unit).bearing:
             if settings.id == bearing:
                 return settings

@@ -1,36 +1,36 @@
-"""Downloads made piece by piece, and heavy work for answers: a little of either at once."""
+"""Downloads in pieces, and a limit on concurrent heavy work for answers."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Generator
 from typing import TypeVar
 
 SLOTS = 2
-"""Reports and pieces of downloads that are worked on at once."""
+"""Maximum number of reports and pieces of downloads made concurrently."""
 
 MAX_DOWNLOADS = 16
-"""Downloads on their way at once; one that is read slowly takes a slot only for its next piece."""
+"""Maximum number of concurrent downloads; each takes a slot only while a piece is made."""
 
 T = TypeVar("T")
 
 
 class TooManyDownloadsError(Exception):
-    """No further download can be sent just now."""
+    """Too many concurrent downloads."""
 
 
 class Downloads:
-    """Makes downloads in threads, as fast as they are taken."""
+    """Makes downloads in threads, as fast as clients read them."""
 
     def __init__(self) -> None:
         self._slots = asyncio.Semaphore(SLOTS)
         self._n = 0
 
     async def worked(self, do: Callable[[], T]) -> T:
-        """Do something in a thread, once a slot is free."""
+        """Run a function in a thread once a slot is free."""
         async with self._slots:
             return await asyncio.to_thread(do)
 
     def require_room(self) -> None:
-        """Refuse a further download while many are on their way.
+        """Refuse a further download above the limit.
 
         Raises
         ------
@@ -38,18 +38,18 @@ class Downloads:
             If there are `MAX_DOWNLOADS`.
         """
         if self._n >= MAX_DOWNLOADS:
-            raise TooManyDownloadsError(f"{MAX_DOWNLOADS} bundles are on their way")
+            raise TooManyDownloadsError(f"{MAX_DOWNLOADS} downloads are in progress")
 
     async def download(self, pieces: Generator[bytes, None, None]) -> AsyncIterator[bytes]:
-        """Send what is made piece by piece.
+        """Return an iterator over the pieces of a download.
 
         Raises
         ------
         TooManyDownloadsError
-            If too many are on their way; and what making the first piece raises.
+            If there are too many downloads. Errors of the first piece are raised too.
         """
         self.require_room()
-        first = await self.worked(lambda: next(pieces, b""))  # now all files are open
+        first = await self.worked(lambda: next(pieces, b""))  # opens all files
         return self._sent(first, pieces)
 
     async def _sent(

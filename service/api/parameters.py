@@ -1,21 +1,27 @@
-"""Time at the API: RFC 3339 in UTC outside, nanoseconds inside."""
+"""Query parameters shared by routes: times, ranges of values, operating states."""
 
 from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from fastapi import Depends, Query
+from pydantic import BeforeValidator
 
 from core.units import NS_PER_S
 from service.api.problems import ProblemError
+from service.api.values import OperatingStateName
 from service.runtime.times import EPOCH, rfc3339
+from service.store.value_range import ValueRange
 
 FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 
 
 def written_as_date(text: object) -> object:
-    """Refuse a bare number, which could be a year as well as seconds since 1970.
+    """Reject a bare number, which could be a year or seconds since 1970.
 
     Raises
     ------
     ValueError
-        Saying how a time is written.
+        If the text is a bare number.
     """
     if isinstance(text, str) and "-" not in text[1:]:
         raise ValueError("a time is written like 2026-11-21T08:00:00Z")
@@ -23,12 +29,12 @@ def written_as_date(text: object) -> object:
 
 
 def ns_from_datetime(moment: datetime, parameter: str) -> int:
-    """Nanoseconds since 1970; what an offset carries out of the years 1 to 9999 is cut off there.
+    """Return nanoseconds since 1970, limited to the years 1 to 9999.
 
     Raises
     ------
     ProblemError
-        If the time carries no offset: local time would be a guess.
+        If the time has no offset from UTC.
     """
     if moment.tzinfo is None:
         detail = f"{parameter} needs an offset from UTC, such as a trailing Z"
@@ -38,13 +44,79 @@ def ns_from_datetime(moment: datetime, parameter: str) -> int:
 
 
 def require_order(start_ns: int, end_ns: int) -> None:
-    """Refuse a range of time that holds nothing.
+    """Reject an empty time range.
 
     Raises
     ------
     ProblemError
-        If it does not begin before it ends.
+        If the start is not before the end.
     """
     if start_ns >= end_ns:
         detail = f"start {rfc3339(start_ns)} must be before end {rfc3339(end_ns)}"
         raise ProblemError(422, "Wrong parameter", detail, "start")
+
+
+Moment = Annotated[datetime, BeforeValidator(written_as_date)]
+
+
+Start = Annotated[
+    Moment,
+    Query(description="Start, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
+]
+
+
+End = Annotated[
+    Moment,
+    Query(description="End, RFC 3339 with offset.", examples=["2026-11-21T09:00:00Z"]),
+]
+
+
+def _bound(description: str, example: float) -> Any:
+    return Query(allow_inf_nan=False, description=description, examples=[example])
+
+
+async def time_range(start: Start, end: End) -> tuple[int, int]:
+    """Return the checked time range."""
+    start_ns, end_ns = ns_from_datetime(start, "start"), ns_from_datetime(end, "end")
+    require_order(start_ns, end_ns)
+    return start_ns, end_ns
+
+
+async def eccentricity_range(
+    eccentricity_min: Annotated[float | None, _bound("Lowest eccentricity ratio.", 0.2)] = None,
+    eccentricity_max: Annotated[float | None, _bound("Highest eccentricity ratio.", 0.4)] = None,
+) -> ValueRange:
+    """Return the range of eccentricity ratios."""
+    return _ordered(eccentricity_min, eccentricity_max, "eccentricity_min")
+
+
+async def oil_temperature_range(
+    oil_temperature_min: Annotated[float | None, _bound("Lowest, °C.", 40.0)] = None,
+    oil_temperature_max: Annotated[float | None, _bound("Highest, °C.", 50.0)] = None,
+) -> ValueRange:
+    """Return the range of oil temperatures, °C."""
+    return _ordered(oil_temperature_min, oil_temperature_max, "oil_temperature_min")
+
+
+async def attitude_range(
+    attitude_min: Annotated[float | None, _bound("Lowest attitude angle, degrees.", 40.0)] = None,
+    attitude_max: Annotated[float | None, _bound("Highest, degrees.", 50.0)] = None,
+) -> ValueRange:
+    """Return the range of attitude angles, degrees."""
+    return _ordered(attitude_min, attitude_max, "attitude_min")
+
+
+TimeRange = Annotated[tuple[int, int], Depends(time_range)]
+
+
+def _ordered(low: float | None, high: float | None, parameter: str) -> ValueRange:
+    if low is not None and high is not None and low > high:
+        detail = f"{parameter} {low:g} must not be above its maximum {high:g}"
+        raise ProblemError(422, "Wrong parameter", detail, parameter)
+    return ValueRange(low, high)
+
+
+States = Annotated[
+    list[OperatingStateName] | None,
+    Query(description="Only in this operating state; may be repeated.", examples=[["full_load"]]),
+]

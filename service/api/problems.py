@@ -1,4 +1,4 @@
-"""Every error as a problem document (RFC 9457), whoever raised it."""
+"""Errors as problem documents (RFC 9457)."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -18,10 +18,10 @@ from service.store.port import QueryTooLargeError, StoreError
 MEDIA_TYPE = "application/problem+json"
 
 MAX_BYTES = 2048
-"""A problem document is no longer, so that a large wrong request cannot cost a large answer."""
+"""Maximum size of a problem document; a large wrong request gets no large answer."""
 
 MAX_MISTAKES = 8
-"""Wrong parameters that are named."""
+"""Maximum number of wrong parameters reported."""
 
 SCHEMAS = "#/components/schemas/"
 
@@ -78,27 +78,27 @@ class ProblemError(Exception):
 
 
 def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """OpenAPI entries for the problems that an operation may answer with."""
+    """Return OpenAPI entries for the problems of an operation."""
     return {status: _documented(WORDS[status]) for status in statuses}
 
 
 def described_problems(words: Mapping[int, str]) -> dict[int | str, dict[str, Any]]:
-    """OpenAPI entries for problems with words of their own."""
+    """Return OpenAPI entries for problems with their own descriptions."""
     return {status: _documented(said) for status, said in words.items()}
 
 
 def any_other_problem() -> dict[int | str, dict[str, Any]]:
-    """OpenAPI entries for what may happen to every operation."""
+    """Return OpenAPI entries for problems of every operation."""
     return {422: _documented(WORDS[422]), "default": _documented("Any other problem")}
 
 
 async def refuse_unknown_parameters(request: Request) -> None:
-    """Answer 422 to a misspelt parameter, which would otherwise seem to have been obeyed.
+    """Reject unknown query parameters, which would otherwise be ignored silently.
 
     Raises
     ------
     ProblemError
-        Naming the first such parameter and those that there are.
+        For the first unknown parameter, with the known ones.
     """
     operation = f"{request.method} {request.scope['route'].path}"
     known = request.app.declared[operation].query_parameters
@@ -109,7 +109,7 @@ async def refuse_unknown_parameters(request: Request) -> None:
 
 
 def problem_schemas() -> dict[str, Any]:
-    """Schemas that the entries refer to, by name."""
+    """Return the schemas that the entries refer to, by name."""
     schema = Problem.model_json_schema(ref_template=f"{SCHEMAS}{{model}}")
     return {**schema.pop("$defs"), "Problem": schema}
 
@@ -167,12 +167,12 @@ def install_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(Exception)
     async def _bug(request: Request, _: Exception) -> Response:
-        """Say no more of a bug than that; it goes on to the log."""
+        """Report a bug without details; they are logged."""
         return _render(request, 500, "Fault in padwatch", "a fault of the program; see its log")
 
 
 def problem_answer(request: Request, error: ProblemError) -> Response:
-    """The problem document of an error."""
+    """Return the problem document of an error."""
     words = (error.status, error.title, error.detail)
     return _render(request, *words, error.errors, error.headers)
 
@@ -182,7 +182,7 @@ def _methods(request: Request) -> list[str]:
 
 
 def _not_allowed(request: Request, methods: Sequence[str]) -> Response:
-    detail = f"this is not done with {request.method}, but with {' or '.join(methods)}"
+    detail = f"{request.method} is not allowed here; use {' or '.join(methods)}"
     allow = {"Allow": ", ".join(methods)}
     return _render(request, 405, "Method not allowed", detail, headers=allow)
 
@@ -206,7 +206,7 @@ def _render(
 
 
 def _bounded(problem: Problem) -> bytes:
-    """JSON of a problem with its texts cut until it has at most `MAX_BYTES`."""
+    """Return a problem as JSON, with texts cut to at most `MAX_BYTES`."""
     n_characters = MAX_BYTES // 2
     while len(document := _json(problem)) > MAX_BYTES:
         problem = Problem(

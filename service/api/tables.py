@@ -1,4 +1,4 @@
-"""Tables to take away, as CSV or Parquet: made in threads, a few hundred rows at a time."""
+"""Answers as tables: CSV or Parquet, made in threads."""
 
 import csv
 from collections.abc import Iterator, Sequence
@@ -26,7 +26,7 @@ MEDIA_TYPES: dict[str, FormatName] = {
 CURSOR_HEADER = "Padwatch-Next-Cursor"
 
 CURSOR = {
-    "description": "In tables: where the next page begins; not there on the last.",
+    "description": "In tables, the cursor of the next page; absent on the last page.",
     "schema": {"type": "string"},
     "example": "1795248192400000000",
 }
@@ -53,9 +53,9 @@ class Column:
     Parameters
     ----------
     values
-        One for each row, None where there is none; times as nanoseconds since 1970.
+        One value per row or None; times in nanoseconds since 1970.
     unit
-        Unit and detector; None where it has none.
+        Unit and detector; None without a unit.
     """
 
     name: str
@@ -65,7 +65,7 @@ class Column:
 
     @property
     def heading(self) -> str:
-        """Name with the unit in brackets."""
+        """Name, with the unit in brackets."""
         return harmless(self.name if self.unit is None else f"{self.name} [{self.unit}]")
 
 
@@ -74,13 +74,12 @@ async def wanted_format(
     format: Annotated[  # noqa: A002  the name that callers know
         FormatName | None,
         Query(
-            description="As what to answer; unless given, what the header Accept asks for, or"
-            " JSON.",
+            description="Format of the answer; default: that of the header Accept, or JSON.",
             examples=["csv"],
         ),
     ] = None,
 ) -> FormatName:
-    """As what to answer."""
+    """Return the requested format."""
     if format is not None:
         return format
     accepted = request.headers.get("accept", "").split(",")
@@ -92,7 +91,7 @@ Format = Annotated[FormatName, Depends(wanted_format)]
 
 
 def table_content(words: str) -> dict[int | str, dict[str, Any]]:
-    """OpenAPI entry for an answer that is there as a table, too."""
+    """Return the OpenAPI entry of an answer that is also available as a table."""
     binary = {"schema": {"type": "string", "format": "binary"}}
     text = {"schema": {"type": "string"}, "example": CSV_EXAMPLE}
     content = {TYPE_OF["csv"]: text, TYPE_OF["parquet"]: binary}
@@ -102,14 +101,14 @@ def table_content(words: str) -> dict[int | str, dict[str, Any]]:
 def table_response(
     wanted: FormatName, columns: Sequence[Column], name: str, next_cursor: str | None = None
 ) -> StreamingResponse:
-    """A table as a file.
+    """Return a table as a file.
 
     Parameters
     ----------
     name
-        Of the file, without its suffix.
+        Name of the file without suffix.
     next_cursor
-        Goes into the header `CURSOR_HEADER`.
+        Value of the header `CURSOR_HEADER`.
     """
     pieces = csv_pieces(columns) if wanted == "csv" else iter([parquet_file(columns)])
     headers = {
@@ -123,7 +122,7 @@ def table_response(
 
 
 def csv_pieces(columns: Sequence[Column]) -> Iterator[bytes]:
-    """A CSV file (RFC 4180), piece by piece; no cell of it can be taken for a formula."""
+    """Yield a CSV file (RFC 4180) in pieces; cells are guarded against formulas."""
     sink = StringIO(newline="")
     writer = csv.writer(sink)
     writer.writerow([column.heading for column in columns])
@@ -139,7 +138,7 @@ def csv_pieces(columns: Sequence[Column]) -> Iterator[bytes]:
 
 
 def parquet_file(columns: Sequence[Column]) -> bytes:
-    """A Parquet file; columns have their unit in their metadata."""
+    """Return a Parquet file; metadata of columns hold their units."""
     fields = [
         pa.field(each.name, ARROW_TYPES[each.kind], metadata={"unit": each.unit or ""})
         for each in columns

@@ -12,7 +12,7 @@ from prometheus_client import exposition
 from prometheus_client.metrics_core import Metric
 
 from acquisition.clock import Clock
-from service.api.http.config import GuardedConfig
+from service.api.http.protocol import GuardedConfig
 from service.api.http.server import GuardedServer
 from service.runtime.heartbeats import Heartbeats
 from service.settings.processes import HttpLimitSettings

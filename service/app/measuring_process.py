@@ -8,8 +8,7 @@ from pathlib import Path
 from core.alarms.alarm import AlarmNews
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.api.load.strain import LoadLimits
-from service.api.load.watch import LoadWatch
+from service.api.load import LoadLimits, LoadWatch
 from service.app.notifications import receivers_of
 from service.app.process import Ground
 from service.app.service_health import Pressure, health_of

@@ -9,8 +9,7 @@ from prometheus_client.metrics_core import Metric
 from prometheus_client.process_collector import ProcessCollector
 
 from acquisition.clock import Clock
-from service.api.load.metrics import load_metrics
-from service.api.load.watch import LoadWatch
+from service.api.load import LoadWatch, load_metrics
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Bus
 from service.measuring.alarm_engine import AlarmEngine

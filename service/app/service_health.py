@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 
-from service.api.load.watch import LoadWatch
+from service.api.load import LoadWatch
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Bus
 from service.measuring.recorder import Recorder

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from functools import partial
 
 from acquisition.clock import Clock
-from service.api.auth.desk import AccessDesk
+from service.api.auth.authenticator import AccessDesk
 from service.api.auth.refusals import Refusals
 from service.api.context import Context
 from service.api.http.listening import url_of
 from service.api.http.server import GuardedServer
-from service.api.load.shedding import Shedding
+from service.api.load import Shedding
 from service.app.measuring_process import Analysis
 from service.app.metrics import Watched, scrape
 from service.app.notifications import receivers_of

@@ -11,19 +11,16 @@ from fastapi import Depends
 from starlette.types import ASGIApp
 
 from acquisition.clock import Clock
-from service.api.app import create_app
-from service.api.auth.application import GuardedApi
-from service.api.auth.desk import AccessDesk
+from service.api.answers import EditionHeader
+from service.api.app import GuardedApi, create_app
+from service.api.auth.authenticator import AccessDesk
 from service.api.context import Context
-from service.api.edition import EditionHeader
-from service.api.http.config import GuardedConfig
-from service.api.http.listening import listen
+from service.api.http.listening import listen, server_tls, socket_file
+from service.api.http.middleware import TrustedProxy
+from service.api.http.protocol import GuardedConfig
 from service.api.http.server import GuardedServer
-from service.api.http.socket_file import socket_file
-from service.api.http.tls import server_tls
-from service.api.http.trusted_proxy import TrustedProxy
 from service.api.problems import refuse_unknown_parameters
-from service.dashboard.edition import edition
+from service.dashboard.assets import edition
 from service.dashboard.routes import dashboard_router
 from service.reports.routes import EvidenceDesk, evidence_router
 from service.settings.plant import PlantFile

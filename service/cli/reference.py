@@ -9,9 +9,9 @@ from pydantic import TypeAdapter
 
 from acquisition.clock import SystemClock
 from core.machine.unit import Bearing
-from service.api.bearing_models import ReferenceModel, SetReferenceModel
-from service.api.bearing_views import reference_model, set_reference_model
-from service.api.models import ApiModel
+from service.api.routes.bearings import ReferenceModel, reference_model
+from service.api.routes.references import SetReferenceModel, set_reference_model
+from service.api.values import ApiModel
 from service.app.storage import has_store, open_store, store_name
 from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
 from service.measuring.references_in_force import (

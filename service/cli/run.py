@@ -9,8 +9,7 @@ import typer
 
 from acquisition.clock import SystemClock
 from acquisition.errors import AcquisitionError
-from service.api.http.listening import PortInUseError, listen
-from service.api.http.tls import CertificateError
+from service.api.http.listening import CertificateError, PortInUseError, listen
 from service.app.health_page import HOST
 from service.app.service import Performance, run_service
 from service.app.serving_process import run_serve

@@ -1,10 +1,11 @@
-"""The dashboard's files as bytes in memory, each with its media type and entity tag."""
+"""Files of the dashboard in memory, with media type and entity tag, and their edition."""
 
 import gzip
 import hashlib
 import json
 from dataclasses import dataclass
 from functools import cache, cached_property
+from importlib.metadata import version
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
@@ -16,12 +17,12 @@ MEDIA_TYPES = {
     "js": "text/javascript; charset=utf-8",
     "svg": "image/svg+xml",
 }
-"""Every kind of file that is served, by suffix; anything else in the folder is not."""
+"""Media types of the files that are served, by suffix; others are not served."""
 
 
 @dataclass(frozen=True)
 class Asset:
-    """One file as it is sent to browsers."""
+    """A file of the dashboard."""
 
     body: bytes
     media_type: str
@@ -33,13 +34,13 @@ class Asset:
 
     @cached_property
     def gzipped(self) -> bytes:
-        """The same bytes for browsers that accept gzip, compressed once."""
+        """The file compressed by gzip."""
         return gzip.compress(self.body, mtime=0)
 
 
 @cache
 def pages() -> dict[str, Asset]:
-    """Read the dashboard's own files, and make those that hold tables of the program.
+    """Read the files of the dashboard, and make those with tables of the program.
 
     Returns
     -------
@@ -52,13 +53,24 @@ def pages() -> dict[str, Asset]:
 
 @cache
 def plotly() -> Asset:
-    """Read the chart library out of the installed plotly package."""
+    """Read the chart library of the installed plotly package."""
     script = files("plotly") / "package_data" / "plotly.min.js"
     return Asset(script.read_bytes(), MEDIA_TYPES["js"])
 
 
+@cache
+def edition() -> str:
+    """Return the edition of program, chart library and files, such as ``0.6.0-1f2e3d4c``.
+
+    An open page compares it with the edition of answers to find out that it is outdated.
+    """
+    tags = "".join(f"{path} {asset.etag}" for path, asset in sorted(pages().items()))
+    tags += version("plotly")
+    return f"{version('padwatch')}-{hashlib.sha256(tags.encode()).hexdigest()[:8]}"
+
+
 def _alarm_kinds() -> str:
-    """JavaScript module with the kinds of alarms, by name."""
+    """Return a JavaScript module with the kinds of alarms by name."""
     table = {
         name: {key: getattr(kind, key) for key in ("label", "subject", "rule", "advice")}
         for name, kind in ALARM_KINDS.items()

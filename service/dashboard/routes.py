@@ -1,12 +1,11 @@
-"""Routes of the dashboard: one page, its files, and the chart library from its own package."""
+"""Routes of the dashboard: the page, its files, and the chart library."""
 
 from functools import cache
 
 from fastapi import APIRouter, HTTPException, Request, Response
 
 from service.api.auth.declared import OPEN
-from service.dashboard.assets import Asset, pages, plotly
-from service.dashboard.edition import edition
+from service.dashboard.assets import Asset, edition, pages, plotly
 
 SECURITY_HEADERS = {
     "Content-Security-Policy": (
@@ -16,23 +15,23 @@ SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
 }
-"""No script but our own files. Plotly adds style elements of its own, hence the inline styles."""
+"""Scripts from this server only; plotly adds style elements, hence the inline styles."""
 
 REVALIDATE = "no-cache"
-"""The page itself is asked for each time: it names the files of the edition that is running."""
+"""Cache control of the page, which names the files of the running edition."""
 
 KEEP = "public, max-age=31536000, immutable"
-"""A file of one edition never changes, so a browser need not ask for it again."""
+"""Cache control of the files, whose paths contain their edition."""
 
 
 def files() -> str:
-    """Path below which the files of this edition are served."""
+    """Return the path of the files of this edition."""
     return f"/static/{edition()}/"
 
 
 @cache
 def index() -> Asset:
-    """The page, which names the files of this edition."""
+    """Return the page, which names the files of this edition."""
     page = pages()["index.html"]
     return Asset(page.body.replace(b"/static/", files().encode()), page.media_type)
 

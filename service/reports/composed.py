@@ -4,7 +4,7 @@ import hashlib
 from typing import Any
 
 from core.change.settings import FilmRules
-from service.api.alarm_views import LEVEL_NAMES
+from service.api.routes.alarm_models import LEVEL_NAMES
 from service.reports.described import bearing_part
 from service.reports.document import FORMAT, VERSION, AlarmPart, Evidence, UnitPart
 from service.reports.maker import Maker

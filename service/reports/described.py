@@ -13,7 +13,7 @@ from core.monitor.catalogue import BY_NAME
 from core.quality import Level, Reading
 from core.stiffness.estimators import ESTIMATORS
 from core.uncertainty import Budget
-from service.api.alarm_views import LEVEL_NAMES
+from service.api.routes.alarm_models import LEVEL_NAMES
 from service.reports.parts import (
     AXES,
     BearingPart,

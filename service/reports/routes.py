@@ -13,14 +13,14 @@ from fastapi.responses import HTMLResponse, StreamingResponse
 from pydantic import Field
 
 from acquisition.clock import Clock
-from service.api.alarm_routes import AlarmId
-from service.api.alarm_views import LEVEL_NAMES
 from service.api.auth.declared import needs
 from service.api.auth.gate import identity_of
 from service.api.context import Context
 from service.api.downloads import Downloads, TooManyDownloadsError
-from service.api.models import ApiModel, Time
 from service.api.problems import ProblemError, described_problems
+from service.api.routes.alarm_models import LEVEL_NAMES
+from service.api.routes.alarms import AlarmId
+from service.api.values import ApiModel, Time
 from service.reports.archive import (
     DamagedEvidenceError,
     EvidenceArchive,

@@ -7,7 +7,7 @@ import pytest
 from playwright.async_api import Locator, Page, expect
 from real_plant import PASSWORD
 
-from service.dashboard.edition import edition
+from service.dashboard.assets import edition
 
 FILES = f"/static/{edition()}/"
 """Where the modules of the dashboard are."""

@@ -5,7 +5,7 @@ import sys
 
 HOLES = """
 import numpy as np, psutil
-from service.runtime.heap import return_large_pieces
+from service.runtime.process import return_large_pieces
 
 return_large_pieces()
 del [np.ones(2 << 20)][0]  # 16 MiB come and go: by itself the C library thinks this usual now

@@ -1,1 +1,1 @@
-"""Who asks, and whether they may: between the HTTP server and the routes."""
+"""Authentication and authorisation between the HTTP server and the routes."""

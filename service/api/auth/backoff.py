@@ -1,4 +1,4 @@
-"""Failed logins make the next one wait, by account and by where it comes from."""
+"""Waits after failed logins, by account and by address of the client."""
 
 from collections import OrderedDict
 from collections.abc import Hashable
@@ -9,21 +9,21 @@ from threading import Lock
 NS_PER_S = 1_000_000_000
 MAX_REMEMBERED = 4096
 IPV6_NETWORK_BITS = 64
-"""One household or one attacker has at least that many addresses to choose from."""
+"""Prefix of an IPv6 address that counts as one client."""
 
 
 @dataclass(frozen=True)
 class WaitRule:
-    """How waits grow.
+    """Growth of waits.
 
     Parameters
     ----------
     n_free
-        Failures without a wait; each further one doubles it, from a second on.
+        Failures without a wait; the next waits 1 s, each further one twice as long.
     longest_s
-        No wait is longer.
+        Maximum wait.
     forget_s
-        After so long without a failure all is forgotten.
+        Time without a failure after which all are forgotten.
     """
 
     n_free: int
@@ -31,7 +31,7 @@ class WaitRule:
     forget_s: float = 3600.0
 
     def wait_ns(self, n_failures: int) -> int:
-        """How long after the newest of so many failures nothing is tried."""
+        """Return the wait after a number of failures."""
         if n_failures < self.n_free:
             return 0
         doubled_s = 2.0 ** min(n_failures - self.n_free, 30)
@@ -39,27 +39,27 @@ class WaitRule:
 
 
 OF_ACCOUNT = WaitRule(n_free=5, longest_s=60.0)
-"""Short: somebody else's failures must not keep a person from the plant for long."""
+"""Waits of an account; short, so that failures of others do not lock a person out."""
 
 OF_PEER = WaitRule(n_free=10, longest_s=900.0)
-"""More failures are free: a control room may come from one address."""
+"""Waits of an address; more failures are free, since a control room may share one."""
 
 
 @dataclass(frozen=True)
 class Failures:
-    """Failures in a row, and when the newest was."""
+    """Number of consecutive failures and time of the newest."""
 
     number: int
     newest_ns: int
 
 
 class Backoff:
-    """Failed logins of late, in bounded memory; may be used from several threads.
+    """Recent failed logins, in bounded memory, safe for several threads.
 
-    An account is not kept from peers that it has logged in from since the service started: who
-    tries passwords from elsewhere delays only strangers.
+    Failures from elsewhere do not delay an account at addresses from which it has logged in since
+    the service started.
 
-    Times are of a clock that never goes back.
+    Times are monotonic.
     """
 
     def __init__(
@@ -75,11 +75,11 @@ class Backoff:
         self._max_remembered = max_remembered
 
     def attempt(self, name: str, peer: str, now_ns: int) -> float:
-        """Ask to try a login: 0 if it may be tried, else how long it must still wait, seconds.
+        """Return the wait before a login may be tried, s; 0 if it may be tried now.
 
-        What may be tried counts as a failure until it has succeeded, so that many at once are
-        many; names that no account has count, too, which therefore tells nothing. What may not be
-        tried does not count: asking too soon makes no wait longer.
+        An attempt counts as a failure until it succeeds, so that concurrent attempts all count.
+        Unknown names count too, so that waits reveal nothing. An attempt that must wait does not
+        count.
         """
         place = place_of(peer)
         with self._lock:
@@ -87,7 +87,7 @@ class Backoff:
             account_ns = 0 if is_known else self._accounts.wait(name, now_ns)
             if wait_ns := max(account_ns, self._peers.wait(place, now_ns)):
                 return wait_ns / NS_PER_S
-            if place:  # all behind a proxy that does not say for whom it asks are one
+            if place:  # clients of a proxy that forwards no address share one
                 self._peers.add(place, now_ns)
             if not is_known:
                 self._accounts.add(name, now_ns)
@@ -99,9 +99,9 @@ class Backoff:
             return (name, place_of(peer)) in self._known
 
     def succeeded(self, name: str, peer: str) -> None:
-        """Remember where an account is at home; earlier failures of its peer stay.
+        """Remember the address of a login; earlier failures of that address remain.
 
-        Otherwise who has one account could try others without end, with a login of his own between.
+        Otherwise the owner of one account could try others without limit by logging in between.
         """
         place = place_of(peer)
         with self._lock:
@@ -114,7 +114,7 @@ class Backoff:
 
 
 class FailureBook:
-    """Failures by whom they are counted for; the longest untouched is forgotten first."""
+    """Failures by account or address; the least recently used is forgotten first."""
 
     def __init__(self, rule: WaitRule, max_remembered: int) -> None:
         self._rule, self._max_remembered = rule, max_remembered
@@ -124,7 +124,7 @@ class FailureBook:
         return len(self._failures)
 
     def wait(self, whom: Hashable, now_ns: int) -> int:
-        """Nanoseconds until something may be tried."""
+        """Return the time until the next attempt, ns."""
         found = self._of_late(whom, now_ns)
         if found is None:
             return 0
@@ -145,7 +145,7 @@ class FailureBook:
             self._failures[whom] = Failures(found.number - 1, found.newest_ns)
 
     def forget(self, whom: Hashable) -> None:
-        """Begin again."""
+        """Forget the failures."""
         self._failures.pop(whom, None)
 
     def _of_late(self, whom: Hashable, now_ns: int) -> Failures | None:
@@ -156,7 +156,7 @@ class FailureBook:
 
 
 def place_of(peer: str) -> str:
-    """What of a peer's address counts: all of IPv4, the network of IPv6, anything else as it is."""
+    """Return the client of an address: an IPv4 address, an IPv6 network, or the text itself."""
     try:
         address = ip_address(peer.partition("%")[0])
     except ValueError:

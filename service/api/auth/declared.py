@@ -1,4 +1,4 @@
-"""What each route needs, said beside it; with a route that does not say it nothing starts."""
+"""What each route needs, declared beside it; the service does not start without it."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,27 +15,27 @@ from service.store.access.identities import Permission
 
 
 class Reach(StrEnum):
-    """What of the plant a route shows or changes where its path names no unit."""
+    """Units that a route concerns if its path names none."""
 
     PLANT = "plant"
-    """All units: nothing for a key of some units."""
+    """All units; refused to a key of some units."""
 
     NO_UNIT = "no_unit"
-    """What belongs to no unit."""
+    """No unit."""
 
     ASKED = "asked"
-    """The unit that the parameter ``unit`` names; all of them without it."""
+    """The unit of the parameter ``unit``; all units without it."""
 
 
 @dataclass(frozen=True)
 class Needs:
-    """What is needed for a route, as a dependency of it; None for nothing: it is open."""
+    """What a route needs, as a dependency of it; no permission for open routes."""
 
     permission: Permission | None
     reach: Reach = Reach.PLANT
 
     async def __call__(self) -> None:
-        """Only say so: what is said is held by `service.api.auth.gate`."""
+        """Do nothing; `service.api.auth.gate` enforces the declaration."""
 
 
 def needs(permission: Permission, reach: Reach = Reach.PLANT) -> Any:
@@ -44,11 +44,11 @@ def needs(permission: Permission, reach: Reach = Reach.PLANT) -> Any:
 
 
 OPEN: Any = Depends(Needs(None, Reach.NO_UNIT))
-"""Declares that a route answers everybody."""
+"""Declares an open route."""
 
 
 class UndeclaredRouteError(Exception):
-    """A route does not say what it needs; the message names it."""
+    """A route without a declaration; the message names it."""
 
 
 @dataclass(frozen=True)
@@ -67,29 +67,28 @@ class Declared:
 
     @property
     def is_open(self) -> bool:
-        """Whether it answers everybody."""
+        """Whether the route is open."""
         return self.needs.permission is None
 
     @cached_property
     def query_parameters(self) -> Sequence[str]:
-        """Names of the parameters that its query may have."""
+        """Names of its query parameters."""
         if not isinstance(self.route, APIRoute):
             return ()
         return tuple(dict.fromkeys(_query_names(self.route.dependant)))
 
     def matches(self, path: str) -> bool:
-        """Whether a request's path could be for it."""
+        """Whether a path matches the route."""
         return isinstance(self.route, Route) and self.route.path_regex.match(path) is not None
 
 
 def declared(app: FastAPI) -> Mapping[str, Declared]:
-    """What each operation of an application needs, by method and path.
+    """Return what each operation of an application needs, by method and path.
 
     Raises
     ------
     UndeclaredRouteError
-        If one has no declaration, or is no operation at all. Of several the nearest counts: a
-        route's own before its router's.
+        If a route has no declaration. The declaration of a route overrides that of its router.
     """
     found: dict[str, Declared] = {}
     for one in _all(app):
@@ -100,10 +99,10 @@ def declared(app: FastAPI) -> Mapping[str, Declared]:
 
 
 def allowed_methods(operations: Iterable[Declared], path: str) -> list[str]:
-    """The methods of a path; none for one that no operation has.
+    """Return the methods of a path; none for an unknown path.
 
-    Of two templates that fit, as `/x/{version}` and `/x/freeze`, the one with fewer parameters is
-    meant.
+    Of two matching templates, such as `/x/{version}` and `/x/freeze`, the one with fewer
+    parameters counts.
     """
     fitting = [operation for operation in operations if operation.matches(path)]
     n_parameters = min((operation.path.count("{") for operation in fitting), default=0)
@@ -132,7 +131,7 @@ def _said(dependencies: Sequence[Any]) -> list[Needs]:
 
 
 def _query_names(dependant: Dependant) -> Iterator[str]:
-    """Names of query parameters of an operation and of what it depends on."""
+    """Yield the names of query parameters of an operation and of its dependencies."""
     for field in dependant.query_params:
         yield field.alias
     for inner in dependant.dependencies:

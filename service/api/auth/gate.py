@@ -1,39 +1,120 @@
-"""The gate before all routes: who asks is found out once, and held against what a route needs."""
+"""The gate before all routes: identifies the caller and compares it with what a route needs."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from math import ceil
+from urllib.parse import urlsplit
 
 from fastapi import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from service.api.auth.credentials import Kind
+from service.api.auth.authenticator import AccessDesk, Caller, Kind
 from service.api.auth.declared import Declared, Reach
-from service.api.auth.desk import AccessDesk, Caller
-from service.api.auth.refused_requests import (
-    must_change_password,
-    not_allowed,
-    not_logged_in,
-    not_this_site,
-    not_this_unit,
-)
-from service.api.auth.same_origin import SAFE, is_foreign
 from service.api.problems import ProblemError, problem_answer
-from service.store.access.audit_entries import name_actor
-from service.store.access.identities import Identity
+from service.store.access.audit_entries import acting, name_actor
+from service.store.access.identities import LOCAL, Identity
 from service.store.port import StoreError
+
+SAFE = ("GET", "HEAD", "OPTIONS")
+"""Methods that change nothing."""
+
+OWN_SITES = (b"same-origin", b"none")
+"""Values of `Sec-Fetch-Site` for pages of the dashboard and for typed addresses."""
+
+
+def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], must_say: bool) -> bool:
+    """Whether a request may come from a page of another origin (cross-site request forgery).
+
+    Browsers add cookies, and reach loopback, for pages of any site.
+
+    Parameters
+    ----------
+    scheme
+        Scheme of the request.
+    must_say
+        Whether a request without headers of its origin counts as foreign; browsers send them.
+    """
+    found = list(headers)
+    hosts = _all(found, b"host")
+    origins, sites = _all(found, b"origin"), _all(found, b"sec-fetch-site")
+    if not origins and not sites:
+        return must_say
+    if any(site not in OWN_SITES for site in sites):
+        return True
+    return any(not _is_own(origin, scheme, hosts) for origin in origins)
+
+
+def _all(headers: list[tuple[bytes, bytes]], wanted: bytes) -> list[bytes]:
+    return [value for name, value in headers if name == wanted]
+
+
+def _is_own(origin: bytes, scheme: str, hosts: list[bytes]) -> bool:
+    try:
+        given = urlsplit(origin.decode("ascii"))
+    except ValueError:
+        return False
+    # behind a proxy that terminates TLS the page has https and the request http
+    is_scheme = given.scheme in (scheme, "https")
+    return is_scheme and len(hosts) == 1 and given.netloc.encode() == hosts[0]
+
+
+BEARER_ONLY = {"WWW-Authenticate": 'Bearer realm="padwatch"'}
+"""Scheme for which browsers open no login dialog."""
+
+
+def not_logged_in() -> ProblemError:
+    """Return the problem of an unauthenticated request."""
+    detail = "log in, or send a key that is valid"
+    return ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
+
+
+def wrong_login() -> ProblemError:
+    """Return the problem of a wrong name or password."""
+    detail = "the name or the password is wrong"
+    return ProblemError(401, "Not let in", detail, headers=BEARER_ONLY)
+
+
+def must_wait(wait_s: float) -> ProblemError:
+    """Return the problem of a login refused after too many failures."""
+    detail = "too many failed logins; wait before the next one"
+    return ProblemError(429, "Wait", detail, headers={"Retry-After": str(max(1, ceil(wait_s)))})
+
+
+def not_allowed() -> ProblemError:
+    """Return the problem of an insufficient role."""
+    return ProblemError(403, "Not allowed", "your role does not allow this")
+
+
+def must_change_password() -> ProblemError:
+    """Return the problem of a password that must be changed first."""
+    detail = "an administrator set your password; change it first"
+    return ProblemError(403, "Change your password", detail)
+
+
+def not_this_unit() -> ProblemError:
+    """Return the problem of a key that is not valid for the unit."""
+    detail = "this key is valid for some units only; request one of them"
+    return ProblemError(403, "Not allowed", detail)
+
+
+def not_this_site() -> ProblemError:
+    """Return the problem of a request from another site."""
+    detail = "requests from pages of another site are refused"
+    return ProblemError(403, "Not from this site", detail)
+
 
 CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
 
 CALLER = "caller"
-"""Where a request keeps who sends it."""
+"""Key of the caller in the state of a request."""
 
 
 class Gate:
-    """ASGI middleware that finds out who asks, and lets nobody in particular to open routes only.
+    """ASGI middleware that identifies callers; unauthenticated ones reach open routes only.
 
     Parameters
     ----------
     declared
-        Tells what each operation needs.
+        Returns what each operation needs.
     """
 
     def __init__(
@@ -42,7 +123,7 @@ class Gate:
         self._app, self._declared, self._desk = app, declared, desk
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on if it may go on."""
+        """Forward an admitted request."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -74,7 +155,7 @@ class Gate:
 
 
 def _require_own_page(scope: Scope, caller: Caller) -> None:
-    """Refuse what a page of another origin lets a browser send."""
+    """Refuse changes requested by a page of another origin."""
     if scope["method"] in SAFE or caller.shown.kind is Kind.KEY:
         return
     must_say = caller.shown.kind is not Kind.NOTHING
@@ -83,18 +164,18 @@ def _require_own_page(scope: Scope, caller: Caller) -> None:
 
 
 def caller_of(request: Request) -> Caller:
-    """Who sends a request."""
+    """Return the caller of a request."""
     caller: Caller = request.scope["state"][CALLER]
     return caller
 
 
 async def require_declared(request: Request) -> None:
-    """Answer 401 or 403 to who lacks what a route needs; a dependency of all routes.
+    """Require what a route declares; a dependency of all routes.
 
     Raises
     ------
     ProblemError
-        If nobody in particular asks, or the role or the units of who does are not enough.
+        If the caller is not authenticated, or its role or units are insufficient.
     """
     operation = f"{request.method} {request.scope['route'].path}"
     needed = request.app.declared[operation].needs
@@ -117,7 +198,7 @@ async def require_declared(request: Request) -> None:
 
 
 def identity_of(request: Request) -> Identity:
-    """Who sends a request that has passed `require_declared`."""
+    """Return the identity of the caller."""
     identity = caller_of(request).identity
     if identity is None:
         raise not_logged_in()
@@ -125,7 +206,7 @@ def identity_of(request: Request) -> Identity:
 
 
 def _unit_of(parameters: Mapping[str, str]) -> str | None:
-    """Which unit a path is about."""
+    """Return the unit of a path."""
     if "unit" in parameters:
         return parameters["unit"]
     if "alarm" in parameters:
@@ -134,6 +215,19 @@ def _unit_of(parameters: Mapping[str, str]) -> str | None:
 
 
 def _unit_asked(request: Request) -> str | None:
-    """The unit that is asked for; of two it is not guessed which."""
+    """Return the unit of the query; None without one or with several."""
     units = request.query_params.getlist("unit")
     return units[0] if len(units) == 1 else None
+
+
+def actor_or(given: str | None) -> str:
+    """Return the authenticated name, else the given one, else the local name."""
+    return acting().actor or given or LOCAL
+
+
+async def name_caller(request: Request) -> None:
+    """Record the name of the caller for the audit trail, also without a login.
+
+    It is a coroutine: a plain function would run in a thread, with a context of its own.
+    """
+    name_actor(identity_of(request).actor)

@@ -1,11 +1,19 @@
-"""Passwords: what is accepted, and how it is kept (argon2id)."""
+"""Passwords: rules, argon2id hashes, and the threads that make them."""
 
+import asyncio
 import unicodedata
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import copy_context
 from functools import cached_property
 from threading import BoundedSemaphore
+from typing import TypeVar
 
+import structlog
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
+
+from service.store.port import StoreError
 
 MIN_LENGTH = 12
 MAX_LENGTH = 256
@@ -17,17 +25,17 @@ PARALLELISM = 4
 """The second recommendation of RFC 9106, section 4: three passes over 64 MiB in four lanes."""
 
 MAX_AT_ONCE = 2
-"""Hashes at the same time, so that logins cannot take the host's memory or all its cores."""
+"""Maximum number of concurrent hashes, which limits memory and cores."""
 
-NOBODYS = "no account has this password"
+NO_ACCOUNT = "no account has this password"
 
 
 class PasswordRefusedError(ValueError):
-    """A password that is not accepted; the message says why, never what it was."""
+    """A rejected password; the message gives the reason, not the password."""
 
 
 def plant_hasher() -> PasswordHasher:
-    """Argon2id with the parameters that are in force."""
+    """Return argon2id with the present parameters."""
     return PasswordHasher(time_cost=TIME_COST, memory_cost=MEMORY_KIB, parallelism=PARALLELISM)
 
 
@@ -39,7 +47,7 @@ def new_password(written: str, name: str) -> str:
     Raises
     ------
     PasswordRefusedError
-        If it is too short, too long, too even, or holds the account's name.
+        If it is too short, too long, has too few different characters, or contains the name.
     """
     password = _normal(written)
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
@@ -49,17 +57,17 @@ def new_password(written: str, name: str) -> str:
     if len(set(password.casefold())) < MIN_DIFFERENT:
         raise PasswordRefusedError(f"a password has at least {MIN_DIFFERENT} different characters")
     if len(name) > 2 and name in password.casefold():
-        raise PasswordRefusedError("a password does not hold the name of its account")
+        raise PasswordRefusedError("a password must not contain the name of its account")
     return password
 
 
 class Hashing:
-    """Makes and checks hashes of passwords, a few at once.
+    """Makes and verifies hashes of passwords, a few at a time.
 
     Parameters
     ----------
     hasher
-        Argon2id with the parameters in force; hashes with others are still verified.
+        Argon2id with the present parameters; hashes with other parameters are verified too.
     """
 
     def __init__(self, hasher: PasswordHasher | None = None) -> None:
@@ -67,42 +75,118 @@ class Hashing:
         self._places = BoundedSemaphore(MAX_AT_ONCE)
 
     def prepare(self) -> None:
-        """Make the first refusal as slow as all others, and no slower."""
-        _ = self._nobodys_hash
+        """Make the hash for unknown accounts, so that the first refusal takes no longer."""
+        _ = self._unused_hash
 
     def hash(self, password: str) -> str:
-        """Hash a password for storing; salted, so never twice the same."""
+        """Return a salted hash of a password."""
         with self._places:
             return self._hasher.hash(_bytes(password))
 
     def verify(self, stored: str | None, password: str) -> bool:
-        """Whether a password is the stored one; without a stored one just as slow, and no.
+        """Whether a password matches a stored hash; False, in the same time, without a hash.
 
-        An overlong password is hashed up to its limit and is wrong.
+        An overlong password is hashed up to its limit and does not match.
         """
-        # of one form first: a character may be written as several
+        # normalised before it is cut: one character may have several encodings
         tried = _bytes(_normal(password)[: MAX_LENGTH + 1])
         with self._places:
             try:
-                self._hasher.verify(self._nobodys_hash if stored is None else stored, tried)
+                self._hasher.verify(self._unused_hash if stored is None else stored, tried)
             except (VerificationError, InvalidHashError):
                 return False
         return stored is not None
 
     @cached_property
-    def _nobodys_hash(self) -> str:
-        return self._hasher.hash(NOBODYS)
+    def _unused_hash(self) -> str:
+        return self._hasher.hash(NO_ACCOUNT)
 
     def is_outdated(self, stored: str) -> bool:
-        """Whether a hash was made with other parameters than those in force."""
+        """Whether a hash was made with other parameters than the present ones."""
         return self._hasher.check_needs_rehash(stored)
 
 
 def _normal(password: str) -> str:
-    """One form for what keyboards write in several."""
+    """Return the normal form of a password (NFKC)."""
     return unicodedata.normalize("NFKC", password)
 
 
 def _bytes(password: str) -> bytes:
-    """What is hashed; also of text that is no text, which JSON can carry."""
+    """Return the bytes to hash; lone surrogates, which JSON can carry, are allowed."""
     return _normal(password).encode("utf-8", "surrogatepass")
+
+
+log = structlog.get_logger()
+
+MAX_WAITING = 16
+"""Maximum number of passwords hashed or waiting; each takes about a third of a second."""
+
+MAX_KNOWN_WAITING = 8
+"""Further places reserved for accounts that have logged in before from the same address."""
+
+LOOKUP_THREADS = 2
+
+MAX_NOTES = 64
+"""Maximum number of waiting writes of times of use; more are dropped."""
+
+T = TypeVar("T")
+
+
+class TooManyLoginsError(Exception):
+    """Too many passwords wait to be hashed."""
+
+
+class AccessWork:
+    """Threads for reads of the store, for hashing, and for writing times of use."""
+
+    def __init__(self) -> None:
+        self._lookups = ThreadPoolExecutor(LOOKUP_THREADS, "access")
+        self._hashes = ThreadPoolExecutor(MAX_AT_ONCE, "passwords")
+        self._places = BoundedSemaphore(MAX_WAITING)
+        self._known_places = BoundedSemaphore(MAX_KNOWN_WAITING)
+        self._notes = ThreadPoolExecutor(1, "notes")
+        self._note_places = BoundedSemaphore(MAX_NOTES)
+
+    async def looked_up(self, look: Callable[[], T]) -> T:
+        """Run a short read of the store in a thread."""
+        return await asyncio.wrap_future(self._lookups.submit(copy_context().run, look))
+
+    async def hashed(self, work: Callable[[], T], is_known: bool = True) -> T:
+        """Run a function that hashes a password in a thread.
+
+        Parameters
+        ----------
+        is_known
+            Whether the account has logged in before from the same address.
+
+        Raises
+        ------
+        TooManyLoginsError
+            If too many are waiting.
+        """
+        places = self._places
+        if not places.acquire(blocking=False):
+            places = self._known_places
+            if not is_known or not places.acquire(blocking=False):
+                raise TooManyLoginsError
+        running: Future[T] = self._hashes.submit(copy_context().run, work)
+        running.add_done_callback(lambda _: places.release())
+        return await asyncio.wrap_future(running)
+
+    def close(self) -> None:
+        """Start no further work; running work is short."""
+        for threads in (self._lookups, self._hashes, self._notes):
+            threads.shutdown(wait=False, cancel_futures=True)
+
+    def note(self, write: Callable[[], None]) -> None:
+        """Run a write in a thread; it may fail, which is logged."""
+        if self._note_places.acquire(blocking=False):
+            running = self._notes.submit(_tried, write)
+            running.add_done_callback(lambda _: self._note_places.release())
+
+
+def _tried(write: Callable[[], None]) -> None:
+    try:
+        write()
+    except StoreError as error:
+        log.warning("the time of use of a login or key was not stored", reason=str(error))

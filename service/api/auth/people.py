@@ -1,9 +1,10 @@
-"""Changing who may come in: accounts, keys, and the very first account."""
+"""Changes of accounts and keys, and the first account."""
 
 from collections.abc import Sequence
 
+from acquisition.clock import Clock
 from core.units import DAY_NS
-from service.api.auth.passwords import Hashing, new_password
+from service.api.auth.passwords import AccessWork, Hashing, new_password
 from service.store.access.identities import (
     MAX_DAYS,
     ApiKey,
@@ -14,20 +15,20 @@ from service.store.access.identities import (
     new_key,
     new_token,
 )
-from service.store.access.port import AccessRefusedError, AccessStore
+from service.store.access.port import AccessRefusedError, AccessStore, Account
 
 NS_PER_S = 1_000_000_000
 SET_UP_S = 3600.0
-"""How long the set-up token may be used."""
+"""Validity of the set-up token, s."""
 
 
 class People:
-    """Accounts. Blocks while a password is hashed: call it from a thread.
+    """Changes accounts. It blocks while hashing: call it from a thread.
 
     Parameters
     ----------
     store
-        Where they are kept.
+        Accounts, sessions and keys.
     """
 
     def __init__(self, store: AccessStore, hashing: Hashing) -> None:
@@ -41,14 +42,14 @@ class People:
         Parameters
         ----------
         must_change
-            Whether the password is to be changed at the first login.
+            Whether the password must be changed at the first login.
 
         Raises
         ------
         NameRefusedError, PasswordRefusedError
             If one is not accepted.
         AccessRefusedError
-            If there is an account of that name.
+            If the name is taken.
         """
         name = account_name(name)
         hashed = self._hashing.hash(new_password(password, name))
@@ -63,7 +64,7 @@ class People:
         Parameters
         ----------
         must_change
-            Whether it is to be changed at the next login.
+            Whether it must be changed at the next login.
 
         Raises
         ------
@@ -76,16 +77,16 @@ class People:
         self._store.accounts.set_password(name, hashed, now_ns, must_change)
 
     def offer_set_up(self, now_ns: int) -> str | None:
-        """Draw the token with which the first account is made; None if there is an account.
+        """Return a token for creating the first account; None if there is an account.
 
-        A token that was drawn before is void.
+        An earlier token becomes invalid.
         """
         token = new_token()
         expires_ns = now_ns + round(SET_UP_S * NS_PER_S)
         return token if self._store.set_up.offer(digest(token), expires_ns) else None
 
     def set_up(self, token: str, name: str, password: str, now_ns: int) -> bool:
-        """Make the first account, an admin; whether the token was good for it.
+        """Create the first account, an admin; return whether the token was valid.
 
         Raises
         ------
@@ -95,7 +96,7 @@ class People:
         name = account_name(name)
         password = new_password(password, name)
         if not is_token(token) or not self._store.set_up.holds(digest(token), now_ns):
-            return False  # before hashing: strangers must not keep the host busy
+            return False  # before hashing, which costs time
         hashed = self._hashing.hash(password)
         return self._store.set_up.take(digest(token), name, hashed, now_ns)
 
@@ -103,22 +104,111 @@ class People:
 def create_key(
     store: AccessStore, name: str, role: Role, units: Sequence[str], days: int, now_ns: int
 ) -> tuple[ApiKey, str]:
-    """Make a key for a machine: what is stored, and the key itself, which nobody can show again.
+    """Create a key for a machine; return the stored part and the key itself, which is not stored.
 
     Raises
     ------
     NameRefusedError
         If the name is not accepted.
     AccessRefusedError
-        If it would be valid for no or too many days, or administer only some units.
+        If its validity is out of range, or an admin key is limited to units.
     """
     if not 1 <= days <= MAX_DAYS:
         raise AccessRefusedError(f"a key is valid for 1 to {MAX_DAYS} days, not for {days}")
     if role is Role.ADMIN and units:
-        raise AccessRefusedError("accounts belong to no unit: a key for some units is no admin's")
+        raise AccessRefusedError("a key for some units cannot have the role admin")
     id_, shown = new_key()
     open_units = tuple(dict.fromkeys(units))
     expires_ns = now_ns + days * DAY_NS
     key = ApiKey(id_, account_name(name), digest(shown), role, open_units, now_ns, expires_ns)
     store.keys.add(key)
     return key, shown
+
+
+class AccessRegistry:
+    """Accounts and keys for the event loop; changes are stored on return.
+
+    Parameters
+    ----------
+    work
+        Threads that do the work.
+    """
+
+    def __init__(self, store: AccessStore, people: People, work: AccessWork, clock: Clock) -> None:
+        self._store, self._people, self._work, self._clock = store, people, work, clock
+
+    async def add(self, name: str, role: Role, password: str) -> str:
+        """Add an account whose password must be changed at the first login; return its name.
+
+        Raises
+        ------
+        NameRefusedError, PasswordRefusedError, AccessRefusedError, TooManyLoginsError
+            If one is not accepted, the name is taken, or there are too many concurrent logins.
+        """
+        now_ns = self._clock.now_ns()
+        return await self._work.hashed(
+            lambda: self._people.add(name, role, password, now_ns, must_change=True)
+        )
+
+    async def set_password(self, name: str, password: str, must_change: bool) -> None:
+        """Change a password; all sessions of the account end.
+
+        Parameters
+        ----------
+        must_change
+            Whether it must be changed at the next login, because an administrator sets it.
+
+        Raises
+        ------
+        PasswordRefusedError, AccessRefusedError, TooManyLoginsError
+            If it is not accepted, the account is unknown, or there are too many concurrent logins.
+        """
+        now_ns = self._clock.now_ns()
+        await self._work.hashed(
+            lambda: self._people.set_password(name, password, now_ns, must_change)
+        )
+
+    async def accounts(self) -> Sequence[Account]:
+        """Return all accounts by name."""
+        return await self._work.looked_up(self._store.accounts.all)
+
+    async def account(self, name: str) -> Account | None:
+        """Return an account; None if there is none of that name."""
+        return await self._work.looked_up(lambda: self._store.accounts.get(name))
+
+    async def set_role(self, name: str, role: Role) -> None:
+        """Change a role; raise `AccessRefusedError` without the account or for the last admin."""
+        now_ns = self._clock.now_ns()
+        await self._work.looked_up(lambda: self._store.accounts.set_role(name, role, now_ns))
+
+    async def remove(self, name: str) -> None:
+        """Remove an account; raise `AccessRefusedError` if that is not possible."""
+        now_ns = self._clock.now_ns()
+        await self._work.looked_up(lambda: self._store.accounts.remove(name, now_ns))
+
+    async def keys(self) -> Sequence[ApiKey]:
+        """Return all keys ever created, oldest first."""
+        return await self._work.looked_up(self._store.keys.all)
+
+    async def create_key(
+        self, name: str, role: Role, units: Sequence[str], days: int
+    ) -> tuple[ApiKey, str]:
+        """Create a key; return the stored part and the key itself.
+
+        Raises
+        ------
+        NameRefusedError, AccessRefusedError
+            If the name is not accepted, or the key is not possible.
+        """
+        now_ns = self._clock.now_ns()
+        return await self._work.looked_up(
+            lambda: create_key(self._store, name, role, units, days, now_ns)
+        )
+
+    async def revoke_key(self, id_: str) -> bool:
+        """Revoke a key permanently; return whether it exists."""
+        now_ns = self._clock.now_ns()
+        is_there = await self._work.looked_up(lambda: self._store.keys.get(id_)) is not None
+        if is_there:
+            await self._work.looked_up(lambda: self._store.keys.revoke(id_, now_ns))
+        return is_there

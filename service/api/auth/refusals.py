@@ -1,31 +1,34 @@
-"""Refused requests in the audit trail: an entry each while they are few, a count beyond."""
+"""Refused requests in the audit trail."""
 
 import asyncio
+import json
 
 import structlog
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
-from service.api.load.allowance import Allowance
-from service.store.access.audit_entries import Deed
+from service.api.auth.gate import SAFE
+from service.api.load import Allowance
+from service.store.access.audit_entries import Acting, Deed, Source, acting, acting_as
 from service.store.audit_port import AuditStore
 from service.store.port import StoreError
 
 log = structlog.get_logger()
 
 N_AT_ONCE = 20
-"""Refusals that get an entry each, however fast they come."""
+"""Number of refusals in a row with an entry each."""
 
 SECONDS_EACH = 30.0
-"""How long it takes until one more may have one: at most 2,880 a day."""
+"""Time after which one more gets an entry: at most 2,880 a day."""
 
 
 class Refusals:
-    """Writes refusals, and counts those that come too fast to be written one by one.
+    """Writes refused requests to the audit trail, and counts those beyond a rate limit.
 
     Parameters
     ----------
     audit
-        Where they are written.
+        Audit trail.
     """
 
     def __init__(self, audit: AuditStore, clock: Clock) -> None:
@@ -34,7 +37,7 @@ class Refusals:
         self.n_more = 0
 
     async def note(self, deed: Deed, status: int) -> None:
-        """Write a refusal, with how many went before it unwritten, or count it."""
+        """Write a refusal with the number of unwritten ones before it, or count it."""
         if not self._allowance.take(self._clock.monotonic_s()):
             self.n_more += 1
             return
@@ -46,3 +49,71 @@ class Refusals:
         except StoreError as error:
             self.n_more += n_before + 1
             log.error("a refused request is not in the audit trail", reason=str(error))
+
+
+REFUSED = (401, 403, 409, 413, 422, 429)
+
+MAX_PROBLEM = 8192
+"""Maximum number of bytes of a problem document that are read."""
+
+
+class AuditTrail:
+    """ASGI middleware that records the origin of requests and refused changes.
+
+    Parameters
+    ----------
+    refusals
+        Receives refused requests that would have changed something.
+    """
+
+    def __init__(self, app: ASGIApp, refusals: Refusals, clock: Clock) -> None:
+        self._app, self._refusals, self._clock = app, refusals, clock
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request, and record it if it is refused."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        client = scope.get("client")
+        with acting_as(Acting(Source.API, str(client[0]) if client else None)):
+            answer = _Answer(send)
+            await self._app(scope, receive, answer.send)
+            if scope["method"] not in SAFE and answer.status in REFUSED:
+                await self._refusals.note(self._deed(scope, answer), answer.status)
+
+    def _deed(self, scope: Scope, answer: "_Answer") -> Deed:
+        who = acting()
+        return Deed(
+            time_ns=self._clock.now_ns(),
+            actor=who.actor,
+            action="request.refused",
+            object=f"{scope['method']} {scope['path']}",
+            reason=answer.detail,
+            source=who.source,
+            peer=who.peer,
+        )
+
+
+class _Answer:
+    """Forwards an answer; keeps its status and the problem document of a refusal."""
+
+    def __init__(self, send: Send) -> None:
+        self._send = send
+        self.status = 0
+        self._body = b""
+
+    async def send(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            self.status = int(message["status"])
+        elif self.status in REFUSED and len(self._body) <= MAX_PROBLEM:
+            self._body += message.get("body", b"")
+        await self._send(message)
+
+    @property
+    def detail(self) -> str:
+        """Detail of the problem document; empty without one."""
+        try:
+            problem = json.loads(self._body[:MAX_PROBLEM])
+        except (ValueError, RecursionError):
+            return ""
+        return str(problem.get("detail", "")) if isinstance(problem, dict) else ""

@@ -1,1 +1,1 @@
-"""The HTTP server's defence: deadlines, sizes, counts, hosts, headers."""
+"""The HTTP server, and its limits on time, size, number, hosts and headers."""

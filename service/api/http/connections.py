@@ -1,4 +1,4 @@
-"""All open connections: how many there may be, and which have taken too long."""
+"""Open connections of the HTTP server: their number and deadlines."""
 
 from collections import defaultdict
 from collections.abc import Callable
@@ -7,35 +7,35 @@ from typing import Protocol
 from service.settings.processes import HttpLimitSettings
 
 MAX_UNSENT_BYTES = 64 * 1024 * 1024
-"""Answers that wait for slow readers, all together; beyond it the largest are given up."""
+"""Maximum total of unsent bytes; above it the largest answers are aborted."""
 
 MAX_PAUSE_S = 1.0
-"""The server looks at its connections more often; when it could not, no client is to blame."""
+"""Longest pause between sweeps that counts towards deadlines, s."""
 
 
 class Connection(Protocol):
-    """One connection, as far as counting and deadlines need it."""
+    """Connection as seen by counts and deadlines."""
 
     peer: str
-    """Address of the other end; empty for a socket file."""
+    """Address of the client; empty for a socket file."""
 
     def check(self, now_s: float) -> None:
-        """Close it if a deadline has passed."""
+        """Close the connection if a deadline has passed."""
 
     def excuse(self, seconds: float) -> None:
-        """Do not count a time in which nobody was listened to."""
+        """Exclude a time in which the server was paused from the deadlines."""
 
     def waits_since(self) -> tuple[bool, float] | None:
-        """When nothing of it is worked on: whether it ever asked, and since when it waits."""
+        """Return whether it ever sent a request, and the start of its wait; None if busy."""
 
     def n_unsent(self) -> int:
-        """Bytes of answers that the other end has not taken."""
+        """Return the number of unsent bytes."""
 
     def give_way(self) -> None:
-        """Close it in favour of another one."""
+        """Close the connection in favour of another."""
 
     def abort(self) -> None:
-        """Close it at once, whatever is unsent."""
+        """Abort the connection."""
 
 
 class Connections:
@@ -44,7 +44,7 @@ class Connections:
     Parameters
     ----------
     now_s
-        Steady time in seconds; tests bring their own.
+        Monotonic time, s.
     """
 
     def __init__(self, limits: HttpLimitSettings, now_s: Callable[[], float]) -> None:
@@ -57,7 +57,7 @@ class Connections:
         return self._n_open
 
     def admit(self, connection: Connection) -> bool:
-        """Count a new connection in; False if there is no room that another could make."""
+        """Add a connection; return False if there is no room for it."""
         neighbours = self._of_peer[connection.peer]
         if len(neighbours) >= self.limits.max_connections_per_peer:
             has_room = _make_room(neighbours)
@@ -65,14 +65,14 @@ class Connections:
             has_room = _make_room(self.all())
         else:
             has_room = True
-        # closing ones are counted until they are gone
+        # closing connections count until they are closed
         neighbours.add(connection)
         self._n_open += 1
         self.n_accepted += 1
         return has_room
 
     def leave(self, connection: Connection) -> None:
-        """Count a connection out that is closed."""
+        """Remove a closed connection."""
         neighbours = self._of_peer[connection.peer]
         neighbours.remove(connection)
         self._n_open -= 1
@@ -80,7 +80,7 @@ class Connections:
             del self._of_peer[connection.peer]
 
     def sweep(self) -> None:
-        """Close what has passed a deadline; called again and again."""
+        """Close connections past a deadline; called periodically."""
         now_s = self.now_s()
         stalled_s = max(0.0, now_s - self._swept_s - MAX_PAUSE_S)
         self._swept_s = now_s
@@ -90,12 +90,12 @@ class Connections:
         self._relieve()
 
     def abort_all(self) -> None:
-        """Close everything at once."""
+        """Abort all connections."""
         for connection in self.all():
             connection.abort()
 
     def all(self) -> set[Connection]:
-        """Those that are open."""
+        """Return the open connections."""
         return set().union(*self._of_peer.values())
 
     def _relieve(self) -> None:
@@ -109,7 +109,7 @@ class Connections:
 
 
 def _make_room(connections: set[Connection]) -> bool:
-    """Close the one that waits longest, those first that never asked anything."""
+    """Close the connection that waits longest, preferring those without a request."""
     waiting = [(since, each) for each in connections if (since := each.waits_since())]
     if not waiting:
         return False

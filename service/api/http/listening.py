@@ -1,33 +1,124 @@
-"""The port of the HTTP server, taken before anything else is started."""
+"""What the HTTP server listens on: a port, a socket file, TLS."""
 
+import os
 import socket
+import ssl
+import stat
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
 
 
 class PortInUseError(Exception):
-    """The HTTP port cannot be listened on; the message says which and why."""
+    """A port or socket file cannot be listened on; the message gives the reason."""
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Take the HTTP port.
+    """Listen on a port.
 
     Raises
     ------
     PortInUseError
-        If it cannot be had.
+        If that is not possible.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
-        # what Python adds in brackets repeats the address
+        # without the address, which Python repeats in brackets
         why = (error.strerror or str(error)).partition(" (")[0]
         raise PortInUseError(f"cannot listen on {host} port {port}: {why}") from error
 
 
 def url_of(listener: socket.socket, has_tls: bool = False) -> str:
-    """Where the service is found."""
+    """Return the URL of the service."""
     if listener.family == socket.AF_UNIX:
         return f"unix:{listener.getsockname()}"
     host, port = listener.getsockname()[:2]
     place = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
     return f"{'https' if has_tls else 'http'}://{place}/"
+
+
+MODE = 0o660
+"""Mode of a socket file: padwatch's user and group, to which the proxy belongs."""
+
+
+@contextmanager
+def socket_file(path: Path) -> Iterator[socket.socket]:
+    """Listen on a socket file, removed at the end; its mode decides who may connect.
+
+    Raises
+    ------
+    PortInUseError
+        If it cannot be created, is no socket, or is in use.
+    """
+    _make_way(path)
+    with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as listener:
+        try:
+            before = os.umask(0o777 & ~MODE)
+            try:
+                listener.bind(str(path))
+            finally:
+                os.umask(before)
+            listener.listen(socket.SOMAXCONN)
+        except OSError as error:
+            raise PortInUseError(f"cannot listen on {path}: {error.strerror}") from error
+        try:
+            yield listener
+        finally:
+            path.unlink(missing_ok=True)
+
+
+def _make_way(path: Path) -> None:
+    """Remove the socket file of a service that was killed."""
+    try:
+        mode = path.lstat().st_mode
+    except OSError:
+        return  # bind reports the error
+    if not stat.S_ISSOCK(mode):
+        raise PortInUseError(f"cannot listen on {path}: it is not a socket")
+    with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as caller:
+        try:
+            caller.connect(str(path))
+        except ConnectionRefusedError:
+            path.unlink()
+        except OSError as error:
+            raise PortInUseError(f"cannot listen on {path}: {error.strerror}") from error
+        else:
+            raise PortInUseError(f"cannot listen on {path}: another program does")
+
+
+class CertificateError(Exception):
+    """An unusable certificate or key; the message gives the reason."""
+
+
+def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
+    """Return a TLS context for a certificate and its key, TLS 1.2 or newer.
+
+    Raises
+    ------
+    CertificateError
+        If a file is unreadable or invalid, or the key does not match.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.minimum_version = ssl.TLSVersion.TLSv1_2
+    context.set_alpn_protocols(["http/1.1"])
+    for path in (certificate, key):
+        _require_readable(path)
+    try:
+        # an empty passphrase keeps OpenSSL from prompting
+        context.load_cert_chain(certificate, key, password="")
+    except (ssl.SSLError, ValueError) as error:
+        why = getattr(error, "reason", None) or str(error)
+        raise CertificateError(
+            f"service.tls: {certificate} and {key} are no certificate and its key: {why}"
+        ) from error
+    return context
+
+
+def _require_readable(path: Path) -> None:
+    try:
+        with path.open("rb") as file:
+            file.read(1)
+    except OSError as error:
+        raise CertificateError(f"service.tls: {path}: {error.strerror}") from error

@@ -1,19 +1,19 @@
-"""Uvicorn's HTTP/1.1 protocol with deadlines, sizes and counts, which it has none of.
-
-Uvicorn closes a connection only that is silent *after* an answer: one that never finishes its
-headers or body, or never reads its answer, stays for ever.
-"""
+"""Uvicorn's HTTP/1.1 protocol with deadlines, sizes and counts."""
 
 import asyncio
+from collections.abc import Callable, Iterable
 from enum import Enum, auto
-from typing import Any
+from typing import Any, cast
 
 import httptools
+import uvicorn
+from starlette.types import ASGIApp
 from uvicorn._types import ASGI3Application
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 from uvicorn.server import ServerState
 
-from service.api.http.config import GuardedConfig
+from service.api.http.connections import Connections
+from service.api.http.middleware import ALWAYS, API_ONLY, BoundedAnswers, guarded
 from service.api.http.refusals import (
     FULL,
     HEAD_TOO_LARGE,
@@ -22,20 +22,62 @@ from service.api.http.refusals import (
     TOO_SLOW,
     Refusal,
 )
-from service.api.http.security_headers import ALWAYS, API_ONLY
+from service.settings.processes import HttpLimitSettings
+
+STOP_S = 2
+"""Time after which uvicorn cancels remaining requests, with tracebacks, s."""
+
+
+class GuardedConfig(uvicorn.Config):
+    """Configuration of uvicorn, with the open connections and running requests.
+
+    Parameters
+    ----------
+    hosts
+        Names of the service besides loopback.
+    now_s
+        Monotonic time for the deadlines, s.
+    """
+
+    def __init__(
+        self,
+        app: ASGIApp,
+        limits: HttpLimitSettings,
+        hosts: Iterable[str],
+        now_s: Callable[[], float],
+        **options: Any,
+    ) -> None:
+        self.answers = BoundedAnswers(app, limits)
+        super().__init__(
+            cast(
+                Any, guarded(self.answers, limits, hosts)
+            ),  # Starlette and uvicorn declare different types
+            http="service.api.http.protocol:GuardedProtocol",
+            ws="none",
+            log_level="warning",
+            access_log=False,
+            server_header=False,
+            lifespan="off",
+            proxy_headers=False,  # uvicorn would trust every local client
+            timeout_keep_alive=round(limits.keep_alive_s),
+            timeout_graceful_shutdown=STOP_S,
+            **options,
+        )
+        self.connections = Connections(limits, now_s)
+
 
 MAX_PIPELINED = 8
-"""Requests that a client may send ahead of its answers; browsers send none."""
+"""Maximum number of pipelined requests; browsers send none."""
 
 FRAMING_BYTES = 256 * 1024
-"""What a chunked body may have around its data, besides 8 bytes for each of its bytes."""
+"""Allowed framing of a chunked body, besides 8 bytes per byte of data."""
 
 PROGRESS_BYTES = 48 * 1024
-"""One who takes less of his answer than this within ``unsent_s`` does not read it."""
+"""Minimum number of bytes that a client must read within ``unsent_s``."""
 
 
 class Phase(Enum):
-    """What the other end is to send next."""
+    """Part of a request that the client sends next."""
 
     HEAD = auto()
     BODY = auto()
@@ -43,7 +85,7 @@ class Phase(Enum):
 
 
 class GuardedProtocol(HttpToolsProtocol):
-    """One connection that ends in time."""
+    """A connection with deadlines and size limits."""
 
     def __init__(
         self,
@@ -62,46 +104,46 @@ class GuardedProtocol(HttpToolsProtocol):
         self._has_asked = self._is_deaf = False
         self._running: RequestResponseCycle | None = None
 
-    # the transport's side
+    # callbacks of the transport
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Count the connection in, or send it away."""
+        """Add the connection, or refuse it."""
         super().connection_made(transport)
         self.peer = self.client[0] if self.client else ""
         if not self._all.admit(self):
             self._end(FULL)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Count the connection out."""
+        """Remove the connection."""
         super().connection_lost(exc)
         self._is_deaf = True
         self._drop_answers()
         self._all.leave(self)
 
     def data_received(self, data: bytes) -> None:
-        """Take bytes in; what is no HTTP, or too much of it, ends the connection."""
+        """Parse bytes; malformed or oversized requests end the connection."""
         self._unset_keepalive_if_required()
         if self._is_deaf:
             return
         try:
             self.parser.feed_data(data)
         except httptools.HttpParserUpgrade:
-            self._answer_and_close()  # there is nothing else spoken here
+            self._answer_and_close()  # no other protocol is supported
         except httptools.HttpParserError:
             self._refuse()
         else:
-            self._n_wire += len(data)  # of this request, or of the one before it too
+            self._n_wire += len(data)  # of this request, and possibly the previous one
             self._check_sizes()
 
     def resume_writing(self) -> None:
-        """The other end has taken a good part of its answer."""
+        """Reset the deadline of unsent bytes."""
         super().resume_writing()
         self._unsent_since_s = None
 
-    # the parser's side; what is raised here comes out of feed_data as HttpParserError
+    # callbacks of the parser; feed_data raises HttpParserError for their exceptions
 
     def on_message_begin(self) -> None:
-        """The first byte of a request."""
+        """Start a request."""
         super().on_message_begin()
         if self._phase is not Phase.HEAD:
             self._enter(Phase.HEAD)
@@ -109,42 +151,42 @@ class GuardedProtocol(HttpToolsProtocol):
         self._refusal = NOT_HTTP
 
     def on_url(self, url: bytes) -> None:
-        """A piece of path and query."""
+        """Take a part of path and query."""
         super().on_url(url)
         if len(self.url) > 1024 * self._limits.max_target_kb:
             self._stop(TARGET_TOO_LONG)
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """A whole header."""
+        """Take a header."""
         if self._phase is Phase.BODY:
-            self._stop(NOT_HTTP)  # trailers: nobody needs them, and there is no end to them
+            self._stop(NOT_HTTP)  # trailers are not supported
         super().on_header(name, value)
         self._n_head += len(name) + len(value) + 4
         if self._n_head > 1024 * self._limits.max_head_kb:
             self._stop(HEAD_TOO_LARGE)
 
     def on_headers_complete(self) -> None:
-        """A whole head: the application is asked, or the request waits for its turn."""
+        """Call the application, or queue the request."""
         if len(self.pipeline) >= MAX_PIPELINED:
             self._stop(NOT_HTTP)
         if not self.url.startswith(b"/"):
-            self._stop(NOT_HTTP)  # as for a proxy: it would name a host besides the header
+            self._stop(NOT_HTTP)  # an absolute target has a host besides the header
         super().on_headers_complete()
         self._enter(Phase.BODY)
 
     def on_body(self, body: bytes) -> None:
-        """A piece of a body; how much is taken is decided where it is read."""
+        """Take a part of a body; its reader limits the size."""
         self._n_body += len(body)
         super().on_body(body)
 
     def on_message_complete(self) -> None:
-        """A whole request."""
+        """Finish a request."""
         super().on_message_complete()
         self._has_asked = True
         self._enter(Phase.NOTHING)
 
     def on_response_complete(self) -> None:
-        """An answer is written, which is not to say taken."""
+        """Finish an answer, which the client may not have read yet."""
         super().on_response_complete()
         self._unsent_since_s = None
         if self._phase is Phase.NOTHING:
@@ -154,54 +196,54 @@ class GuardedProtocol(HttpToolsProtocol):
         self._running = cycle
         super()._start_asgi_task(cycle, app)
 
-    # the server's side
+    # called by the server
 
     def check(self, now_s: float) -> None:
         """Close the connection if a deadline has passed."""
         if self._is_stuck(now_s):
             self.abort()
         elif self.transport.is_closing():
-            pass  # on its way
+            pass  # already closing
         elif self.flow.read_paused and self._phase is not Phase.NOTHING:
-            self._since_s = now_s  # it may not send just now
+            self._since_s = now_s  # reading is paused
         elif now_s - self._since_s > self._patience_s():
             self._end(TOO_SLOW if self._phase is not Phase.NOTHING and self._n_wire else None)
 
     def excuse(self, seconds: float) -> None:
-        """Do not count a time in which nobody was listened to."""
+        """Exclude a time in which the server was paused from the deadlines."""
         self._since_s += seconds
         if self._unsent_since_s is not None:
             self._unsent_since_s += seconds
 
     def waits_since(self) -> tuple[bool, float] | None:
-        """Whether it ever asked, and since when it waits; None while it is answered."""
+        """Return whether it ever sent a request, and the start of its wait; None if busy."""
         is_answered = self._phase is Phase.NOTHING and self._is_answering()
         if is_answered or self.transport.is_closing():
             return None
         return self._has_asked, self._since_s
 
     def n_unsent(self) -> int:
-        """Bytes that the other end has not taken."""
+        """Return the number of unsent bytes."""
         return self.transport.get_write_buffer_size()
 
     def give_way(self) -> None:
-        """Close in favour of another connection."""
+        """Close the connection in favour of another."""
         self._end(None)
 
     def abort(self) -> None:
-        """Close at once."""
+        """Abort the connection."""
         self._is_deaf = True
         self._drop_answers()
         self.transport.abort()
 
     def shutdown(self) -> None:
-        """The server stops: what is not completely asked is not answered any more."""
+        """Stop; incomplete requests are not answered."""
         if self._phase is Phase.BODY:
             self._end(None)
         else:
             super().shutdown()
 
-    # inside
+    # internals
 
     def _enter(self, phase: Phase) -> None:
         self._phase, self._since_s = phase, self._all.now_s()
@@ -230,7 +272,7 @@ class GuardedProtocol(HttpToolsProtocol):
         raise ValueError(refusal.title)
 
     def _check_sizes(self) -> None:
-        """What the parser keeps to itself: a header without end, or framing without data."""
+        """Limit what the parser buffers: an endless header, or framing without data."""
         if self._phase is Phase.HEAD and self._n_wire > 1024 * (
             self._limits.max_head_kb + self._limits.max_target_kb
         ):
@@ -239,7 +281,7 @@ class GuardedProtocol(HttpToolsProtocol):
             self._end(NOT_HTTP)
 
     def _refuse(self) -> None:
-        """End with what was wrong, after the answers to what was right."""
+        """Refuse a request after the answers to previous requests."""
         if self._phase is Phase.HEAD and self._is_answering():
             self._answer_and_close()
         else:
@@ -253,7 +295,7 @@ class GuardedProtocol(HttpToolsProtocol):
             self.transport.close()
 
     def _end(self, refusal: Refusal | None) -> None:
-        """Close, with a last word where one fits in."""
+        """Close the connection, with a problem document if possible."""
         self._is_deaf = True
         if refusal is not None and self._may_speak():
             self.transport.write(refusal.on_the_wire([*ALWAYS, *API_ONLY]))
@@ -261,7 +303,7 @@ class GuardedProtocol(HttpToolsProtocol):
         self.transport.close()
 
     def _drop_answers(self) -> None:
-        """Let nothing more be written; uvicorn tells it only to the newest request."""
+        """Mark all requests as disconnected; uvicorn marks the newest only."""
         waiting = [cycle for cycle, _ in self.pipeline]
         self.pipeline.clear()
         for cycle in (self._running, self.cycle, *waiting):
@@ -270,7 +312,7 @@ class GuardedProtocol(HttpToolsProtocol):
                 cycle.message_event.set()
 
     def _may_speak(self) -> bool:
-        """Whether the next answer on this connection is the server's to write."""
+        """Whether the server may write the next answer on this connection."""
         if self.transport.is_closing():
             return False
         if self._phase is Phase.BODY:

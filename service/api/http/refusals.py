@@ -1,4 +1,4 @@
-"""What is refused before the application sees it: a problem document (RFC 9457) for each status."""
+"""Requests refused before the application: a problem document (RFC 9457) for each."""
 
 import json
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from starlette.types import Scope, Send
 MEDIA_TYPE = b"application/problem+json"
 
 MAX_INSTANCE = 256
-"""Characters of a path that are repeated; JSON escapes one as up to six bytes."""
+"""Maximum number of characters of a path in an answer."""
 
 Headers = Sequence[tuple[bytes, bytes]]
 
@@ -59,15 +59,15 @@ class Refusal:
         await send({"type": "http.response.body", "body": body, "more_body": False})
 
 
-NOT_HTTP = Refusal(400, "Not a request", "this is not HTTP/1.1 as it is written down")
-NO_HOST = Refusal(400, "No host", "a request must say exactly once which host it asks for")
+NOT_HTTP = Refusal(400, "Not a request", "malformed HTTP/1.1 request")
+NO_HOST = Refusal(400, "No host", "a request must have exactly one Host header")
 NOT_UTF8 = Refusal(400, "Not UTF-8", "the body is not valid UTF-8")
-TOO_DEEP = Refusal(400, "Nested too deep", "the body is nested deeper than anything asked for here")
-TOO_SLOW = Refusal(408, "Too slow", "the request did not come completely within its time")
-BODY_TOO_LARGE = Refusal(413, "Body too large", "the body is larger than anything asked for here")
+TOO_DEEP = Refusal(400, "Nested too deep", "the JSON body is nested too deeply")
+TOO_SLOW = Refusal(408, "Too slow", "the request was not complete in time")
+BODY_TOO_LARGE = Refusal(413, "Body too large", "the body is larger than allowed")
 TARGET_TOO_LONG = Refusal(414, "Address too long", "path and query are longer than allowed")
-WRONG_HOST = Refusal(421, "Wrong host", "this service is not known by the name that was asked for")
+WRONG_HOST = Refusal(421, "Wrong host", "the requested host is not a name of this service")
 HEAD_TOO_LARGE = Refusal(431, "Headers too large", "line and headers are longer than allowed")
-BUSY = Refusal(503, "Busy", "too many requests at the same time; try again", retry_after_s=1)
-FULL = Refusal(503, "Busy", "too many connections at the same time; try again", retry_after_s=5)
-NO_ANSWER = Refusal(503, "No answer in time", "the answer took too long; ask for less", 5)
+BUSY = Refusal(503, "Busy", "too many concurrent requests; try again", retry_after_s=1)
+FULL = Refusal(503, "Busy", "too many connections; try again", retry_after_s=5)
+NO_ANSWER = Refusal(503, "No answer in time", "the request timed out; request a shorter range", 5)

@@ -1,4 +1,4 @@
-"""The HTTP server: watches its connections while it runs, and leaves none when it stops."""
+"""The HTTP server."""
 
 import asyncio
 import socket
@@ -7,20 +7,19 @@ from contextlib import contextmanager
 
 import uvicorn
 
-from service.api.http.config import STOP_S, GuardedConfig
 from service.api.http.connections import Connections
-from service.api.http.protocol import GuardedProtocol
+from service.api.http.protocol import STOP_S, GuardedConfig, GuardedProtocol
 from service.runtime.heartbeats import UNHEARD, Pulse
 
 PATIENCE_S = 1.0
-"""What clients get to finish in when the server stops."""
+"""Time for open requests when the server stops, s."""
 
 SWEEP_TICKS = 5
-"""Connections are looked at every so many of uvicorn's ticks of 0.1 s."""
+"""Period of sweeps in ticks of uvicorn, 0.1 s each."""
 
 
 class GuardedServer(uvicorn.Server):
-    """Uvicorn without its own signal handling: the program stops all its parts together."""
+    """Uvicorn with deadlines for connections and without signal handlers."""
 
     def __init__(self, config: GuardedConfig) -> None:
         super().__init__(config)
@@ -28,7 +27,7 @@ class GuardedServer(uvicorn.Server):
         self._pulse: Pulse = UNHEARD
 
     async def run_on(self, listener: socket.socket, pulse: Pulse) -> None:
-        """Serve until it is told to stop."""
+        """Serve until stopped."""
         self._pulse = pulse
         await self.serve([listener])
 
@@ -38,7 +37,7 @@ class GuardedServer(uvicorn.Server):
         return self._guarded.connections
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Listen; uvicorn's own would let a client take a minute for its TLS handshake."""
+        """Listen with a time limit for TLS handshakes, which uvicorn does not set."""
         if self.config.ssl is None:
             await super().startup(sockets)
             return
@@ -62,19 +61,19 @@ class GuardedServer(uvicorn.Server):
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Leave the signals alone."""
+        """Install no signal handlers; the program stops all its parts together."""
         yield
 
     async def on_tick(self, counter: int) -> bool:
-        """Beat ten times a second, and look at all connections now and then."""
+        """Send a heartbeat, and sweep the connections periodically."""
         self._pulse.beat()
         if counter % SWEEP_TICKS == 0:
             self.open.sweep()
         return await super().on_tick(counter)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Close everything in time; who does not read his answer is not waited for to the end."""
-        # before uvicorn cancels the tasks, which would log a traceback for each
+        """Stop in time; clients that do not read their answers are disconnected."""
+        # before uvicorn cancels tasks, which logs a traceback for each
         patience = asyncio.get_running_loop().call_later(PATIENCE_S, self._give_up)
         try:
             await super().shutdown(sockets)

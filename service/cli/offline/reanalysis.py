@@ -6,7 +6,8 @@ from acquisition.delivery.calibration import UnitCalibration
 from acquisition.source import SampleSource
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
-from service.api.models import (
+from service.api.routes.bearings import estimator_names, runout_names
+from service.api.values import (
     ApiModel,
     EstimatorName,
     QualityModel,
@@ -15,12 +16,8 @@ from service.api.models import (
     SpeedSourceName,
     Time,
     WindowModel,
-)
-from service.api.views import (
-    estimator_names,
     quality_model,
     reading_model,
-    runout_names,
     window_model,
 )
 from service.runtime.times import rfc3339

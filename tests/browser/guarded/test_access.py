@@ -181,7 +181,7 @@ async def test_an_admin_adds_changes_and_removes_accounts_and_reads_what_is_refu
     said = page.get_by_role("alert").filter(visible=True)
     await page.get_by_role("button", name="Remove admin").click()
     await page.get_by_role("button", name="Remove", exact=True).click()
-    await expect(said).to_contain_text("his own account")
+    await expect(said).to_contain_text("your own account")
     await page.get_by_role("button", name="Add somebody…").click()
     await form.get_by_label("Name").fill("newcomer")
     await form.get_by_label("Password").fill("short")

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from service.api.auth.application import GuardedApi
+from service.api.app import GuardedApi
 from service.api.context import Context
 from service.app.web import application
 from service.reports.routes import EvidenceDesk

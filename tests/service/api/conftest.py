@@ -24,7 +24,7 @@ from core.alarms.life_cycle import update
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.api.auth.desk import AccessDesk
+from service.api.auth.authenticator import AccessDesk
 from service.api.context import Context
 from service.app.storage import (
     built_configuration,

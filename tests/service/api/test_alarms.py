@@ -12,7 +12,7 @@ from rigs.probes import ACKNOWLEDGE, ALARMS, ANNA, PROBE, SHELVE, Probes, post
 from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingState
 from core.quality import Reason
-from service.api.alarm_routes import N_COMMENTS, S_PER_COMMENT
+from service.api.routes.alarms import N_COMMENTS, S_PER_COMMENT
 
 
 async def test_a_plant_in_good_health_has_no_alarms(service: Any, probes: Probes) -> None:

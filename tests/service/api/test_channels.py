@@ -154,7 +154,7 @@ async def test_a_waveform_that_there_is_not_is_a_problem(
     assert unknown["errors"][0]["parameter"] == "channel"
     for seconds in ("0", "10.1", "nan", "inf", "-1"):
         assert await running.problem(WAVEFORM, 422, seconds=seconds)
-    monkeypatch.setattr("service.api.channel_routes.MAX_NUMBERS", 100)
+    monkeypatch.setattr("service.api.routes.channels.MAX_NUMBERS", 100)
     assert "at most" in (await running.problem(WAVEFORM, 422, seconds=1.0))["detail"]
     await running.problem("/api/v1/units/U9/waveform", 404)
     await running.problem("/api/v1/units/U9/channels", 404)

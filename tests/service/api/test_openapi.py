@@ -10,7 +10,7 @@ import pytest
 from jsonschema_rs import Draft202012Validator
 from pydantic import BaseModel
 
-from service.api.auth.application import GuardedApi
+from service.api.app import GuardedApi
 from service.app.web import application
 
 Operations = list[tuple[str, dict[str, Any]]]

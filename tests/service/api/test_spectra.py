@@ -14,7 +14,7 @@ from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD, Reading
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import CrossSpectrum
-from service.api.spectra_views import MAX_NUMBERS
+from service.api.routes.spectra import MAX_NUMBERS
 from service.settings.core_values import analysis_of, machine_of
 from service.settings.plant import PlantFile
 
@@ -203,6 +203,6 @@ async def test_more_numbers_than_fit_an_answer_are_refused_before_they_are_writt
 
     problem = await service.problem(SPECTRA, 422, **DAY, max_spectra=1000)
 
-    assert f"at most {MAX_NUMBERS // 4000} are given" in problem["detail"]
+    assert f"at most {MAX_NUMBERS // 4000} spectra" in problem["detail"]
     fewer = await service.json(SPECTRA, **DAY, max_spectra=1000, channel="shaft_x")
     assert len(fewer["time"]) == n

@@ -5,9 +5,8 @@ from dataclasses import replace
 from typing import Any
 
 from core.monitor.assessment import Assessment
-from service.api.alarm_models import AlarmListModel
-from service.api.alarm_views import alarm_list_model
-from service.api.shared import SharedAnswer
+from service.api.answers import SharedAnswer
+from service.api.routes.alarm_models import AlarmListModel, alarm_list_model
 from service.live.live_view import LinkState
 from service.runtime.asker import ASKER, Asker
 from service.settings.storage import Origin

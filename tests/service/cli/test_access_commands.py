@@ -11,8 +11,8 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
+from service.api.auth.authenticator import Doors, LoggedIn, Refusal
 from service.api.auth.backoff import Backoff
-from service.api.auth.doors import Doors, LoggedIn, Refusal
 from service.api.auth.passwords import Hashing
 from service.cli.commands import app
 from service.runtime.process import made_by
@@ -168,7 +168,7 @@ def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
         (("create", "historian", "--unit", "U9"), "there is no unit U9, it has U1, U2"),
         (("create", "historian", "--days", "0"), "Invalid value"),
         (("create", "a b"), "a name has 1 to 64"),
-        (("create", "historian", "--role", "admin", "--unit", "U1"), "no admin's"),
+        (("create", "historian", "--role", "admin", "--unit", "U1"), "cannot have the role admin"),
         (("revoke", "000000000000"), "there is no key 000000000000"),
     ],
 )

@@ -110,7 +110,7 @@ def _keys(schema: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
 
 WAITS_FOR_EVER = """
 import asyncio, threading
-from service.runtime.ending import run_to_its_end
+from service.runtime.process import run_to_its_end
 
 async def program():
     begun = threading.Event()

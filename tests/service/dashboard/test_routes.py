@@ -11,11 +11,10 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from starlette.types import Message
 
-from service.api.edition import EditionHeader
-from service.api.http.answers import BoundedAnswers
-from service.dashboard import edition as told
-from service.dashboard.assets import Asset, pages, plotly
-from service.dashboard.edition import edition
+from service.api.answers import EditionHeader
+from service.api.http.middleware import BoundedAnswers
+from service.dashboard.assets import Asset, edition, pages, plotly
+from service.dashboard.assets import edition as told
 from service.dashboard.routes import dashboard_router
 from service.settings.processes import HttpLimitSettings
 

@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 import pytest
 from starlette.types import Receive, Scope, Send
 
-from service.api.http.config import GuardedConfig
-from service.api.http.protocol import GuardedProtocol
+from service.api.http.protocol import GuardedConfig, GuardedProtocol
 from service.api.http.server import GuardedServer
 from service.runtime.asker import ASKER, Asker
 from service.settings.processes import HttpLimitSettings

@@ -10,10 +10,8 @@ from typing import Any
 
 import pytest
 
-from service.api.http.listening import PortInUseError
-from service.api.http.socket_file import socket_file
-from service.api.http.tls import CertificateError, server_tls
-from service.api.http.trusted_proxy import TrustedProxy
+from service.api.http.listening import CertificateError, PortInUseError, server_tls, socket_file
+from service.api.http.middleware import TrustedProxy
 
 
 def test_nothing_older_than_tls_1_2_is_spoken(certificate: tuple[Path, Path]) -> None:
@@ -55,7 +53,7 @@ def test_a_socket_file_is_for_user_and_group_and_goes_at_the_end(tmp_path: Path)
 def test_nothing_else_is_ever_removed_for_a_socket(tmp_path: Path) -> None:
     path = tmp_path / "notes.txt"
     path.write_text("keep")
-    with pytest.raises(PortInUseError, match="something else"), socket_file(path):
+    with pytest.raises(PortInUseError, match="not a socket"), socket_file(path):
         pass
     running = tmp_path / "http.sock"
     with socket_file(running):

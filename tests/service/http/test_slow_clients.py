@@ -9,9 +9,9 @@ import pytest
 from rigs.tiers import covering
 from starlette.responses import PlainTextResponse
 
-from service.api.http.config import GuardedConfig
+from service.api.http.listening import server_tls
+from service.api.http.protocol import GuardedConfig
 from service.api.http.server import GuardedServer
-from service.api.http.tls import server_tls
 from service.settings.processes import HttpLimitSettings
 
 LARGE_MIB = 64
@@ -173,7 +173,7 @@ async def test_an_answer_that_does_not_come_is_given_up(start) -> None:
     assert not running.app.asker.has_gone
 
     assert await client.status() == 503
-    assert b"took too long" in client.body
+    assert b"timed out" in client.body
     assert running.app.asker.has_gone  # and so is what threads still read
 
 

@@ -8,10 +8,16 @@ import pytest
 from rigs.capturing import block
 from starlette.responses import PlainTextResponse
 
-from service.api.load.questions import question
-from service.api.load.shedding import Shedding
-from service.api.load.strain import LoadLimits, Refused, Strain, advance
-from service.api.load.watch import N_LOOKS, LoadWatch
+from service.api.load import (
+    N_LOOKS,
+    LoadLimits,
+    LoadWatch,
+    Refused,
+    Shedding,
+    Strain,
+    advance,
+    question,
+)
 from service.measuring.acquirer import Bus
 
 NOTHING, HISTORY, VIEWS = Refused

@@ -8,8 +8,8 @@ import pytest
 from argon2 import PasswordHasher
 from harness.places import Place, SqlitePlace
 
+from service.api.auth.authenticator import Doors
 from service.api.auth.backoff import Backoff
-from service.api.auth.doors import Doors
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import People
 from service.store.access.port import AccessStore

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from argon2 import PasswordHasher
 
+from service.api.auth.authenticator import Doors, LoggedIn, NotLoggedIn, Refusal
 from service.api.auth.backoff import OF_ACCOUNT, Backoff
-from service.api.auth.doors import Doors, LoggedIn, NotLoggedIn, Refusal
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import People, create_key
 from service.settings.processes import Doorway, why_closed

@@ -11,7 +11,7 @@ import pytest
 from argon2 import PasswordHasher
 from rigs.described import described_app
 
-from service.api.auth.desk import AccessDesk
+from service.api.auth.authenticator import AccessDesk
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import create_key
 from service.app.metrics import Watched, scrape

@@ -11,9 +11,9 @@ from rigs.tiers import covering, fast_and_long
 from starlette.responses import PlainTextResponse
 from starlette.routing import Mount
 
-from service.api.auth.application import GuardedApi
+from service.api.app import GuardedApi
 from service.api.auth.declared import OPEN, Reach, UndeclaredRouteError, declared, needs
-from service.dashboard.edition import edition
+from service.dashboard.assets import edition
 from service.store.access.identities import Permission, Role, new_key, new_token
 
 ROLES = ("viewer", "operator", "engineer", "admin")

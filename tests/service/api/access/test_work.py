@@ -6,8 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from service.api.auth.passwords import MAX_AT_ONCE
-from service.api.auth.work import MAX_WAITING, AccessWork, TooManyLoginsError
+from service.api.auth.passwords import MAX_AT_ONCE, MAX_WAITING, AccessWork, TooManyLoginsError
 from service.store.port import StoreError
 
 

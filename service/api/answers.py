@@ -1,0 +1,277 @@
+"""What every answer has in common: JSON made in a thread, its entity tag, its headers."""
+
+import asyncio
+import re
+from collections.abc import Callable, Hashable
+from contextvars import Context, copy_context
+from hashlib import blake2b
+from typing import Protocol, TypeVar
+
+from fastapi import Response
+from pydantic import BaseModel
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from acquisition.clock import Clock
+from service.runtime.asker import ASKER
+from service.runtime.times import rfc3339
+from service.settings.storage import Origin
+
+_AGE = re.compile(rb'("(?:data_)?age_s":)[0-9][0-9.e+-]*')
+
+_DIGEST_BYTES = 12
+
+
+def digest_of(content: bytes) -> bytes:
+    """Return the digest of a JSON text, ignoring the fields ``age_s`` and ``data_age_s``."""
+    if b'age_s":' in content:  # most answers have none
+        content = _AGE.sub(rb"\1", content)
+    return blake2b(content, digest_size=_DIGEST_BYTES).digest()
+
+
+def tag_of(*digests: bytes) -> str:
+    """Return the weak entity tag (RFC 9110, 8.8.3) of an answer from the digests of its parts."""
+    return f'W/"{blake2b(b"".join(digests), digest_size=_DIGEST_BYTES).hexdigest()}"'
+
+
+def is_known(tag: str, if_none_match: str | None) -> bool:
+    """Whether a client already has the answer of a tag.
+
+    Parameters
+    ----------
+    if_none_match
+        Header If-None-Match: tags separated by commas, or a star.
+    """
+    if if_none_match is None:
+        return False
+    named = {each.strip().removeprefix("W/") for each in if_none_match.split(",")}
+    return "*" in named or tag.removeprefix("W/") in named
+
+
+T = TypeVar("T")
+
+JSON = "application/json"
+
+
+class Dated(Protocol):
+    """A model whose field ``time`` is the present time, which its entity tag ignores."""
+
+    time: str
+
+    def model_dump_json(self) -> str:
+        """Return the model as JSON."""
+        ...
+
+
+async def worked(do: Callable[[], T]) -> T:
+    """Call a function in a thread."""
+    return await asyncio.to_thread(do)
+
+
+async def rendered(make: Callable[[], BaseModel]) -> Response:
+    """Build a model, its JSON and its entity tag in a thread.
+
+    Parameters
+    ----------
+    make
+        Builds the model; may block.
+    """
+    return await asyncio.to_thread(lambda: _json(make()))
+
+
+async def rendered_now(make: Callable[[], Dated]) -> Response:
+    """Like `rendered` for the present state; the tag ignores the time of the answer.
+
+    Parameters
+    ----------
+    make
+        Builds the model; may block. Its time must be the first time in it.
+    """
+    return await asyncio.to_thread(lambda: _dated(make()))
+
+
+class Renderings:
+    """Cache of large answers that seldom change.
+
+    Parameters
+    ----------
+    n_kept
+        Maximum number of answers; the least recently used is dropped first.
+    """
+
+    def __init__(self, n_kept: int = 16) -> None:
+        self._n_kept = n_kept
+        self._kept: dict[Hashable, tuple[object, bytes, str]] = {}
+
+    async def of(self, key: Hashable, source: T, make: Callable[[T], BaseModel]) -> Response:
+        """Return the answer for a key; it is rendered again if its source is another object."""
+        kept = self._kept.pop(key, None)
+        if kept is None or kept[0] is not source:
+            kept = (source, *await worked(lambda: _content(make(source))))
+        self._kept[key] = kept
+        while len(self._kept) > self._n_kept:
+            del self._kept[next(iter(self._kept))]
+        return Response(kept[1], media_type=JSON, headers={"ETag": kept[2]})
+
+
+def _json(model: BaseModel) -> Response:
+    content, tag = _content(model)
+    return Response(content, media_type=JSON, headers={"ETag": tag})
+
+
+def _content(model: BaseModel) -> tuple[bytes, str]:
+    content = model.model_dump_json().encode()
+    return content, tag_of(digest_of(content))
+
+
+def _dated(model: Dated) -> Response:
+    content = model.model_dump_json().encode()
+    undated = content.replace(f'"time":"{model.time}"'.encode(), b"", 1)
+    return Response(content, media_type=JSON, headers={"ETag": tag_of(digest_of(undated))})
+
+
+FRESH_S = 1.0
+"""Maximum age of an answer whose revision is unchanged: some states end by time alone."""
+
+
+class SharedAnswer:
+    """The newest answer of one route, shared by concurrent requests.
+
+    Parameters
+    ----------
+    make
+        Builds the model in a thread; may block.
+    revision
+        Changes with everything that must be shown at once.
+    """
+
+    def __init__(
+        self, make: Callable[[], Dated], revision: Callable[[], int], clock: Clock
+    ) -> None:
+        self._make, self._revision, self._clock = make, revision, clock
+        self._made: tuple[int, float, asyncio.Task[Response]] | None = None
+
+    async def answer(self) -> Response:
+        """Return the answer for one client."""
+        revision, now_s = self._revision(), self._clock.monotonic_s()
+        if self._made is None or self._made[0] != revision or now_s - self._made[1] >= FRESH_S:
+            making = asyncio.create_task(rendered_now(self._make), context=_shared_context())
+            self._made = (revision, now_s, making)
+        # a client that disconnects must not cancel the answer of the others
+        shared = await asyncio.shield(self._made[2])
+        return Response(shared.body, media_type=shared.media_type, headers=dict(_tag(shared)))
+
+
+def _shared_context() -> Context:
+    """Return a context without the first client, so that its disconnect stops no read."""
+    context = copy_context()
+    context.run(ASKER.set, None)
+    return context
+
+
+def _tag(response: Response) -> list[tuple[str, str]]:
+    return [("ETag", response.headers["etag"])]
+
+
+TIME_HEADER = "Padwatch-Time"
+"""Header with the time of the answer, from which clients advance ages in a cached body."""
+
+CACHE_CONTROL = "private, no-cache"
+"""Private caches only, revalidated before each use."""
+
+
+class Revalidation:
+    """ASGI middleware that adds entity tags and answers 304; a route may set ``ETag`` itself."""
+
+    def __init__(self, app: ASGIApp, clock: Clock) -> None:
+        self._app, self._clock = app, clock
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request and tag its answer."""
+        if scope["type"] != "http" or not scope["path"].startswith("/api/"):
+            await self._app(scope, receive, send)
+            return
+        answer = _Answer(send, self._clock, scope)
+        await self._app(scope, receive, answer.send)
+
+
+class _Answer:
+    """Holds back the head of an answer until its body, which determines the tag, is complete."""
+
+    def __init__(self, send: Send, clock: Clock, scope: Scope) -> None:
+        self._send, self._clock = send, clock
+        self._is_read = scope["method"] == "GET"
+        self._named = Headers(scope=scope).get("if-none-match")
+        self._head: Message | None = None
+
+    async def send(self, message: Message) -> None:
+        if message["type"] == "http.response.start":
+            MutableHeaders(scope=message)[TIME_HEADER] = rfc3339(self._clock.now_ns())
+            if self._is_read and _is_whole_json(message):
+                self._head = message
+                return
+        elif self._head is not None:
+            head, self._head = self._head, None
+            message = self._judged(head, message)
+            await self._send(head)
+        await self._send(message)
+
+    def _judged(self, head: Message, body: Message) -> Message:
+        """Set the tag; drop the body if the client has it."""
+        headers = MutableHeaders(scope=head)
+        if "ETag" not in headers:
+            headers["ETag"] = tag_of(digest_of(body.get("body", b"")))
+        headers["Cache-Control"] = CACHE_CONTROL
+        headers.add_vary_header("Accept")
+        if not is_known(headers["ETag"], self._named):
+            return body
+        head["status"] = 304
+        for name in ("Content-Length", "Content-Type"):
+            del headers[name]
+        return {"type": "http.response.body", "body": b""}
+
+
+def _is_whole_json(head: Message) -> bool:
+    headers = Headers(scope=head)
+    is_json = headers.get("content-type") == "application/json"
+    return head["status"] == 200 and is_json and "content-length" in headers
+
+
+ORIGIN_HEADER = "Padwatch-Origin"
+
+
+class OriginHeader:
+    """ASGI middleware that adds the header to all responses."""
+
+    def __init__(self, app: ASGIApp, origin: Origin) -> None:
+        self._app, self._origin = app, origin
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request and add the header to the answer."""
+
+        async def marked(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message)[ORIGIN_HEADER] = self._origin.value
+            await send(message)
+
+        await self._app(scope, receive, marked)
+
+
+EDITION_HEADER = "Padwatch-Edition"
+
+
+class EditionHeader:
+    """ASGI middleware that adds the header to all responses."""
+
+    def __init__(self, app: ASGIApp, edition: str) -> None:
+        self._app, self._edition = app, edition
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request and add the header to the answer."""
+
+        async def marked(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message)[EDITION_HEADER] = self._edition
+            await send(message)
+
+        await self._app(scope, receive, marked)

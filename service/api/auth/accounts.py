@@ -1,0 +1,329 @@
+"""Accounts of people and keys of machines, for admins."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Depends, Path, Request
+from pydantic import FailFast, Field
+
+from service.api.auth.declared import Reach, needs
+from service.api.auth.gate import identity_of, name_caller
+from service.api.auth.passwords import MAX_LENGTH, PasswordRefusedError, TooManyLoginsError
+from service.api.auth.people import AccessRegistry
+from service.api.context import Context
+from service.api.problems import ProblemError, described_problems
+from service.api.values import ApiModel, RequestModel, Time
+from service.runtime.times import rfc3339
+from service.store.access.identities import (
+    MAX_DAYS,
+    MAX_NAME,
+    ApiKey,
+    Means,
+    NameRefusedError,
+    Permission,
+    Role,
+)
+from service.store.access.port import AccessRefusedError, Account
+
+RoleName = Literal["viewer", "operator", "engineer", "admin"]
+
+
+LoginName = Annotated[str, Field(max_length=4 * MAX_NAME, examples=["anna"])]
+
+
+Password = Annotated[
+    str, Field(max_length=4 * MAX_LENGTH, examples=["a long and unusual sentence"])
+]
+
+
+UnitName = Annotated[str, Field(max_length=32, examples=["U1"])]
+
+
+class AccountModel(ApiModel):
+    """An account of a person."""
+
+    name: Annotated[str, Field(examples=["anna"])]
+    """Login name."""
+
+    role: Annotated[RoleName, Field(examples=["operator"])]
+    """Role of the account."""
+
+    created: Time
+    """Time when it was added."""
+
+    password_set: Time
+    """Time when its password was set."""
+
+
+class NewAccountModel(RequestModel):
+    """Request to add an account."""
+
+    name: LoginName
+    """Name of the account: a-z 0-9 . _ @ -."""
+
+    role: Annotated[RoleName, Field(examples=["operator"])]
+    """Role of the account."""
+
+    password: Password
+    """Its first password: 12 to 256 characters, at least 6 different ones."""
+
+
+class SetRoleModel(RequestModel):
+    """Request to change a role."""
+
+    role: Annotated[RoleName, Field(examples=["engineer"])]
+    """Role from the next request on."""
+
+
+class SetPasswordModel(RequestModel):
+    """Request to set a password."""
+
+    password: Password
+    """The new password: 12 to 256 characters, at least 6 different ones."""
+
+
+class KeyModel(ApiModel):
+    """A key of a machine, without its secret."""
+
+    id: Annotated[str, Field(examples=["5f0c6f3a9b1e"])]
+    """Public part of the key."""
+
+    name: Annotated[str, Field(examples=["historian"])]
+    """Name of the key."""
+
+    role: Annotated[RoleName, Field(examples=["viewer"])]
+    """Role of the machine."""
+
+    units: Annotated[list[str], Field(examples=[["U1", "U2"]])]
+    """Units that it is valid for; empty for all."""
+
+    state: Literal["valid", "expired", "revoked"]
+    """State of the key."""
+
+    created: Time
+    """Time of creation."""
+
+    expires: Time
+    """Time of expiry."""
+
+    used: Time | None
+    """Time of last use, to a minute; null if never used."""
+
+    revoked: Time | None
+    """Time of revocation; null if not revoked."""
+
+
+class NewKeyModel(RequestModel):
+    """Request to create a key."""
+
+    name: LoginName
+    """Name of the key: a-z 0-9 . _ @ -."""
+
+    role: Annotated[RoleName, Field(examples=["viewer"])]
+    """Role of the machine."""
+
+    units: Annotated[list[UnitName], FailFast(), Field(max_length=200, default_factory=list)]
+    """Units that it is valid for; empty for all."""
+
+    days: Annotated[int, Field(ge=1, le=MAX_DAYS, examples=[365])] = 365
+    """Validity in days."""
+
+
+class CreatedKeyModel(KeyModel):
+    """A new key."""
+
+    key: Annotated[str, Field(examples=["pw_5f0c6f3a9b1e_…"])]
+    """The key itself, shown once and not stored."""
+
+
+def account_model(account: Account) -> AccountModel:
+    """Return an account without the hash of its password."""
+    return AccountModel(
+        name=account.name,
+        role=account.role.value,
+        created=rfc3339(account.created_ns),
+        password_set=rfc3339(account.password_ns),
+    )
+
+
+def key_model(key: ApiKey, now_ns: int) -> dict[str, Any]:
+    """Return a key without its digest."""
+    return {
+        "id": key.id,
+        "name": key.name,
+        "role": key.role.value,
+        "units": list(key.units),
+        "state": key.state(now_ns).value,
+        "created": rfc3339(key.created_ns),
+        "expires": rfc3339(key.expires_ns),
+        "used": None if key.used_ns is None else rfc3339(key.used_ns),
+        "revoked": None if key.revoked_ns is None else rfc3339(key.revoked_ns),
+    }
+
+
+@contextmanager
+def refusals_as_problems(password: str = "password") -> Iterator[None]:  # noqa: S107
+    """Turn refusals of names, passwords, accounts and keys into problems.
+
+    Parameters
+    ----------
+    password
+        Name of the parameter with the new password.
+    """
+    try:
+        yield
+    except NameRefusedError as error:
+        raise ProblemError(422, "Wrong parameter", str(error), "name") from error
+    except PasswordRefusedError as error:
+        raise ProblemError(422, "Wrong parameter", str(error), password) from error
+    except AccessRefusedError as error:
+        raise ProblemError(409, "Does not fit", str(error)) from error
+    except TooManyLoginsError as error:
+        detail = "too many concurrent logins; try again"
+        raise ProblemError(503, "Busy", detail, headers={"Retry-After": "1"}) from error
+
+
+AccountName = Annotated[
+    str, Path(description="Name of an account.", max_length=256, examples=["anna"])
+]
+
+READ_PROBLEMS = described_problems({503: "The store cannot be read"})
+
+CHANGE_PROBLEMS = described_problems(
+    {
+        403: "Not allowed, or asked for by a page of another site",
+        404: "Unknown account",
+        409: "Does not fit the present accounts",
+        422: "A wrong parameter, or a name or password that is not accepted",
+        503: "Not stored",
+    }
+)
+
+
+def account_router(registry: AccessRegistry) -> APIRouter:
+    """Return the routes of accounts."""
+    router = APIRouter(
+        prefix="/api/v1/accounts",
+        tags=["access"],
+        dependencies=[
+            needs(Permission.CHANGE_ACCESS, Reach.NO_UNIT),
+            Depends(name_caller),
+        ],
+    )
+
+    @router.get("", summary="Accounts", responses=READ_PROBLEMS)
+    async def accounts() -> list[AccountModel]:
+        """List all accounts by name."""
+        return [account_model(account) for account in await registry.accounts()]
+
+    @router.post("", summary="Add an account", status_code=201, responses=CHANGE_PROBLEMS)
+    async def add(asked: NewAccountModel) -> AccountModel:
+        """Add an account with a password to change at the first login."""
+        with refusals_as_problems():
+            name = await registry.add(asked.name, Role(asked.role), asked.password)
+        return await _one(registry, name)
+
+    @router.put("/{name}/role", summary="Change a role", responses=CHANGE_PROBLEMS)
+    async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
+        """Change the role of an account from its next request on."""
+        await _one(registry, name)
+        with refusals_as_problems():
+            await registry.set_role(name, Role(asked.role))
+        return await _one(registry, name)
+
+    @router.put("/{name}/password", summary="Set a password", responses=CHANGE_PROBLEMS)
+    async def set_password(
+        request: Request, name: AccountName, asked: SetPasswordModel
+    ) -> AccountModel:
+        """Set the password of another account, to change at the next login; its sessions end."""
+        if _is_own(request, name):
+            detail = "change your own password with POST /session/password"
+            raise ProblemError(409, "Does not fit", detail)
+        await _one(registry, name)
+        with refusals_as_problems():
+            await registry.set_password(name, asked.password, must_change=True)
+        return await _one(registry, name)
+
+    @router.delete(
+        "/{name}", summary="Remove an account", status_code=204, responses=CHANGE_PROBLEMS
+    )
+    async def remove(request: Request, name: AccountName) -> None:
+        """Remove an account and end its sessions; the own account cannot be removed."""
+        if _is_own(request, name):
+            raise ProblemError(409, "Does not fit", "you cannot remove your own account")
+        await _one(registry, name)
+        with refusals_as_problems():
+            await registry.remove(name)
+
+    return router
+
+
+def _is_own(request: Request, name: str) -> bool:
+    """Whether an account is that of the caller."""
+    identity = identity_of(request)
+    return identity.means is Means.SESSION and identity.name == name
+
+
+async def _one(registry: AccessRegistry, name: str) -> AccountModel:
+    found = await registry.account(name)
+    if found is None:
+        raise ProblemError(404, "Unknown account", "there is no such account")
+    return account_model(found)
+
+
+KeyId = Annotated[
+    str, Path(description="Public part of a key.", max_length=64, examples=["5f0c6f3a9b1e"])
+]
+
+KEY_READ_PROBLEMS = described_problems({503: "The store cannot be read"})
+
+KEY_CHANGE_PROBLEMS = described_problems(
+    {
+        403: "Not allowed, or asked for by a page of another site",
+        404: "Unknown key",
+        409: "No such key can be made",
+        422: "A wrong parameter, or a name that is not accepted",
+        503: "Not stored",
+    }
+)
+
+
+def key_router(context: Context, registry: AccessRegistry) -> APIRouter:
+    """Return the routes of keys."""
+    router = APIRouter(
+        prefix="/api/v1/keys",
+        tags=["access"],
+        dependencies=[
+            needs(Permission.CHANGE_ACCESS, Reach.NO_UNIT),
+            Depends(name_caller),
+        ],
+    )
+
+    @router.get("", summary="Keys", responses=KEY_READ_PROBLEMS)
+    async def keys() -> list[KeyModel]:
+        """List all keys that were ever created, oldest first, without their secrets."""
+        now_ns = context.clock.now_ns()
+        return [KeyModel.model_validate(key_model(key, now_ns)) for key in await registry.keys()]
+
+    @router.post("", summary="Create a key", status_code=201, responses=KEY_CHANGE_PROBLEMS)
+    async def create(asked: NewKeyModel) -> CreatedKeyModel:
+        """Create a key for a machine and show it once."""
+        for unit in asked.units:
+            if unit not in context.units:
+                detail = "there is no such unit in this plant"
+                raise ProblemError(422, "Wrong parameter", detail, "units")
+        with refusals_as_problems():
+            made, shown = await registry.create_key(
+                asked.name, Role(asked.role), asked.units, asked.days
+            )
+        about = key_model(made, context.clock.now_ns())
+        return CreatedKeyModel.model_validate({**about, "key": shown})
+
+    @router.delete("/{key}", summary="Revoke a key", status_code=204, responses=KEY_CHANGE_PROBLEMS)
+    async def revoke(key: KeyId) -> None:
+        """Revoke a key permanently; repeating the request changes nothing."""
+        if not await registry.revoke_key(key):
+            raise ProblemError(404, "Unknown key", "there is no such key")
+
+    return router

@@ -1,0 +1,377 @@
+"""Logins, and who is behind a request."""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from enum import Enum, StrEnum, auto
+from functools import cached_property
+
+from starlette.types import Scope
+
+from acquisition.clock import Clock
+from core.units import ns_from_s
+from service.api.auth.backoff import Backoff
+from service.api.auth.passwords import AccessWork, Hashing
+from service.api.auth.people import AccessRegistry, People
+from service.settings.processes import is_loopback
+from service.store.access.identities import (
+    LOCAL,
+    Identity,
+    KeyState,
+    Means,
+    NameRefusedError,
+    Role,
+    Session,
+    SessionLimits,
+    account_name,
+    digest,
+    is_token,
+    is_token_of,
+    key_id,
+    new_token,
+)
+from service.store.access.port import AccessStore, Account
+
+
+def immediately(note: Callable[[], None]) -> None:
+    """Call a function immediately."""
+    note()
+
+
+class Refusal(StrEnum):
+    """Why credentials were refused; for logs, not for the caller."""
+
+    UNKNOWN = "unknown"
+    EXPIRED = "expired"
+    REVOKED = "revoked"
+
+
+@dataclass(frozen=True)
+class LoggedIn:
+    """A successful login.
+
+    Parameters
+    ----------
+    token
+        Token of the session; only its digest is stored.
+    """
+
+    token: str = field(repr=False)
+    identity: Identity
+
+
+@dataclass(frozen=True)
+class NotLoggedIn:
+    """A failed login: wrong name, wrong password or a wait, without saying which.
+
+    Parameters
+    ----------
+    wait_s
+        Time until the next attempt is checked; 0 if this one was.
+    """
+
+    wait_s: float = 0.0
+
+
+class Doors:
+    """Checks passwords, sessions and keys. It blocks while hashing: call it from a thread.
+
+    Parameters
+    ----------
+    store
+        Accounts, sessions and keys.
+    note
+        Runs writes of times of use, by default immediately; a login does not depend on them.
+    """
+
+    def __init__(
+        self,
+        store: AccessStore,
+        hashing: Hashing,
+        backoff: Backoff,
+        limits: SessionLimits | None = None,
+        note: Callable[[Callable[[], None]], None] = immediately,
+    ) -> None:
+        self._store, self._hashing, self._backoff = store, hashing, backoff
+        self._limits, self._note = limits or SessionLimits(), note
+        hashing.prepare()
+
+    def log_in(
+        self, name: str, password: str, peer: str, now_ns: int, ticks_ns: int
+    ) -> LoggedIn | NotLoggedIn:
+        """Start a session for the right password of an account.
+
+        Parameters
+        ----------
+        peer
+            Address of the client.
+        now_ns
+            Time by the host's clock.
+        ticks_ns
+            Monotonic time.
+        """
+        name = tidy_name(name)
+        if wait_s := self._backoff.attempt(name, peer, ticks_ns):
+            return NotLoggedIn(wait_s)
+        account = self._store.accounts.get(name)
+        if not self._hashing.verify(account.password_hash if account else None, password):
+            return NotLoggedIn()
+        if account is None or (token := self._begin(account, now_ns)) is None:
+            return NotLoggedIn()
+        self._backoff.succeeded(name, peer)
+        self._renew_hash(account, password)
+        return LoggedIn(token, _person(account))
+
+    def log_out(self, token: str) -> None:
+        """End a session; an ended one is ignored."""
+        if is_token(token):
+            self._store.sessions.end(digest(token))
+
+    def person(self, token: str, now_ns: int) -> Identity | Refusal:
+        """Return the identity of a session token."""
+        found = self._store.sessions.get(digest(token)) if is_token(token) else None
+        if found is None:
+            return Refusal.UNKNOWN
+        session, account = found
+        if not self._limits.is_live(session, now_ns):
+            self._note(lambda: self._store.sessions.end(session.digest))
+            return Refusal.EXPIRED
+        if self._limits.is_news(session, now_ns):
+            self._note(lambda: self._store.sessions.see(session.digest, now_ns))
+        return _person(account)
+
+    def machine(self, key: str, now_ns: int) -> Identity | Refusal:
+        """Return the identity of a key."""
+        id_ = key_id(key)
+        stored = None if id_ is None else self._store.keys.get(id_)
+        if stored is None or not is_token_of(key, stored.digest):
+            return Refusal.UNKNOWN
+        state = stored.state(now_ns)
+        if state is not KeyState.VALID:
+            return Refusal.REVOKED if state is KeyState.REVOKED else Refusal.EXPIRED
+        if stored.is_news(now_ns):
+            self._note(lambda: self._store.keys.see(stored.id, now_ns))
+        return Identity(stored.name, stored.role, Means.KEY, stored.units)
+
+    def _begin(self, account: Account, now_ns: int) -> str | None:
+        token = new_token()
+        session = Session(digest(token), account.name, now_ns, now_ns)
+        oldest_ns = self._limits.oldest_ns(now_ns)
+        begun = self._store.sessions.add(session, account.password_number, oldest_ns)
+        return token if begun else None
+
+    def _renew_hash(self, account: Account, password: str) -> None:
+        if self._hashing.is_outdated(account.password_hash):
+            self._store.accounts.rehash(account, self._hashing.hash(password))
+
+
+def tidy_name(name: str) -> str:
+    """Return the normalised name of an account; "?" for an invalid name."""
+    try:
+        return account_name(name)
+    except NameRefusedError:
+        return "?"
+
+
+def _person(account: Account) -> Identity:
+    return Identity(
+        account.name, account.role, Means.SESSION, must_change_password=account.must_change
+    )
+
+
+COOKIE = "__Host-padwatch"
+"""Cookie that browsers accept only from a secure origin, for that host and every path."""
+
+PLAIN_COOKIE = "padwatch"
+"""Cookie over plain HTTP: some browsers reject a secure cookie from loopback."""
+
+BEARER = "bearer"
+
+Headers = Iterable[tuple[bytes, bytes]]
+
+
+class Kind(Enum):
+    """Kind of credentials."""
+
+    NOTHING = auto()
+    SESSION = auto()
+    KEY = auto()
+
+    WRONG = auto()
+    """Ambiguous credentials, such as two cookies."""
+
+
+@dataclass(frozen=True)
+class Credentials:
+    """Credentials of a request; a key takes precedence over a cookie."""
+
+    kind: Kind
+    secret: str = field(default="", repr=False)
+
+
+NOTHING, WRONG = Credentials(Kind.NOTHING), Credentials(Kind.WRONG)
+
+
+def credentials_of(headers: Headers, scheme: str) -> Credentials:
+    """Return the credentials in the headers of a request."""
+    found = list(headers)
+    keys = list(_keys(value.decode("latin-1") for name, value in found if name == b"authorization"))
+    if len(keys) > 1:
+        return WRONG
+    if keys:
+        return Credentials(Kind.KEY, keys[0])
+    values = [value.decode("latin-1") for name, value in found if name == b"cookie"]
+    cookies = _cookies(values, COOKIE)
+    if not cookies and scheme == "http":
+        cookies = _cookies(values, PLAIN_COOKIE)
+    if len(cookies) > 1:
+        return WRONG
+    return Credentials(Kind.SESSION, cookies[0]) if cookies else NOTHING
+
+
+def _keys(values: Iterable[str]) -> Iterator[str]:
+    """Yield bearer keys; other schemes belong to the login of a proxy."""
+    for value in values:
+        scheme, _, key = value.partition(" ")
+        if scheme.lower() == BEARER:
+            yield key.strip()
+
+
+def _cookies(values: Iterable[str], wanted: str) -> list[str]:
+    pairs = (pair.strip().partition("=") for value in values for pair in value.split(";"))
+    return [value for name, _, value in pairs if name.strip() == wanted]
+
+
+PASSED_ON = (b"forwarded", b"x-forwarded-for", b"x-real-ip", b"via")
+"""Headers of a proxy, whose requests may come from anywhere."""
+
+
+def is_from_here(scope: Scope) -> bool:
+    """Whether a request comes from this computer and not through a proxy."""
+    client = scope.get("client")
+    if client is None or not is_loopback(str(client[0])):
+        return False
+    return not any(name in PASSED_ON for name, _ in scope["headers"])
+
+
+@dataclass(frozen=True)
+class Caller:
+    """Sender of a request.
+
+    Parameters
+    ----------
+    identity
+        Identity; None if unauthenticated.
+    shown
+        Credentials, valid or not.
+    must_log_in
+        Whether requests from that address need a login.
+    """
+
+    identity: Identity | None
+    shown: Credentials = field(repr=False)
+    must_log_in: bool
+
+
+class AccessDesk:
+    """Identifies callers and logs people in, without blocking the event loop.
+
+    Parameters
+    ----------
+    local_role
+        Role of callers on this computer without credentials; None if they must log in.
+    hashing
+        Password hashing; default: argon2id with the present parameters.
+    """
+
+    def __init__(
+        self,
+        store: AccessStore,
+        clock: Clock,
+        local_role: Role | None = Role.VIEWER,
+        hashing: Hashing | None = None,
+        limits: SessionLimits | None = None,
+    ) -> None:
+        self._store, self._clock, self._limits = store, clock, limits
+        self.local_role = local_role
+        self._hashing = hashing or Hashing()
+        self._people = People(store, self._hashing)
+        self._work = AccessWork()
+        self._backoff = Backoff()
+        self.registry = AccessRegistry(store, self._people, self._work, clock)
+
+    async def caller(self, scope: Scope) -> Caller:
+        """Identify the sender of a request.
+
+        Raises
+        ------
+        StoreError
+            If the store cannot be read.
+        """
+        local_role = self.local_role if is_from_here(scope) else None
+        shown = credentials_of(scope["headers"], scope["scheme"])
+        identity = await self._proven(shown)
+        # a wrong key is refused; an expired session counts as no credentials
+        is_anonymous = identity is None and shown.kind in (Kind.NOTHING, Kind.SESSION)
+        if is_anonymous and local_role is not None:
+            identity = Identity(LOCAL, local_role, Means.LOCAL)
+        return Caller(identity, shown, must_log_in=local_role is None)
+
+    async def log_in(self, name: str, password: str, peer: str) -> LoggedIn | NotLoggedIn:
+        """Start a session for the right password of an account.
+
+        Raises
+        ------
+        TooManyLoginsError
+            If there are too many concurrent logins.
+        """
+        now_ns, ticks_ns = self._clock.now_ns(), ns_from_s(self._clock.monotonic_s())
+        return await self._work.hashed(
+            lambda: self._doors.log_in(name, password, peer, now_ns, ticks_ns),
+            is_known=self._backoff.knows(tidy_name(name), peer),
+        )
+
+    async def log_out(self, token: str) -> None:
+        """End a session; an ended one is ignored."""
+        await self._work.looked_up(lambda: self._doors.log_out(token))
+
+    async def set_up(self, token: str, name: str, password: str) -> bool:
+        """Create the first account, an admin; return whether the token was valid.
+
+        Raises
+        ------
+        NameRefusedError, PasswordRefusedError, TooManyLoginsError
+            If one is not accepted, or there are too many concurrent logins.
+        """
+        now_ns = self._clock.now_ns()
+        return await self._work.hashed(
+            lambda: self._people.set_up(token, name, password, now_ns), is_known=False
+        )
+
+    async def offer_set_up(self) -> str | None:
+        """Return a token for creating the first account; None if none is needed."""
+        if self.local_role is Role.ADMIN:
+            return None
+        now_ns = self._clock.now_ns()
+        return await self._work.looked_up(lambda: self._people.offer_set_up(now_ns))
+
+    async def has_accounts(self) -> bool:
+        """Whether there is an account."""
+        return bool(await self._work.looked_up(self._store.accounts.all))
+
+    def close(self) -> None:
+        """Stop the threads; no further request is served."""
+        self._work.close()
+
+    async def _proven(self, shown: Credentials) -> Identity | None:
+        now_ns = self._clock.now_ns()
+        if shown.kind is Kind.SESSION:
+            found = await self._work.looked_up(lambda: self._doors.person(shown.secret, now_ns))
+        elif shown.kind is Kind.KEY:
+            found = await self._work.looked_up(lambda: self._doors.machine(shown.secret, now_ns))
+        else:
+            return None
+        return None if isinstance(found, Refusal) else found
+
+    @cached_property
+    def _doors(self) -> Doors:
+        return Doors(self._store, self._hashing, self._backoff, self._limits, self._work.note)

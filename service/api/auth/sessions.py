@@ -1,0 +1,260 @@
+"""Login, logout, change of password, and the first account."""
+
+import asyncio
+from contextlib import suppress
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Request, Response
+from pydantic import Field
+
+from acquisition.clock import Clock
+from service.api.auth.accounts import LoginName, Password, RoleName, refusals_as_problems
+from service.api.auth.authenticator import (
+    COOKIE,
+    PLAIN_COOKIE,
+    AccessDesk,
+    Caller,
+    Kind,
+    LoggedIn,
+    NotLoggedIn,
+)
+from service.api.auth.declared import OPEN, Reach, needs
+from service.api.auth.gate import caller_of, identity_of, must_wait, wrong_login
+from service.api.context import Context
+from service.api.problems import ProblemError, described_problems
+from service.api.values import ApiModel, RequestModel
+from service.store.access.audit_entries import Deed, acting, name_actor
+from service.store.access.identities import Identity, Means, Permission, Role
+from service.store.audit_port import AuditStore
+from service.store.port import StoreError
+
+PermissionName = Literal["read", "act_on_alarms", "change_measuring", "read_audit", "change_access"]
+
+
+class SessionModel(ApiModel):
+    """The caller and its permissions."""
+
+    login_required: bool
+    """Whether this client must log in to see the plant; changes need a login everywhere except in
+    the demonstration."""
+
+    set_up_needed: bool
+    """Whether there is no account yet."""
+
+    password_change_needed: bool
+    """Whether the password, set by an administrator, must be changed first."""
+
+    name: Annotated[str | None, Field(examples=["anna"])]
+    """Name of the account or key; null without a login."""
+
+    role: Annotated[RoleName | None, Field(examples=["operator"])]
+    """Role; null if a login is needed. Callers on this computer without a login are viewers."""
+
+    permissions: Annotated[list[PermissionName], Field(examples=[["read", "act_on_alarms"]])]
+    """Permissions; empty if a login is needed."""
+
+
+class LoginModel(RequestModel):
+    """Request to log in."""
+
+    name: LoginName
+    """Name of the account; upper and lower case are the same."""
+
+    password: Password
+    """Its password."""
+
+
+class NewPasswordModel(RequestModel):
+    """Request to change the own password."""
+
+    password: Password
+    """Present password."""
+
+    new_password: Password
+    """New password: 12 to 256 characters, at least 6 different ones."""
+
+
+class SetUpModel(RequestModel):
+    """Request to create the first account."""
+
+    token: Annotated[str, Field(max_length=256, examples=["the token that the service printed"])]
+    """The token that the service printed when it started."""
+
+    name: LoginName
+    """Name of the account: a-z 0-9 . _ @ -."""
+
+    password: Password
+    """Its password: 12 to 256 characters, at least 6 different ones."""
+
+
+BEGUN, ENDED = "session.begun", "session.ended"
+
+
+async def record(audit: AuditStore, clock: Clock, action: str, name: str) -> None:
+    """Record a login or logout in the audit trail.
+
+    Raises
+    ------
+    StoreError
+        If it cannot be stored.
+    """
+    name_actor(name)
+    who = acting()
+    deed = Deed(clock.now_ns(), name, action, name, source=who.source, peer=who.peer)
+    await asyncio.to_thread(audit.record, [deed])
+
+
+LOGIN_PROBLEMS = described_problems(
+    {
+        401: "The name or the password is wrong",
+        403: "Asked for by a page of another site",
+        422: "A wrong parameter",
+        429: "Too many failed logins; Retry-After gives the wait",
+        503: "The store cannot be used, or too many log in at the same time",
+    }
+)
+
+PASSWORD_PROBLEMS = {
+    **LOGIN_PROBLEMS,
+    **described_problems({409: "The caller has no password"}),
+}
+
+SET_UP_PROBLEMS = described_problems(
+    {
+        403: "The token is wrong or has been used, or there is an account already",
+        422: "A wrong parameter, or a name or password that is not accepted",
+        503: "The store cannot be used",
+    }
+)
+
+
+def session_router(context: Context, desk: AccessDesk) -> APIRouter:
+    """Return the routes of sessions."""
+    router = APIRouter(prefix="/api/v1", tags=["access"])
+
+    @router.get("/session", summary="The caller", dependencies=[OPEN])
+    async def session(request: Request) -> SessionModel:
+        """Show whether a login is needed, the caller, and its permissions."""
+        return await session_model(caller_of(request), desk)
+
+    @router.post(
+        "/session",
+        summary="Log in",
+        status_code=201,
+        responses=LOGIN_PROBLEMS,
+        dependencies=[OPEN],
+    )
+    async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
+        """Start a session, kept in a cookie; an earlier session of the browser ends."""
+        let_in = await _log_in(desk, request, asked.name, asked.password)
+        await _end(desk, caller_of(request))
+        await _record_login(context, desk, let_in)
+        return await _begun(desk, request, response, let_in)
+
+    @router.delete("/session", summary="Log out", status_code=204, dependencies=[OPEN])
+    async def log_out(request: Request, response: Response) -> None:
+        """End the session, if there is one."""
+        caller = caller_of(request)
+        await _end(desk, caller)
+        if caller.identity is not None and caller.identity.means is Means.SESSION:
+            await record(context.store.audit, context.clock, ENDED, caller.identity.name)
+        response.delete_cookie(COOKIE, secure=True, httponly=True, samesite="strict")
+        response.delete_cookie(PLAIN_COOKIE, httponly=True, samesite="strict")
+
+    @router.post(
+        "/session/password",
+        summary="Change one's own password",
+        status_code=201,
+        responses=PASSWORD_PROBLEMS,
+        dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
+    )
+    async def change_password(
+        request: Request, response: Response, asked: NewPasswordModel
+    ) -> SessionModel:
+        """Change the password; all sessions of the account end, and this browser gets a new one."""
+        identity = _person(identity_of(request))
+        await _log_in(desk, request, identity.name, asked.password)
+        with refusals_as_problems("new_password"):
+            await desk.registry.set_password(identity.name, asked.new_password, must_change=False)
+        let_in = await _log_in(desk, request, identity.name, asked.new_password)
+        await _record_login(context, desk, let_in)
+        return await _begun(desk, request, response, let_in)
+
+    @router.post(
+        "/set-up",
+        summary="Make the first account",
+        status_code=201,
+        responses=SET_UP_PROBLEMS,
+        dependencies=[OPEN],
+    )
+    async def set_up(request: Request, asked: SetUpModel) -> SessionModel:
+        """Create the first account, an admin, with the token printed by the service."""
+        with refusals_as_problems():
+            is_made = await desk.set_up(asked.token, asked.name, asked.password)
+        if not is_made:
+            detail = "the token is wrong or used up, or there is an account already"
+            raise ProblemError(403, "Not set up", detail)
+        return await session_model(caller_of(request), desk)
+
+    return router
+
+
+async def _log_in(desk: AccessDesk, request: Request, name: str, password: str) -> LoggedIn:
+    peer = request.client.host if request.client else ""
+    with refusals_as_problems():
+        found = await desk.log_in(name, password, peer)
+    if isinstance(found, NotLoggedIn):
+        raise must_wait(found.wait_s) if found.wait_s else wrong_login()
+    return found
+
+
+async def _record_login(context: Context, desk: AccessDesk, let_in: LoggedIn) -> None:
+    """Record a login in the audit trail; end the session if that fails."""
+    try:
+        await record(context.store.audit, context.clock, BEGUN, let_in.identity.name)
+    except StoreError:
+        with suppress(StoreError):
+            await desk.log_out(let_in.token)
+        raise
+
+
+async def _begun(
+    desk: AccessDesk, request: Request, response: Response, let_in: LoggedIn
+) -> SessionModel:
+    is_secure = _is_secure(request)
+    name = COOKIE if is_secure else PLAIN_COOKIE
+    response.set_cookie(name, let_in.token, secure=is_secure, httponly=True, samesite="strict")
+    caller = caller_of(request)
+    return await session_model(Caller(let_in.identity, caller.shown, caller.must_log_in), desk)
+
+
+def _is_secure(request: Request) -> bool:
+    """Whether the browser uses https; a proxy may forward http."""
+    return "https" in (request.url.scheme, request.headers.get("origin", "").partition(":")[0])
+
+
+async def _end(desk: AccessDesk, caller: Caller) -> None:
+    if caller.shown.kind is Kind.SESSION:
+        await desk.log_out(caller.shown.secret)
+
+
+def _person(identity: Identity) -> Identity:
+    if identity.means is not Means.SESSION:
+        detail = "this identity has no password; log in with an account first"
+        raise ProblemError(409, "No password", detail)
+    return identity
+
+
+async def session_model(caller: Caller, desk: AccessDesk) -> SessionModel:
+    """The caller and its permissions."""
+    identity = caller.identity
+    may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
+    needs_set_up = not may_all and not await desk.has_accounts()
+    return SessionModel(
+        login_required=caller.must_log_in,
+        set_up_needed=needs_set_up,
+        password_change_needed=identity is not None and identity.must_change_password,
+        name=identity.name if identity is not None and identity.is_proven else None,
+        role=identity.role.value if identity is not None else None,
+        permissions=[p.value for p in Permission if identity is not None and identity.role.may(p)],
+    )

@@ -1,0 +1,101 @@
+"""Liveness, readiness and metrics."""
+
+from collections.abc import Awaitable, Callable
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Header, Response
+from prometheus_client.registry import Collector
+
+from service.api.auth.declared import OPEN, needs
+from service.api.context import Context
+from service.api.values import ApiModel
+from service.runtime.metrics import OPEN_METRICS, rendered
+from service.store.access.identities import Permission
+
+
+class HealthModel(ApiModel):
+    """Whether the service can do its work."""
+
+    status: Literal["ok", "not ready"]
+    """Overall state."""
+
+    checks: dict[str, str]
+    """Result of each check."""
+
+
+def health_router(context: Context) -> APIRouter:
+    """Return the routes of liveness and readiness."""
+    router = APIRouter(tags=["health"], dependencies=[OPEN])
+
+    @router.get("/livez", summary="Is the process alive?")
+    async def livez() -> HealthModel:
+        """Answer while the event loop runs, whatever the state of DAQ or disk."""
+        return HealthModel(status="ok", checks={"event_loop": "turning"})
+
+    @router.get(
+        "/readyz",
+        summary="Can it do its work?",
+        responses={503: {"model": HealthModel, "description": "Something does not work"}},
+    )
+    async def readyz(response: Response) -> HealthModel:
+        """Answer 200 if results can be stored and every loop of the program is alive, else 503.
+
+        A lost DAQ is reported but does not make the service unready.
+        """
+        checks = {f"unit {unit}": context.live.status(unit).state.value for unit in context.units}
+        checks["store"] = context.live.store_error or "ok"
+        checks["database"] = context.store.kind
+        if context.space is not None:
+            checks["disk"] = str(context.space)
+        checks["stored data"] = context.stored_trouble() or "ok"
+        checks |= context.checks()
+        loops = context.loops()
+        checks |= {f"loop {name}": trouble or "alive" for name, trouble in loops.items()}
+        ready = context.live.store_error is None and not any(loops.values())
+        response.status_code = 200 if ready else 503
+        return HealthModel(status="ok" if ready else "not ready", checks=checks)
+
+    return router
+
+
+EXAMPLE = """\
+# HELP padwatch_link_connected 1 while the device is connected.
+# TYPE padwatch_link_connected gauge
+padwatch_link_connected{unit="U1"} 1.0
+"""
+
+ANSWER = {
+    "description": "Metrics in Prometheus' text format, or in OpenMetrics' where that is accepted",
+    "content": {
+        kind: {"schema": {"type": "string"}, "example": EXAMPLE}
+        for kind in ("text/plain", OPEN_METRICS.partition(";")[0])
+    },
+}
+
+
+def metrics_router(look: Callable[[], Awaitable[Collector]]) -> APIRouter:
+    """Return the route of the metrics for Prometheus.
+
+    Parameters
+    ----------
+    look
+        Collects all metrics.
+    """
+    router = APIRouter(tags=["health"], dependencies=[needs(Permission.READ)])
+
+    @router.get(
+        "/metrics",
+        summary="How the service does, for Prometheus",
+        response_class=Response,
+        responses={200: ANSWER},
+    )
+    async def metrics(
+        accept: Annotated[
+            str, Header(description="Accepted formats.", examples=["text/plain"])
+        ] = "text/plain",
+    ) -> Response:
+        """Return counters and gauges of samples, links, results, alarms, store and deliveries."""
+        body, kind = rendered(await look(), accept)
+        return Response(body, headers={"content-type": kind, "cache-control": "no-store"})
+
+    return router

@@ -1,0 +1,312 @@
+"""Middleware between the HTTP server and the application."""
+
+import asyncio
+import re
+from collections.abc import Iterable
+from ipaddress import ip_address
+
+from starlette.datastructures import MutableHeaders
+from starlette.requests import ClientDisconnect
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.api.http.refusals import (
+    BODY_TOO_LARGE,
+    BUSY,
+    NO_ANSWER,
+    NO_HOST,
+    NOT_UTF8,
+    TOO_DEEP,
+    WRONG_HOST,
+    Refusal,
+)
+from service.runtime.asker import ASKER, Asker
+from service.settings.processes import HttpLimitSettings
+
+
+class HeadRequests:
+    """ASGI middleware that handles HEAD as GET without a body (RFC 9110, 9.3.2)."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request."""
+        if scope.get("method") != "HEAD":
+            await self._app(scope, receive, send)
+            return
+
+        async def without_body(message: Message) -> None:
+            if message["type"] == "http.response.body":
+                message = {**message, "body": b""}
+            await send(message)
+
+        await self._app({**scope, "method": "GET"}, receive, without_body)
+
+
+HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::[0-9]{1,5})?")
+"""Name, IPv4 address or bracketed IPv6 address, with an optional port."""
+
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+
+
+class KnownHosts:
+    """ASGI middleware that refuses requests for unknown hosts.
+
+    A page of another site can let its own name point to 127.0.0.1 (DNS rebinding); the Host header
+    still has that name.
+
+    Parameters
+    ----------
+    hosts
+        Names and addresses without port, besides loopback and the address of the server.
+    """
+
+    def __init__(self, app: ASGIApp, hosts: Iterable[str]) -> None:
+        self._app = app
+        self._known = {host.lower().strip("[]").rstrip(".") for host in (*LOOPBACK, *hosts)}
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request for this service."""
+        asked = [value for name, value in scope["headers"] if name == b"host"]
+        if len(asked) != 1 or not asked[0]:
+            await NO_HOST.send(scope, send)
+        elif self._is_known(_name(asked[0].decode("latin-1")), scope):
+            await self._app(scope, receive, send)
+        else:
+            await WRONG_HOST.send(scope, send)
+
+    def _is_known(self, name: str, scope: Scope) -> bool:
+        address, _ = scope.get("server") or ("", None)
+        return name in self._known or (bool(name) and name == address.removeprefix("::ffff:"))
+
+
+def _name(host: str) -> str:
+    """Return a Host header without its port; empty if it is malformed."""
+    found = HOST.fullmatch(host)
+    return found[1].strip("[]").rstrip(".").lower() if found else ""
+
+
+ALWAYS = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"permissions-policy", b"camera=(), geolocation=(), microphone=(), payment=(), usb=()"),
+)
+"""Headers of every answer."""
+
+API_ONLY = (
+    (b"content-security-policy", b"default-src 'none'; base-uri 'none'; frame-ancestors 'none'"),
+    (b"cache-control", b"no-store"),
+)
+"""Headers of answers without their own, which dashboard and evidence report have."""
+
+
+class SecurityHeaders:
+    """ASGI middleware that adds missing security headers."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request and add headers to the answer."""
+
+        async def completed(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in (*ALWAYS, *API_ONLY):
+                    headers.setdefault(name.decode(), value.decode())
+            await send(message)
+
+        await self._app(scope, receive, completed)
+
+
+FOR, PROTO = b"x-forwarded-for", b"x-forwarded-proto"
+
+
+class TrustedProxy:
+    """ASGI middleware for a unix socket behind a trusted proxy: client address and scheme."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request with the client and scheme reported by the proxy."""
+        if scope["type"] == "http":
+            scope["client"] = _client(_last(scope, FOR))
+            scope["scheme"] = "https" if _last(scope, PROTO).lower() == "https" else "http"
+        await self._app(scope, receive, send)
+
+
+def _last(scope: Scope, name: bytes) -> str:
+    """Return the last value of a list header, which the proxy added; others may be forged."""
+    values = [value for found, value in scope["headers"] if found == name]
+    return values[-1].decode("latin-1").rpartition(",")[2].strip() if values else ""
+
+
+def _client(address: str) -> tuple[str, int] | None:
+    try:
+        return str(ip_address(address)), 0
+    except ValueError:
+        return None
+
+
+TOKEN = re.compile(rb'"(?:[^"\\]++|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
+"""A string, closed or not, or a bracket; without backtracking."""
+
+
+def is_deeper_than(limit: int, text: bytes) -> bool:
+    """Whether lists and objects of a text, valid JSON or not, are nested too deeply."""
+    if text.count(b"[") + text.count(b"{") <= limit:
+        return False  # true of all usual requests, and cheaper than scanning strings
+    depth = 0
+    for match in TOKEN.finditer(text):
+        first = text[match.start()]
+        if first in b"[{":
+            depth += 1
+            if depth > limit:
+                return True
+        elif first in b"]}":
+            depth -= 1
+    return False
+
+
+class TooLargeError(Exception):
+    """A body above the limit."""
+
+
+class WholeBodies:
+    """ASGI middleware that reads the whole body before it calls the application.
+
+    The connection limits the time for it.
+    """
+
+    def __init__(self, app: ASGIApp, limits: HttpLimitSettings) -> None:
+        self._app, self._limits = app, limits
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request with its whole body."""
+        try:
+            body = await self._body(scope, receive)
+        except TooLargeError:
+            await BODY_TOO_LARGE.send(scope, send)
+            return
+        except ClientDisconnect:
+            return
+        refusal = self._wrong(body)
+        if refusal is not None:
+            await refusal.send(scope, send)
+            return
+        await self._app(scope, _given(body, receive), send)
+
+    async def _body(self, scope: Scope, receive: Receive) -> bytes:
+        limit = 1024 * self._limits.max_body_kb
+        if any(
+            _says_more(value, limit)
+            for name, value in scope["headers"]
+            if name == b"content-length"
+        ):
+            raise TooLargeError
+        body = bytearray()
+        while True:
+            message = await receive()
+            if message["type"] == "http.disconnect":
+                raise ClientDisconnect
+            body += message.get("body", b"")
+            if len(body) > limit:
+                raise TooLargeError
+            if not message.get("more_body", False):
+                return bytes(body)
+
+    def _wrong(self, body: bytes) -> Refusal | None:
+        try:
+            body.decode()
+        except UnicodeDecodeError:
+            return NOT_UTF8
+        return TOO_DEEP if is_deeper_than(self._limits.max_json_depth, body) else None
+
+
+def _says_more(length: bytes, limit: int) -> bool:
+    digits = length.strip().lstrip(b"0")
+    # int() of very long numbers is slow, and fails from 4300 digits
+    return len(digits) > 18 or int(digits or b"0") > limit
+
+
+def _given(body: bytes, receive: Receive) -> Receive:
+    """Return a receiver of the body, then of the messages of the connection."""
+    whole: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
+
+    async def given() -> Message:
+        return whole.pop() if whole else await receive()
+
+    return given
+
+
+class BoundedAnswers:
+    """ASGI middleware that limits the number of concurrent requests and the time of each.
+
+    Both limits end when an answer starts; then the connection limits the time.
+    """
+
+    def __init__(self, app: ASGIApp, limits: HttpLimitSettings) -> None:
+        self._app, self._limits = app, limits
+        self._n_running = 0
+        self._deadlines: set[asyncio.Timeout] = set()
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request, or refuse it above the limit."""
+        if self._n_running >= self._limits.max_requests:
+            await BUSY.send(scope, send)
+            return
+        asker = Asker()
+        before = ASKER.set(asker)
+        try:
+            is_answered = await self._answered(scope, receive, send)
+        finally:
+            asker.has_gone = True  # a thread may still be working
+            ASKER.reset(before)
+        if not is_answered:
+            await NO_ANSWER.send(scope, send)
+
+    def give_up(self) -> None:
+        """Stop requests whose answers have not started."""
+        for deadline in self._deadlines:
+            deadline.reschedule(0.0)
+
+    async def _answered(self, scope: Scope, receive: Receive, send: Send) -> bool:
+        has_begun = False
+
+        async def watched(message: Message) -> None:
+            nonlocal has_begun
+            if deadline.expired():
+                return  # sent while the application is cancelled
+            if not has_begun:
+                has_begun = True
+                self._n_running -= 1
+                self._deadlines.discard(deadline)
+                deadline.reschedule(None)
+            await send(message)
+
+        self._n_running += 1
+        try:
+            async with asyncio.timeout(self._limits.answer_s) as deadline:
+                self._deadlines.add(deadline)
+                await self._app(scope, receive, watched)
+        except TimeoutError:
+            if not deadline.expired():
+                raise
+            return False
+        finally:
+            self._deadlines.discard(deadline)
+            if not has_begun:
+                self._n_running -= 1
+        return True
+
+
+def guarded(answers: BoundedAnswers, limits: HttpLimitSettings, hosts: Iterable[str]) -> ASGIApp:
+    """Add the other middleware to an application with bounded answers.
+
+    Bodies are read before requests are counted, so that slow senders take no place.
+    """
+    bodies = WholeBodies(answers, limits)
+    return HeadRequests(SecurityHeaders(KnownHosts(bodies, hosts)))

@@ -1,0 +1,284 @@
+"""Requests refused while the service cannot keep up, so that samples and alarms come first."""
+
+import re
+from collections import Counter, deque
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+import structlog
+from prometheus_client.metrics_core import Metric
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from acquisition.clock import Clock
+from service.api.http.refusals import Refusal
+from service.measuring.acquirer import Bus
+from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.metrics import counter, gauge
+
+RELIEF_SHARE = 0.5
+"""Share of its limit below which the load must stay for `RELIEF_S` before requests are accepted."""
+
+RELIEF_S = 5.0
+
+
+class Refused(IntEnum):
+    """Refused requests; a higher level includes the lower ones."""
+
+    NOTHING = 0
+    HISTORY = 1
+    VIEWS = 2
+
+
+@dataclass(frozen=True)
+class LoadLimits:
+    """Limits above which requests for past values are refused; at twice these, live values too.
+
+    In between, continuous recording stops (`service.recordings.continuous.pressure`).
+
+    Parameters
+    ----------
+    delay_s
+        Waiting time of the oldest block.
+    waiting_share
+        Fill level of the queue to the analysis, 0 to 1.
+    lag_s
+        Lasting delay of the event loop.
+    """
+
+    delay_s: float = 2.0
+    waiting_share: float = 0.2
+    lag_s: float = 1.0
+
+
+@dataclass(frozen=True)
+class Load:
+    """Load of the service; fields as in `LoadLimits`."""
+
+    delay_s: float = 0.0
+    waiting_share: float = 0.0
+    lag_s: float = 0.0
+
+    def over(self, limits: LoadLimits) -> float:
+        """Return the largest ratio of a load to its limit."""
+        return max(
+            self.delay_s / limits.delay_s,
+            self.waiting_share / limits.waiting_share,
+            self.lag_s / limits.lag_s,
+        )
+
+
+@dataclass(frozen=True)
+class Strain:
+    """Level of refusal.
+
+    Parameters
+    ----------
+    relieved_s
+        Monotonic time since when a lower level suffices; None if it does not.
+    """
+
+    refused: Refused = Refused.NOTHING
+    relieved_s: float | None = None
+
+
+def advance(strain: Strain, over: float, now_s: float) -> Strain:
+    """Update the level of refusal: raise it at once, lower it after `RELIEF_S`."""
+    wanted = Refused(min(int(over), Refused.VIEWS))
+    if wanted >= strain.refused or over > RELIEF_SHARE * strain.refused:
+        return Strain(max(wanted, strain.refused))
+    if strain.relieved_s is None:
+        return replace(strain, relieved_s=now_s)
+    is_over = now_s - strain.relieved_s >= RELIEF_S
+    return Strain(Refused(strain.refused - 1)) if is_over else strain
+
+
+log = structlog.get_logger()
+
+LOOK_EVERY_S = 0.25
+
+N_LOOKS = 4
+"""Number of successive checks over the limit that make an overload."""
+
+
+WORDS = {
+    Refused.HISTORY: "questions about the past",
+    Refused.VIEWS: "questions about the past and views of now",
+}
+
+
+class LoadWatch:
+    """Watches the queue and the event loop, and counts refused requests.
+
+    Parameters
+    ----------
+    bus
+        Queue of blocks to the analysis.
+    """
+
+    def __init__(self, bus: Bus, limits: LoadLimits, clock: Clock) -> None:
+        self._bus, self._limits, self._clock = bus, limits, clock
+        self._lags = deque([0.0] * N_LOOKS, N_LOOKS)
+        self._overs = deque([0.0] * N_LOOKS, N_LOOKS)
+        self._strain = Strain()
+        self.n_refused: Counter[Refused] = Counter()
+
+    @property
+    def refused(self) -> Refused:
+        """Level of refusal now."""
+        return self._strain.refused
+
+    @property
+    def words(self) -> str | None:
+        """Refused requests in words; None if none are."""
+        return WORDS.get(self.refused)
+
+    @property
+    def lag_s(self) -> float:
+        """Smallest delay of the event loop within the last second."""
+        return min(self._lags)
+
+    async def run(self, pulse: Pulse = UNHEARD) -> None:
+        """Check periodically."""
+        while True:
+            pulse.beat(LOOK_EVERY_S)
+            due_s = self._clock.monotonic_s() + LOOK_EVERY_S
+            await self._clock.sleep(LOOK_EVERY_S)
+            self.look(self._clock.monotonic_s() - due_s)
+
+    def look(self, late_s: float) -> None:
+        """Check once.
+
+        Parameters
+        ----------
+        late_s
+            Delay of the event loop.
+        """
+        self._lags.append(max(0.0, late_s))
+        bus = self._bus
+        load = Load(bus.oldest_wait_s, bus.depth / bus.capacity, self.lag_s)
+        self._overs.append(load.over(self._limits))
+        before = self.refused
+        self._strain = advance(self._strain, min(self._overs), self._clock.monotonic_s())
+        if self.refused != before:
+            _log(self.refused, load)
+
+    def refuses(self, question: Refused) -> bool:
+        """Whether a request of this kind is refused now; count it if so."""
+        if question is Refused.NOTHING or question > self.refused:
+            return False
+        self.n_refused[question] += 1
+        return True
+
+
+def _log(refused: Refused, load: Load) -> None:
+    say = log.warning if refused else log.info
+    say(
+        "questions are refused" if refused else "questions are answered again",
+        refused=refused.name.lower(),
+        delay_s=round(load.delay_s, 2),
+        waiting_share=round(load.waiting_share, 2),
+        lag_s=round(load.lag_s, 2),
+    )
+
+
+VITAL = re.compile(
+    r"/(livez|readyz|metrics)"
+    r"|/api/v1/alarms(/[^/]+)?"  # the list, and one of it
+    r"|/api/v1/session"
+    r"|/(?!api/).*"  # the pages, which show the alarms
+)
+"""Paths that are never refused; neither are requests that change something."""
+
+VIEWS = re.compile(
+    r"/api/v1/overview"
+    r"|/api/v1/sources"
+    r"|/api/v1/units(/[^/]+(/channels)?)?"
+    r"|/api/v1/units/[^/]+/bearings(/[^/]+(/latest|/orbit|/budgets/[^/]+)?)?"
+)
+"""Paths of live values, answered from memory."""
+
+READING = ("GET", "HEAD")
+
+
+def question(method: str, path: str) -> Refused:
+    """Return the level of load that refuses a request; `Refused.NOTHING` for none."""
+    if method not in READING or (VITAL.fullmatch(path) and path != "/api/v1/alarms/rates"):
+        return Refused.NOTHING
+    return Refused.VIEWS if VIEWS.fullmatch(path) else Refused.HISTORY
+
+
+BEHIND = Refusal(
+    503,
+    "Too busy",
+    "the service is overloaded and analyses samples first; try again later",
+    retry_after_s=10,
+)
+
+
+class Shedding:
+    """ASGI middleware that refuses requests while the service cannot keep up."""
+
+    def __init__(self, app: ASGIApp, load: LoadWatch) -> None:
+        self._app, self._load = app, load
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Refuse a request or forward it."""
+        if scope["type"] == "http" and self._load.refuses(question(scope["method"], scope["path"])):
+            await BEHIND.send(scope, send)
+            return
+        await self._app(scope, receive, send)
+
+
+KINDS = (Refused.HISTORY, Refused.VIEWS)
+
+
+def load_metrics(load: LoadWatch | None) -> Iterator[Metric]:
+    """Yield metrics of refused requests; none without a load watch."""
+    if load is None:
+        return
+    yield counter(
+        "questions_refused",
+        "Questions answered by 503 because the service was behind.",
+        ("about",),
+        [((kind.name.lower(),), load.n_refused[kind]) for kind in KINDS],
+    )
+    yield gauge(
+        "refusing",
+        "1 while such questions are refused.",
+        ("about",),
+        [((kind.name.lower(),), load.refused >= kind) for kind in KINDS],
+    )
+    yield gauge(
+        "event_loop_lag_seconds",
+        "By how much the program has been late at every look within the last second.",
+        (),
+        [((), load.lag_s)],
+    )
+
+
+class Allowance:
+    """Token bucket.
+
+    Parameters
+    ----------
+    n_at_once
+        Size of the bucket.
+    seconds_each
+        Time in which one token is added, s.
+    now_s
+        Monotonic time, s.
+    """
+
+    def __init__(self, n_at_once: int, seconds_each: float, now_s: float) -> None:
+        self._n_at_once, self._seconds_each = float(n_at_once), seconds_each
+        self._n_free, self._seen_s = self._n_at_once, now_s
+
+    def take(self, now_s: float) -> bool:
+        """Take a token; return whether there was one."""
+        self._n_free += (now_s - self._seen_s) / self._seconds_each
+        self._n_free, self._seen_s = min(self._n_free, self._n_at_once), now_s
+        if self._n_free < 1.0:
+            return False
+        self._n_free -= 1.0
+        return True

@@ -1,0 +1,427 @@
+"""Models of alarms and of their events."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState, Hold
+from core.alarms.kinds import FILM_KINDS
+from core.condition.cells import CellGrid, OperatingPoint
+from core.limits import AlarmLevel, Judgement
+from service.api.context import FilmBoard
+from service.api.values import (
+    STATE_NAMES,
+    ApiModel,
+    CellModel,
+    FilmConditionModel,
+    OperatingStateName,
+    Time,
+    cell_of,
+    condition_model,
+)
+from service.live.alarm_board import AlarmBoard
+from service.runtime.times import rfc3339
+from service.settings.alarm_kinds import AlarmKindName, value_unit
+from service.settings.storage import Origin
+from service.store.port import StoredEvent
+
+AlarmLevelName = Literal["alert", "danger"]
+
+AlarmStateName = Literal[
+    "normal",
+    "unacknowledged",
+    "acknowledged",
+    "returned_unacknowledged",
+    "shelved",
+    "suppressed",
+    "out_of_service",
+]
+
+AlarmChangeName = Literal[
+    "raised",
+    "escalated",
+    "eased",
+    "returned",
+    "latched",
+    "reset",
+    "acknowledged",
+    "shelved",
+    "unshelved",
+    "suppressed",
+    "unsuppressed",
+    "taken_out_of_service",
+    "returned_to_service",
+    "commented",
+    "condition_unknown",
+    "condition_known",
+]
+
+
+ConditionName = Literal["active", "within_limits", "unknown"]
+
+OriginName = Literal["live", "replay"]
+
+AlarmIdText = Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
+
+
+class HoldModel(ApiModel):
+    """A shelving or an outage of an alarm."""
+
+    actor: str
+    """Person who did it."""
+
+    reason: str
+    """Reason."""
+
+    since: Time
+    """Start."""
+
+    until: Time | None
+    """End; null if it has none."""
+
+
+class RaisedAtModel(ApiModel):
+    """Operating condition under which an occurrence of an alarm was raised."""
+
+    operating_state: OperatingStateName
+    """Operating state of the unit."""
+
+    eccentricity_ratio: Annotated[float | None, Field(examples=[0.37])]
+    """Eccentricity over clearance; null if unknown, and for alarms about no bearing."""
+
+    attitude_deg: Annotated[float | None, Field(examples=[47.0])]
+    """Attitude angle, degrees; null if unknown."""
+
+    oil_temperature_c: Annotated[float | None, Field(examples=[46.2])]
+    """Oil temperature, °C; null if unknown."""
+
+    cell: CellModel | None
+    """Condition cell of these values; null if one of them is unknown."""
+
+
+class AlarmModel(ApiModel):
+    """One alarm now."""
+
+    id: AlarmIdText
+    """Stable identifier: unit, subject and kind."""
+
+    unit: str
+    """Unit; "plant" for alarms about the service itself."""
+
+    subject: str
+    """Channel or bearing; "device" or "link" for the whole unit; for "plant", a part of the service
+    or the unit whose samples were lost."""
+
+    kind: AlarmKindName
+    """Kind of alarm."""
+
+    state: AlarmStateName
+    """State in the life cycle of ISA-18.2."""
+
+    level: AlarmLevelName | None
+    """Priority; null if the alarm is not active."""
+
+    is_active: bool
+    """Whether it is active, also while hidden."""
+
+    is_acknowledged: bool
+    """Whether the newest occurrence is acknowledged."""
+
+    is_latched: bool
+    """Whether only the latch keeps it active: the condition has cleared and a reset is due."""
+
+    is_chattering: bool
+    """Whether it was raised too often in a short time, within the last ten minutes."""
+
+    occurrence: int
+    """Number of times it was raised or rose in level; acknowledgements refer to it."""
+
+    raised: Time | None
+    """Start of the newest occurrence."""
+
+    raised_at: RaisedAtModel | None
+    """Operating condition at that time; null if unknown, or if the alarm was never raised."""
+
+    condition: ConditionName
+    """Present condition; "unknown" without good data, which is never a return to normal: an
+    active alarm stays active."""
+
+    condition_reason: str
+    """Reason; "ok" if all is well."""
+
+    value: Annotated[float | None, Field(examples=[163.2])]
+    """Value compared with the limit; while the condition is unknown, the last known value."""
+
+    limit: Annotated[float | None, Field(examples=[150.0])]
+    """Limit; null if there is none."""
+
+    value_unit: Annotated[str | None, Field(examples=["µm 0-pk"])]
+    """Unit of value and limit."""
+
+    film: FilmConditionModel | None
+    """For kinds of film stiffness, the condition of the newest reading: operating state and cell;
+    null for all others, and before the first reading."""
+
+    suppressed_by: str | None
+    """Why it is suppressed by design; null if it is not."""
+
+    shelf: HoldModel | None
+    """Shelving; null if it is not shelved."""
+
+    outage: HoldModel | None
+    """Outage; null if it is in service."""
+
+
+class AlarmCountModel(ApiModel):
+    """Numbers of alarms."""
+
+    n_active: int
+    """Active and not hidden."""
+
+    n_danger: int
+    """Active alarms at level danger."""
+
+    n_unacknowledged: int
+    """Not hidden, newest occurrence not acknowledged."""
+
+    n_hidden: int
+    """Shelved, suppressed or out of service."""
+
+    n_unjudged: int
+    """Not active, condition unknown."""
+
+
+class AlarmListModel(ApiModel):
+    """Alarms that are not normal, and alarms whose condition is unknown."""
+
+    time: Time
+    """Present time."""
+
+    origin: OriginName
+    """Whether this is live or a replay."""
+
+    count: AlarmCountModel
+    """Numbers of alarms."""
+
+    alarms: list[AlarmModel]
+    """Not normal; unacknowledged first, danger before alert, the newest first."""
+
+    unjudged: list[AlarmModel]
+    """Normal when last judged, condition unknown now."""
+
+
+class AlarmEventModel(ApiModel):
+    """An event of an alarm."""
+
+    id: int
+    """Number in the store; later events have higher numbers."""
+
+    alarm: AlarmIdText
+    """Alarm."""
+
+    unit: str
+    """Unit."""
+
+    subject: str
+    """Channel or bearing."""
+
+    kind: AlarmKindName
+    """Kind of alarm."""
+
+    number: int
+    """Number among the alarm's events, from 1 without gaps."""
+
+    change: AlarmChangeName
+    """Kind of change."""
+
+    level: AlarmLevelName | None
+    """Level after the event; for a return to normal, the level before it."""
+
+    state_before: AlarmStateName
+    """State before it."""
+
+    state_after: AlarmStateName
+    """State after it."""
+
+    time: Time
+    """Time, by the samples where they decided; else by the host's clock."""
+
+    occurrence: int
+    """Occurrence that the event belongs to."""
+
+    value: float | None
+    """Value compared with the limit."""
+
+    limit: float | None
+    """Limit; null if there is none."""
+
+    value_unit: str | None
+    """Unit of value and limit."""
+
+    actor: str
+    """Person who did it; empty if the change was automatic."""
+
+    reason: str
+    """Reason."""
+
+    raised_at: RaisedAtModel | None
+    """Operating condition when the occurrence was raised; null if unknown."""
+
+
+class AlarmEventsModel(ApiModel):
+    """A page of alarm events."""
+
+    origin: OriginName
+    """Whether this is live or a replay."""
+
+    events: list[AlarmEventModel]
+    """Newest first."""
+
+    next_before: int | None
+    """Value of ``before`` for the next page; null on the last page."""
+
+
+def alarm_list_model(
+    engine: AlarmBoard, films: FilmBoard, origin: Origin, now_ns: int
+) -> AlarmListModel:
+    """Return the alarm list."""
+    alarms = engine.alarms
+    listed = [alarm for alarm in alarms if alarm.state is not AlarmState.NORMAL]
+    unjudged = [a for a in alarms if a.state is AlarmState.NORMAL and not engine.is_judged(a)]
+    return AlarmListModel(
+        time=rfc3339(now_ns),
+        origin=origin.value,
+        count=alarm_count_model(engine),
+        alarms=[alarm_model(engine, films, alarm) for alarm in sorted(listed, key=_urgency)],
+        unjudged=[alarm_model(engine, films, alarm) for alarm in unjudged],
+    )
+
+
+def alarm_count_model(engine: AlarmBoard) -> AlarmCountModel:
+    """Numbers of alarms."""
+    return AlarmCountModel(**vars(engine.count()))
+
+
+def alarm_model(engine: AlarmBoard, films: FilmBoard, alarm: Alarm) -> AlarmModel:
+    """Return the model of an alarm."""
+    identity, condition = alarm.identity, alarm.condition
+    is_judged = engine.is_judged(alarm)
+    unseen = "not_connected" if condition.is_known else str(condition.reason)
+    return AlarmModel(
+        id=identity.id,
+        unit=identity.unit,
+        subject=identity.subject,
+        kind=identity.kind,
+        state=alarm.state.value,
+        level=_level(alarm.level),
+        is_active=alarm.level is not None,
+        is_acknowledged=alarm.is_acknowledged,
+        is_latched=alarm.is_latched,
+        is_chattering=engine.is_chattering(alarm),
+        occurrence=alarm.occurrence,
+        raised=None if alarm.raised_ns is None else rfc3339(alarm.raised_ns),
+        raised_at=_raised_at(alarm.raised_at, grid_of(films)),
+        condition=_condition(condition) if is_judged else "unknown",
+        condition_reason=str(condition.reason) if is_judged else unseen,
+        value=condition.value,
+        limit=condition.limit,
+        value_unit=value_unit(identity.kind),
+        film=_film(films, identity),
+        suppressed_by=alarm.suppressed_by,
+        shelf=_hold(alarm.shelf),
+        outage=_hold(alarm.outage),
+    )
+
+
+def _film(films: FilmBoard, identity: AlarmIdentity) -> FilmConditionModel | None:
+    """Condition of the newest reading of a film, if the alarm is about one."""
+    if identity.kind not in FILM_KINDS:
+        return None
+    news, rules = films.newest(identity.unit, identity.subject), films.rules(identity.unit)
+    if news is None or rules is None:
+        return None
+    return condition_model(news.reading.time_ns, news.reading.condition, rules.grid)
+
+
+def alarm_events_model(
+    events: list[StoredEvent], origin: Origin, grid: CellGrid, *, there_is_more: bool
+) -> AlarmEventsModel:
+    """Return a page of alarm events."""
+    return AlarmEventsModel(
+        origin=origin.value,
+        events=[event_model(stored, grid) for stored in events],
+        next_before=events[-1].id if there_is_more else None,
+    )
+
+
+def grid_of(films: FilmBoard) -> CellGrid:
+    """Condition cells of all units."""
+    return films.settings.baseline.settings().grid
+
+
+def event_model(stored: StoredEvent, grid: CellGrid) -> AlarmEventModel:
+    """Return the model of an alarm event."""
+    event, identity = stored.event, stored.event.identity
+    return AlarmEventModel(
+        id=stored.id,
+        alarm=identity.id,
+        unit=identity.unit,
+        subject=identity.subject,
+        kind=identity.kind,
+        number=event.number,
+        change=event.change.value,
+        level=_level(event.level),
+        state_before=event.state_before.value,
+        state_after=event.state_after.value,
+        time=rfc3339(event.time_ns),
+        occurrence=event.occurrence,
+        value=event.value,
+        limit=event.limit,
+        value_unit=value_unit(identity.kind),
+        actor=event.actor,
+        reason=str(event.reason),
+        raised_at=_raised_at(event.raised_at, grid),
+    )
+
+
+def _raised_at(point: OperatingPoint | None, grid: CellGrid) -> RaisedAtModel | None:
+    if point is None:
+        return None
+    return RaisedAtModel(
+        operating_state=STATE_NAMES[point.state],
+        eccentricity_ratio=point.eccentricity_ratio,
+        attitude_deg=point.attitude_deg,
+        oil_temperature_c=point.oil_temperature_c,
+        cell=cell_of(point, grid),
+    )
+
+
+def _condition(condition: Judgement) -> ConditionName:
+    return "within_limits" if condition.level is None else "active"
+
+
+def _level(level: AlarmLevel | None) -> AlarmLevelName | None:
+    return None if level is None else LEVEL_NAMES[level]
+
+
+def _hold(hold: Hold | None) -> HoldModel | None:
+    if hold is None:
+        return None
+    return HoldModel(
+        actor=hold.actor,
+        reason=hold.reason,
+        since=rfc3339(hold.since_ns),
+        until=None if hold.until_ns is None else rfc3339(hold.until_ns),
+    )
+
+
+def _urgency(alarm: Alarm) -> tuple[bool, bool, int, int]:
+    """Sort key: hidden alarms last; unacknowledged, dangerous and newest alarms first."""
+    shown = alarm.shelf is None and alarm.outage is None and alarm.suppressed_by is None
+    return (not shown, alarm.is_acknowledged, -(alarm.level or 0), -(alarm.raised_ns or 0))
+
+
+LEVEL_NAMES: dict[AlarmLevel, AlarmLevelName] = {
+    AlarmLevel.ALERT: "alert",
+    AlarmLevel.DANGER: "danger",
+}

@@ -1,0 +1,363 @@
+"""Baselines of a bearing, and the requests by which engineers change them."""
+
+import asyncio
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import numpy as np
+from fastapi import APIRouter, Path, Response
+
+from core.baseline.baseline import BearingBaseline, QuantityBaseline
+from core.baseline.cell_table import CellStatistics
+from core.baseline.history import Watched
+from core.condition.cells import CellGrid
+from core.machine.unit import Estimator
+from service.api.answers import rendered, worked
+from service.api.auth.declared import needs
+from service.api.auth.gate import actor_or
+from service.api.context import BearingId, Context, UnitId
+from service.api.parameters import ns_from_datetime
+from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.routes.baseline_models import (
+    BaselineActionModel,
+    BaselineCellsModel,
+    BaselineDirectionModel,
+    BaselineModel,
+    BaselinesModel,
+    BaselineStatusName,
+    BaselineStepModel,
+    BaselineVersionModel,
+    LearningModel,
+    ReadingCountsModel,
+    RenewModel,
+    TimeScatterModel,
+)
+from service.api.routes.films import watched_place
+from service.api.values import EstimatorName, bounds
+from service.live.commands import (
+    Accept,
+    BaselineAction,
+    BaselineRefusedError,
+    Freeze,
+    Reject,
+    Renew,
+    Thaw,
+)
+from service.live.learning_progress import RECENT_DAYS, LearningProgress, learning_progress
+from service.runtime.times import rfc3339
+from service.store.access.identities import Permission
+from service.store.baselines import Versions, versions_after
+from service.store.documents import BASELINE, FORMAT_VERSION, to_json
+from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
+
+
+def version_model(
+    entry: BaselineEntry, versions: Versions, steps: list[StoredStep]
+) -> BaselineVersionModel:
+    """Return the model of a baseline after all steps."""
+    own = [step for step in steps if step.version == entry.version]
+    return BaselineVersionModel(
+        version=entry.version,
+        estimator=entry.estimator.value,
+        status=_status(entry, versions, own),
+        author=entry.author,
+        created=rfc3339(entry.created_ns),
+        learned_from=rfc3339(entry.learned_from_ns),
+        learned_until=rfc3339(entry.learned_until_ns),
+        event=entry.event,
+        remark=_remark(entry, own),
+        is_frozen=versions.is_frozen and entry.version == versions.in_force,
+    )
+
+
+def _status(entry: BaselineEntry, versions: Versions, own: list[StoredStep]) -> BaselineStatusName:
+    if entry.version == versions.in_force:
+        return "in_force"
+    if entry.version in versions.rejected:
+        return "rejected"
+    was_accepted = any(step.step is BaselineStep.ACCEPTED for step in own)
+    is_before = versions.renewed_ns is not None and entry.learned_from_ns < versions.renewed_ns
+    return "superseded" if was_accepted or is_before else "learned"
+
+
+def _remark(entry: BaselineEntry, own: list[StoredStep]) -> str:
+    """Return the reason of the learning step if it differs from the event."""
+    reasons = [step.reason for step in own if step.step is BaselineStep.LEARNED]
+    return next((words for words in reasons if words != entry.event), "")
+
+
+def step_model(step: StoredStep) -> BaselineStepModel:
+    """Return the model of a step."""
+    return BaselineStepModel(
+        step=step.step.value,
+        version=step.version,
+        time=rfc3339(step.time_ns),
+        actor=step.actor,
+        reason=step.reason,
+        event_time=None if step.from_ns is None else rfc3339(step.from_ns),
+    )
+
+
+def learning_model(progress: LearningProgress, n_days_wanted: int) -> LearningModel:
+    """Return the progress of learning."""
+    since_ns, until_ns = progress.since_ns, progress.until_ns
+    return LearningModel(
+        since=None if since_ns is None else rfc3339(since_ns),
+        until=None if until_ns is None else rfc3339(until_ns),
+        is_over=progress.is_over,
+        n_readings=progress.n_readings,
+        n_days=progress.n_days,
+        n_days_wanted=n_days_wanted,
+        recent=ReadingCountsModel(days=RECENT_DAYS, **asdict(progress.recent)),
+    )
+
+
+def baseline_model(baseline: BearingBaseline, about: BaselineVersionModel) -> BaselineModel:
+    """Return the model of a baseline with its cells."""
+    x, y = (baseline.of(Watched.STIFFNESS, direction) for direction in ("x", "y"))
+    grid = next((found.grid for found in (x, y) if found), None)
+    return BaselineModel(
+        unit=baseline.origin.unit,
+        bearing=baseline.origin.bearing,
+        about=about,
+        eccentricity_width=grid.eccentricity_width if grid else None,
+        oil_temperature_width_c=grid.temperature_width_c if grid else None,
+        x=_direction(x) if x else None,
+        y=_direction(y) if y else None,
+    )
+
+
+def _direction(learned: QuantityBaseline) -> BaselineDirectionModel:
+    return BaselineDirectionModel(
+        cells=_cells(list(learned.table.cells), learned.grid),
+        scatter_percent=100.0 * learned.scatter,
+        u_random_percent=100.0 * learned.u_random,
+        rejected_share=learned.rejected_share,
+        time_scatter=[
+            TimeScatterModel(time_scale_h=time.time_scale_h, share=time.share)
+            for time in learned.time_scatter
+        ],
+    )
+
+
+def _cells(cells: list[CellStatistics], grid: CellGrid) -> BaselineCellsModel:
+    low_e, high_e = _bounds(cells, 0, grid.eccentricity_width)
+    low_c, high_c = _bounds(cells, 1, grid.temperature_width_c)
+    attitude = (
+        None if grid.attitude_width_deg is None else _bounds(cells, 2, grid.attitude_width_deg)
+    )
+    return BaselineCellsModel(
+        eccentricity_low=low_e,
+        eccentricity_high=high_e,
+        oil_temperature_low_c=low_c,
+        oil_temperature_high_c=high_c,
+        attitude_low_deg=attitude[0] if attitude else None,
+        attitude_high_deg=attitude[1] if attitude else None,
+        eccentricity_ratio=[cell.eccentricity_ratio for cell in cells],
+        oil_temperature_c=[cell.oil_temperature_c for cell in cells],
+        n_readings=[cell.n_readings for cell in cells],
+        n_days=[cell.n_days for cell in cells],
+        stiffness_n_per_m=np.exp([cell.location for cell in cells]).tolist(),
+        scatter_percent=[100.0 * cell.scatter for cell in cells],
+        surface_std_percent=[100.0 * cell.surface_std for cell in cells],
+        support=[cell.support.value for cell in cells],
+    )
+
+
+def _bounds(
+    cells: list[CellStatistics], axis: int, width: float
+) -> tuple[list[float], list[float]]:
+    found = [bounds(cell.cell[axis], width) for cell in cells]
+    return [low for low, _ in found], [high for _, high in found]
+
+
+def estimator_name(estimator: Estimator | None) -> EstimatorName | None:
+    """Return the name of an estimator."""
+    return None if estimator is None else estimator.value
+
+
+Version = Annotated[int, Path(ge=1, le=10**15, description="Version of a baseline.", examples=[3])]
+
+READING_PROBLEMS = problem_responses(404, 422, 503)
+
+ACTION_PROBLEMS = described_problems(
+    {
+        403: "Not allowed, or asked for by a page of another site",
+        404: "Unknown unit, bearing or version",
+        409: "Does not fit the baselines as they are now, or the film is not watched",
+        422: "A wrong parameter",
+        503: "Not done: the store cannot be written",
+    }
+)
+
+EXPORTED: dict[int | str, dict[str, Any]] = {
+    200: {
+        "description": "The baseline as a document.",
+        "content": {
+            "application/json": {
+                "schema": {"type": "object"},
+                "example": {"format": BASELINE, "format_version": FORMAT_VERSION, "content": {}},
+            }
+        },
+    }
+}
+
+
+def baseline_router(context: Context) -> APIRouter:
+    """Return the routes that show baselines."""
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings/{bearing}/baselines",
+        tags=["baselines"],
+        dependencies=[needs(Permission.READ)],
+    )
+
+    @router.get(
+        "",
+        summary="Baselines of a bearing",
+        response_model=BaselinesModel,
+        responses=problem_responses(404, 503),
+    )
+    async def baselines(unit: UnitId, bearing: BearingId) -> Response:
+        """List versions, the version in force, steps, and the progress of learning."""
+        context.bearing(unit, bearing)
+        return await rendered(lambda: _baselines(context, unit, bearing))
+
+    @router.get(
+        "/{version}",
+        summary="One baseline",
+        response_model=BaselineModel,
+        responses=READING_PROBLEMS,
+    )
+    async def one_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
+        """Show the cells by column: bounds, stiffness, scatter, and whether readings are judged."""
+        context.bearing(unit, bearing)
+        return await rendered(lambda: _baseline(context, unit, bearing, version))
+
+    @router.get(
+        "/{version}/export",
+        summary="A baseline as a document",
+        responses={**READING_PROBLEMS, **EXPORTED},
+        response_class=Response,
+    )
+    async def export(unit: UnitId, bearing: BearingId, version: Version) -> Response:
+        """Export the whole baseline with its surface as a file that padwatch reads back exactly."""
+        context.bearing(unit, bearing)
+        found = await worked(lambda: to_json(_stored(context, unit, bearing, version)))
+        name = f"{unit}-{bearing}-baseline-{version}.json"
+        headers = {"Content-Disposition": f'attachment; filename="{name}"'}
+        return Response(found, headers=headers, media_type="application/json")
+
+    return router
+
+
+def baseline_action_router(context: Context) -> APIRouter:
+    """Return the routes that change baselines; each answers with the stored baselines."""
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings/{bearing}/baselines",
+        tags=["baselines"],
+        dependencies=[needs(Permission.CHANGE_MEASURING)],
+    )
+
+    @router.post("/{version}/accept", summary="Accept a baseline", responses=ACTION_PROBLEMS)
+    async def accept(
+        unit: UnitId, bearing: BearingId, version: Version, asked: BaselineActionModel
+    ) -> BaselinesModel:
+        """Put this version in force from the next reading on."""
+        await asyncio.to_thread(_require_version, context, unit, bearing, version)
+        return await _done(context, unit, bearing, Accept(version), asked)
+
+    @router.post("/{version}/reject", summary="Reject a baseline", responses=ACTION_PROBLEMS)
+    async def reject(
+        unit: UnitId, bearing: BearingId, version: Version, asked: BaselineActionModel
+    ) -> BaselinesModel:
+        """Reject this version; if it is in force, none is until another is accepted."""
+        await asyncio.to_thread(_require_version, context, unit, bearing, version)
+        return await _done(context, unit, bearing, Reject(version), asked)
+
+    @router.post("/freeze", summary="Learn no further", responses=ACTION_PROBLEMS)
+    async def freeze(
+        unit: UnitId, bearing: BearingId, asked: BaselineActionModel
+    ) -> BaselinesModel:
+        """Keep the version in force; learning stops until it is thawed."""
+        return await _done(context, unit, bearing, Freeze(), asked)
+
+    @router.post("/thaw", summary="Learn again", responses=ACTION_PROBLEMS)
+    async def thaw(unit: UnitId, bearing: BearingId, asked: BaselineActionModel) -> BaselinesModel:
+        """End a freeze; learning continues in its learning period."""
+        return await _done(context, unit, bearing, Thaw(), asked)
+
+    @router.post("/renew", summary="Begin again", responses=ACTION_PROBLEMS)
+    async def renew(unit: UnitId, bearing: BearingId, asked: RenewModel) -> BaselinesModel:
+        """Start a new baseline after a machine event, such as an overhaul.
+
+        No baseline is in force until enough readings after the event are learned.
+        """
+        from_ns = ns_from_datetime(asked.event_time, "event_time")
+        if from_ns < 0:
+            detail = f"event_time {rfc3339(from_ns)} lies before 1970"
+            raise ProblemError(422, "Wrong parameter", detail, "event_time")
+        return await _done(context, unit, bearing, Renew(from_ns), asked)
+
+    return router
+
+
+async def _done(
+    context: Context, unit: str, bearing: str, action: BaselineAction, asked: BaselineActionModel
+) -> BaselinesModel:
+    """Carry out an action; answer when it is stored."""
+    place = watched_place(context, unit, bearing)
+    try:
+        await context.operators.act(place, action, actor_or(asked.actor), asked.reason)
+    except BaselineRefusedError as error:
+        raise ProblemError(409, "Does not fit", f"{unit} {bearing}: {error}") from error
+    return await asyncio.to_thread(_baselines, context, unit, bearing)
+
+
+def _baselines(context: Context, unit: str, bearing: str) -> BaselinesModel:
+    store, settings = context.store.films, context.films.settings
+    entries, steps = list(store.baselines(unit, bearing)), list(store.steps(unit, bearing))
+    versions, place = versions_after(steps), context.films.place(unit, bearing)
+    progress = (
+        learning_progress(store, place, versions, entries, settings, context.clock.now_ns())
+        if place
+        else None
+    )
+    renewed_ns, n_days = versions.renewed_ns, settings.baseline.min_learning_days
+    return BaselinesModel(
+        unit=unit,
+        bearing=bearing,
+        estimator=estimator_name(place.estimator if place else None),
+        in_force=versions.in_force,
+        is_frozen=versions.is_frozen,
+        renewed=None if renewed_ns is None else rfc3339(renewed_ns),
+        acceptance=settings.acceptance,
+        learning=learning_model(progress, n_days) if progress else None,
+        versions=[version_model(entry, versions, steps) for entry in entries],
+        steps=[step_model(step) for step in reversed(steps)],
+    )
+
+
+def _baseline(context: Context, unit: str, bearing: str, version: int) -> BaselineModel:
+    found, store = _stored(context, unit, bearing, version), context.store.films
+    steps = list(store.steps(unit, bearing))
+    [entry] = [one for one in store.baselines(unit, bearing) if one.version == version]
+    return baseline_model(found, version_model(entry, versions_after(steps), steps))
+
+
+def _stored(context: Context, unit: str, bearing: str, version: int) -> BearingBaseline:
+    found = context.store.films.baseline(unit, bearing, version)
+    if found is None:
+        raise _unknown_version(unit, bearing, version)
+    return found
+
+
+def _require_version(context: Context, unit: str, bearing: str, version: int) -> None:
+    context.bearing(unit, bearing)
+    entries = context.store.films.baselines(unit, bearing)
+    if version not in [entry.version for entry in entries]:
+        raise _unknown_version(unit, bearing, version)
+
+
+def _unknown_version(unit: str, bearing: str, version: int) -> ProblemError:
+    detail = f"unit {unit!r} bearing {bearing!r} has no baseline {version}"
+    return ProblemError(404, "Unknown baseline", detail)

@@ -1,0 +1,355 @@
+"""One bearing: its configuration, its newest result, its uncertainty budgets."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Response
+from pydantic import Field
+
+from core.machine.unit import Bearing
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import BY_NAME
+from core.stiffness.estimators import ESTIMATORS
+from core.uncertainty import Budget
+from service.api.answers import rendered
+from service.api.auth.declared import needs
+from service.api.context import BearingId, Context, LiveLook, QuantityName, UnitId
+from service.api.problems import ProblemError, problem_responses
+from service.api.values import (
+    ApiModel,
+    EstimatorName,
+    QualityModel,
+    ReadingModel,
+    RunoutName,
+    SpeedSourceName,
+    Time,
+    UncertaintyModel,
+    WindowModel,
+    quality_model,
+    reading_model,
+    window_model,
+)
+from service.live.live_view import CurrentBearing
+from service.runtime.times import rfc3339
+from service.store.access.identities import Permission
+from service.store.gap_reference import GapReference
+
+MicrometrePair = Annotated[
+    list[float], Field(min_length=2, max_length=2, examples=[[1998.5, 2003.1]])
+]
+SetTime = Annotated[Time, Field(description="Time when it was set.")]
+Author = Annotated[str, Field(description="Person who set it.", examples=["A. Name"])]
+Note = Annotated[str, Field(description="Note of the author.", examples=["after the overhaul"])]
+
+
+class ReferenceModel(ApiModel):
+    """Origin of the reference in force."""
+
+    source: Literal["plant_file", "given", "measured"]
+    """Plant file, values given by hand, or mean gaps measured when it was set."""
+
+    set: SetTime | None
+    """Time when it was set; null for the plant file."""
+
+    author: Author | None
+    """Person who set it; null for the plant file."""
+
+    note: Note | None
+    """Note of the author, if any."""
+
+
+class BearingModel(ApiModel):
+    """A bearing as configured, with the reference in force."""
+
+    unit: str
+    """Identifier of the unit."""
+
+    id: str
+    """Identifier of the bearing."""
+
+    bracket_stiffness_n_per_m: float
+    """Radial stiffness of the bracket."""
+
+    clearance_um: float
+    """Radial clearance in operation."""
+
+    gap_reference_um: MicrometrePair
+    """Probe gaps [x, y] with the shaft centred, as in force."""
+
+    opposite_reference_um: MicrometrePair | None
+    """Gaps of the probes across the shaft; null without such probes."""
+
+    reference: ReferenceModel
+    """Origin of these gaps."""
+
+    channels: dict[str, str]
+    """Channel ids of shaft_x, shaft_y, bearing_x and bearing_y."""
+
+
+class LatestModel(ApiModel):
+    """A bearing now. Readings that are not current are null with the reason."""
+
+    unit: str
+    """Identifier of the unit."""
+
+    bearing: str
+    """Identifier of the bearing."""
+
+    time: Time | None
+    """End of the samples of the newest result, also if it is not current."""
+
+    age_s: float | None
+    """Age of that result, s."""
+
+    quality: QualityModel
+    """Worst quality of the 1× amplitudes and the preferred stiffness."""
+
+    speed_source: SpeedSourceName | None
+    """Source of the running speed."""
+
+    runout: Annotated[
+        dict[str, RunoutName | None],
+        Field(examples=[{"shaft_x": "applied", "shaft_y": "no_vector"}]),
+    ]
+    """Runout compensation of 1× of the newest segment, by "shaft_x" and "shaft_y": "applied", or
+    why not: "no_vector" (none in the plant file), "other_probe" (measured with another probe than
+    the present one), "not_slow_roll" (read above a quarter of the rated speed),
+    "no_phase_reference" (no key-phase, or its pulses are missing, doubled, irregular or
+    contradicted). Null if nothing is current."""
+
+    clipped_share: Annotated[
+        dict[str, float], Field(examples=[{"shaft_x": 0.0, "bearing_x": 0.0002}])
+    ]
+    """Share of samples of the newest segment at an end of the converter's range, by
+    "shaft_x" to "bearing_y"; empty without waveforms, or if nothing is current."""
+
+    window: WindowModel | None
+    """Samples of the newest result."""
+
+    estimators: dict[str, EstimatorName | None]
+    """Estimator of `stiffness` by axes "xx" and "yy"; null if there is none."""
+
+    readings: dict[str, ReadingModel]
+    """All quantities of the catalogue, by name."""
+
+
+class BudgetLineModel(ApiModel):
+    """One contribution to the uncertainty of a result."""
+
+    name: Annotated[str, Field(examples=["bracket stiffness"])]
+    """What contributes."""
+
+    kind: Literal["random", "systematic"]
+    """Whether it differs from one result to the next, or stays."""
+
+    distribution: Literal["normal", "uniform"]
+    """What is known about it besides its width."""
+
+    width: float
+    """Standard uncertainty if normal, half-width if uniform, in the unit of what contributes."""
+
+    sensitivity: float
+    """Change of the result per unit of what contributes."""
+
+    contribution: float
+    """Standard uncertainty of the result by this alone."""
+
+
+class BudgetModel(ApiModel):
+    """Uncertainty budget of one result (JCGM 100:2008, "GUM")."""
+
+    quantity: Annotated[str, Field(examples=["dynamic_k_xx_n_per_m"])]
+    """Name from the catalogue."""
+
+    unit: Annotated[str, Field(examples=["N/m"])]
+    """Unit of the value and of the uncertainties."""
+
+    time: Time
+    """End of the samples."""
+
+    value: float
+    """Result."""
+
+    uncertainty: UncertaintyModel
+    """Combined uncertainty."""
+
+    lines: list[BudgetLineModel]
+    """Contributions, largest first."""
+
+
+def bearing_model(unit: str, bearing: Bearing, reference: GapReference | None) -> BearingModel:
+    """Return the model of a bearing.
+
+    Parameters
+    ----------
+    reference
+        Stored reference, if one is in force.
+    """
+    opposite = bearing.opposite_reference_um
+    return BearingModel(
+        unit=unit,
+        id=bearing.id,
+        bracket_stiffness_n_per_m=bearing.bracket_stiffness_n_per_m,
+        clearance_um=bearing.clearance_um,
+        gap_reference_um=list(bearing.gap_reference_um),
+        opposite_reference_um=None if opposite is None else list(opposite),
+        reference=reference_model(reference),
+        channels={
+            "shaft_x": bearing.shaft_x,
+            "shaft_y": bearing.shaft_y,
+            "bearing_x": bearing.bearing_x,
+            "bearing_y": bearing.bearing_y,
+        },
+    )
+
+
+def reference_model(reference: GapReference | None) -> ReferenceModel:
+    """Return the origin of a reference; None stands for the plant file."""
+    if reference is None:
+        return ReferenceModel(source="plant_file", set=None, author=None, note=None)
+    return ReferenceModel(
+        source=reference.source.value,
+        set=rfc3339(reference.set_ns),
+        author=reference.author,
+        note=reference.note or None,
+    )
+
+
+def budget_model(name: str, time_ns: int, budget: Budget) -> BudgetModel:
+    """Return the model of a budget, largest contribution first."""
+    low, high = budget.interval
+    ordered = sorted(budget.lines, key=lambda line: line.contribution, reverse=True)
+    return BudgetModel(
+        quantity=name,
+        unit=BY_NAME[name].unit,
+        time=rfc3339(time_ns),
+        value=budget.value,
+        uncertainty=UncertaintyModel(
+            random=budget.random, systematic=budget.systematic, low_95=low, high_95=high
+        ),
+        lines=[
+            BudgetLineModel(
+                name=line.name,
+                kind=line.kind.value,
+                distribution=line.distribution.value,
+                width=line.width,
+                sensitivity=line.sensitivity,
+                contribution=line.contribution,
+            )
+            for line in ordered
+        ],
+    )
+
+
+def latest_model(live: LiveLook, unit: str, bearing: str) -> LatestModel:
+    """Return the newest result of a bearing; values that are not current are null."""
+    current = live.current(unit, bearing)
+    newest = current.assessment
+    return LatestModel(
+        unit=unit,
+        bearing=bearing,
+        time=rfc3339(newest.time_ns) if newest else None,
+        age_s=current.age_s,
+        quality=quality_model(current.quality),
+        speed_source=newest.speed_source.value if newest else None,
+        window=window_model(newest.window) if newest else None,
+        estimators=_estimators(current),
+        runout=_runout(current),
+        clipped_share=dict(newest.clipped_share) if newest and current.is_current else {},
+        readings={name: reading_model(name, r) for name, r in current.readings.items()},
+    )
+
+
+def _estimators(current: CurrentBearing) -> dict[str, EstimatorName | None]:
+    if current.assessment is None or not current.is_current:
+        return {"xx": None, "yy": None}
+    return estimator_names(current.assessment)
+
+
+def estimator_names(assessment: Assessment) -> dict[str, EstimatorName | None]:
+    """Return the estimator of the preferred stiffness by axes."""
+    chosen = assessment.estimators
+    return {axes: estimator.value if estimator else None for axes, estimator in chosen.items()}
+
+
+def _runout(current: CurrentBearing) -> dict[str, RunoutName | None]:
+    if current.assessment is None or not current.is_current:
+        return {"shaft_x": None, "shaft_y": None}
+    return runout_names(current.assessment)
+
+
+def runout_names(assessment: Assessment) -> dict[str, RunoutName | None]:
+    """Return the runout compensation by shaft channel."""
+    return {place: verdict.value for place, verdict in assessment.runout.items()}
+
+
+def bearing_router(context: Context) -> APIRouter:
+    """Return the routes of one bearing."""
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings",
+        tags=["bearing"],
+        dependencies=[needs(Permission.READ)],
+    )
+    unknown, no_result = problem_responses(404), problem_responses(404, 409)
+
+    @router.get("", summary="All bearings of a unit", responses=unknown)
+    async def bearings(unit: UnitId) -> list[BearingModel]:
+        """List the guide bearings of a unit as configured, with their references in force."""
+        return [_bearing(context, unit, bearing.id) for bearing in context.unit(unit).bearing]
+
+    @router.get("/{bearing}", summary="One bearing as configured", responses=unknown)
+    async def one_bearing(unit: UnitId, bearing: BearingId) -> BearingModel:
+        """Show bracket, clearance, channels, and the reference in force with its origin."""
+        return _bearing(context, unit, bearing)
+
+    @router.get(
+        "/{bearing}/latest",
+        summary="One bearing now",
+        response_model=LatestModel,
+        responses=unknown,
+    )
+    async def latest(unit: UnitId, bearing: BearingId) -> Response:
+        """Show the newest result; values that are not current are null."""
+        context.bearing(unit, bearing)
+        return await rendered(lambda: latest_model(context.live, unit, bearing))
+
+    @router.get("/{bearing}/budgets/{quantity}", summary="Uncertainty budget", responses=no_result)
+    async def budget(unit: UnitId, bearing: BearingId, quantity: QuantityName) -> BudgetModel:
+        """Show the uncertainty budget of the newest result of a quantity."""
+        context.bearing(unit, bearing)
+        if quantity not in BY_NAME or not BY_NAME[quantity].has_uncertainty:
+            detail = f"quantity {quantity!r} has no uncertainty budget; see /api/v1/quantities"
+            raise ProblemError(404, "No such budget", detail)
+        found = _budget(context.live.current(unit, bearing), quantity)
+        if found is None:
+            detail = f"{quantity} has no budget now: no value, or too few segments yet"
+            raise ProblemError(409, "No result", detail)
+        return found
+
+    return router
+
+
+def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:
+    context.bearing(unit, bearing)
+    references = context.references
+    watched = references.bearing(unit, bearing)
+    return bearing_model(unit, watched, references.of(unit, bearing))
+
+
+def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
+    """Return the budget of a current reading; preferred stiffness uses that of its estimator."""
+    assessment = current.assessment
+    if assessment is None or not current.is_current:
+        return None
+    source = quantity
+    if quantity.startswith("stiffness_"):
+        axes = quantity.split("_")[1]
+        estimator = assessment.estimators[axes]
+        source = ESTIMATORS[estimator].stiffness.format(axes=axes) if estimator else quantity
+    budget = assessment.budgets.get(source)
+    return None if budget is None else budget_model(quantity, assessment.time_ns, budget)
+
+
+def no_result(unit: str, bearing: str) -> ProblemError:
+    """Return the problem of a bearing without a result."""
+    detail = f"unit {unit!r} bearing {bearing!r} has no result yet; the first takes one segment"
+    return ProblemError(409, "No result yet", detail)

@@ -1,0 +1,407 @@
+"""Channels of a unit and their newest samples."""
+
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from fastapi import APIRouter, Query, Response
+from pydantic import Field
+
+from core.arrays import SampleArray
+from core.machine.channel import Measurand
+from core.quality import Level, Quality, Reading, Reason, bad, missing, worst
+from core.samples.blocks import SampleBlock
+from service.api.answers import rendered
+from service.api.auth.declared import needs
+from service.api.context import Context, LiveLook, UnitId
+from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.values import ApiModel, QualityModel, Time, listed, quality_model
+from service.live.live_view import HELD_S
+from service.live.samples import Stretch, newest_stretch
+from service.runtime.times import rfc3339
+from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
+from service.settings.channels import ChannelSettings, SlowChannelSettings
+from service.settings.sources.devices import ModbusVectorSettings
+from service.settings.units import UnitSettings
+from service.store.access.identities import Permission
+
+TransducerName = Literal[
+    "proximity_probe", "displacement", "velocity", "accelerometer", "key_phase"
+]
+
+ChannelUnit = Annotated[
+    Literal["um", "mm/s", "m/s2", "V"], Field(examples=["um"], description="Engineering unit.")
+]
+
+
+class WaveformChannelModel(ApiModel):
+    """A waveform channel: settings and present state."""
+
+    id: Annotated[str, Field(examples=["ujb_shaft_x"])]
+    """Identifier within the unit."""
+
+    transducer: TransducerName
+    """Kind of transducer."""
+
+    unit: ChannelUnit
+    """Engineering unit of its samples."""
+
+    sensitivity: float | None
+    """Sensitivity; null for a key-phase, and where counts are scaled."""
+
+    sensitivity_unit: str | None
+    """Unit of the sensitivity."""
+
+    full_scale_v: float | None
+    """Converter input in volts that reads full scale; null where counts are scaled."""
+
+    ok_min_v: float | None
+    """Lowest mean voltage of a healthy transducer."""
+
+    ok_max_v: float | None
+    """Highest mean voltage of a healthy transducer."""
+
+    unit_per_count: float | None
+    """Engineering units per count, where counts are scaled; else null."""
+
+    ok_min: float | None
+    """Lowest mean of a healthy transducer whose counts are scaled, in engineering units."""
+
+    ok_max: float | None
+    """Highest mean of such a transducer, in engineering units."""
+
+    gain_uncertainty: float
+    """Half-width of the relative error of the sensitivity."""
+
+    direction: Literal[1, -1]
+    """+1 if an increasing reading is motion along the positive bearing axis, else -1."""
+
+    probe: str | None
+    """Serial number or mark of the probe; null if unknown."""
+
+    used_by: Annotated[list[str], Field(examples=[["UJB shaft_x"]])]
+    """Uses of the channel: bearing and place, or "key_phase"."""
+
+    quality: QualityModel
+    """Quality of its newest block of samples."""
+
+    minimum: float | None
+    """Lowest sample of that block; null if the channel is bad, and for racks without samples."""
+
+    maximum: float | None
+    """Highest sample, likewise."""
+
+    mean: float | None
+    """Mean of the samples, likewise; for a proximity probe, the gap."""
+
+
+class SlowChannelModel(ApiModel):
+    """A slow channel: settings and newest reading."""
+
+    id: Annotated[str, Field(examples=["ujb_oil_temperature"])]
+    """Identifier within the unit."""
+
+    unit: Literal["r/min", "MW", "degC", "mm"]
+    """Unit of its readings."""
+
+    minimum: float
+    """Lowest valid reading."""
+
+    maximum: float
+    """Highest valid reading."""
+
+    used_by: Annotated[list[str], Field(examples=[["UJB oil_temperature"]])]
+    """Uses of the channel."""
+
+    value: float | None
+    """Newest reading; null if and only if the level is bad."""
+
+    quality: QualityModel
+    """Quality of that reading."""
+
+
+class ChannelsModel(ApiModel):
+    """All channels of a unit."""
+
+    unit: str
+    """Identifier of the unit."""
+
+    rate_hz: float
+    """Samples per second and channel."""
+
+    time: Time | None
+    """End of the newest block, also if it is not current; null without a block."""
+
+    age_s: float | None
+    """Age of that block, s."""
+
+    waveform: list[WaveformChannelModel]
+    """Waveform channels in the order of the source."""
+
+    slow: list[SlowChannelModel]
+    """Slow channels in the order of the source."""
+
+
+class ChannelSamplesModel(ApiModel):
+    """Samples of one channel."""
+
+    unit: ChannelUnit
+    """Engineering unit."""
+
+    quality: QualityModel
+    """Worst quality of the blocks of these samples."""
+
+    sample: list[float | None]
+    """One sample per index; null where it is missing or the channel was bad."""
+
+
+class WaveformModel(ApiModel):
+    """Newest samples of some channels of a unit."""
+
+    unit: str
+    """Identifier of the unit."""
+
+    time: Time
+    """Time of the first sample."""
+
+    age_s: float
+    """Age of the newest sample, s; it grows while the link is lost."""
+
+    epoch: int
+    """Changes when the device restarts its count."""
+
+    first_index: int
+    """Index of the first sample."""
+
+    rate_hz: float
+    """Samples per second."""
+
+    n_samples: int
+    """Samples of each channel."""
+
+    channels: dict[str, ChannelSamplesModel]
+    """Requested channels."""
+
+
+UNITS: dict[Measurand, ChannelUnit] = {
+    Measurand.GAP_UM: "um",
+    Measurand.DISPLACEMENT_UM: "um",
+    Measurand.VELOCITY_MM_S: "mm/s",
+    Measurand.ACCELERATION_M_S2: "m/s2",
+    Measurand.KEY_PHASE_V: "V",
+}
+"""Units of waveform channels, written as in exported recordings."""
+
+USES = (*CHANNEL_KEYS, *OPTIONAL_CHANNEL_KEYS, *GAP_KEYS, "oil_temperature")
+"""Keys of a bearing that name channels."""
+
+UNIT_USES = ("speed_channel", "power_channel", "key_phase")
+"""Keys of a unit that name channels."""
+
+
+def channels_model(live: LiveLook, settings: UnitSettings) -> ChannelsModel:
+    """Return all channels of a unit with the state of its newest block."""
+    newest, why_not = live.newest_block(settings.id), live.why_no_samples(settings.id)
+    shown = newest if why_not is None else None
+    why = why_not or Reason.WAITING_FOR_DATA
+    uses = _uses(settings)
+    return ChannelsModel(
+        unit=settings.id,
+        rate_hz=settings.sampling_hz,
+        time=None if newest is None else rfc3339(newest.stop_ns),
+        age_s=live.data_age_s(settings.id),
+        waveform=[
+            _waveform(settings, channel, uses.get(channel.id, []), shown, why)
+            for channel in settings.channel
+        ],
+        slow=[
+            _slow(channel, uses.get(channel.id, []), shown, why)
+            for channel in settings.slow_channel
+        ],
+    )
+
+
+def rows_of(settings: UnitSettings, channel: str) -> list[int]:
+    """Return the rows of a block that belong to a channel; a rack has several."""
+    if isinstance(settings.source, ModbusVectorSettings):
+        return [n for n, row in enumerate(settings.source.rows) if row.channel == channel]
+    return [n for n, each in enumerate(settings.channel) if each.id == channel]
+
+
+def _waveform(
+    settings: UnitSettings,
+    channel: ChannelSettings,
+    used_by: list[str],
+    block: SampleBlock | None,
+    why: Reason,
+) -> WaveformChannelModel:
+    rows = rows_of(settings, channel.id)
+    quality = bad(why) if block is None else worst(block.channel_quality[row] for row in rows)
+    return WaveformChannelModel(
+        id=channel.id,
+        transducer=channel.transducer.value,
+        unit=UNITS[channel.measurand],
+        sensitivity=channel.sensitivity,
+        sensitivity_unit=channel.sensitivity_unit,
+        full_scale_v=channel.full_scale_v,
+        ok_min_v=channel.ok_min_v,
+        ok_max_v=channel.ok_max_v,
+        unit_per_count=channel.unit_per_count,
+        ok_min=channel.ok_min,
+        ok_max=channel.ok_max,
+        gain_uncertainty=channel.gain_uncertainty,
+        direction=channel.sign,
+        probe=channel.probe,
+        used_by=used_by,
+        quality=quality_model(quality),
+        **_extent(settings, block, rows, quality),
+    )
+
+
+def _extent(
+    settings: UnitSettings, block: SampleBlock | None, rows: list[int], quality: Quality
+) -> dict[str, Any]:
+    """Return extremes and mean of a block; rows of a rack have no samples."""
+    has_samples = not isinstance(settings.source, ModbusVectorSettings)
+    if block is None or quality.level is Level.BAD or not has_samples:
+        return {"minimum": None, "maximum": None, "mean": None}
+    samples: SampleArray = block.samples[rows[0]]
+    mean = float(samples.mean(dtype=np.float64))
+    return {"minimum": float(samples.min()), "maximum": float(samples.max()), "mean": mean}
+
+
+def _slow(
+    channel: SlowChannelSettings, used_by: list[str], block: SampleBlock | None, why: Reason
+) -> SlowChannelModel:
+    reading = missing(why) if block is None else _reading(block, channel.id)
+    return SlowChannelModel(
+        id=channel.id,
+        unit=channel.unit,
+        minimum=channel.minimum,
+        maximum=channel.maximum,
+        used_by=used_by,
+        value=reading.value,
+        quality=quality_model(reading.quality),
+    )
+
+
+def _reading(block: SampleBlock, channel: str) -> Reading:
+    return block.slow.get(channel) or missing(Reason.NOT_MEASURED)
+
+
+def _uses(settings: UnitSettings) -> dict[str, list[str]]:
+    """Return the uses of each channel."""
+    found: dict[str, list[str]] = {}
+    for key in UNIT_USES:
+        found.setdefault(getattr(settings, key), []).append(key)
+    for bearing in settings.bearing:
+        for key in USES:
+            found.setdefault(getattr(bearing, key), []).append(f"{bearing.id} {key}")
+    return found
+
+
+def waveform_model(
+    settings: UnitSettings, channels: Sequence[str], stretch: Stretch, age_s: float
+) -> WaveformModel:
+    """Return the model of samples."""
+    units = {each.id: UNITS[each.measurand] for each in settings.channel}
+    found = zip(channels, stretch.samples, stretch.quality, strict=True)
+    return WaveformModel(
+        unit=settings.id,
+        time=rfc3339(stretch.start_ns),
+        age_s=age_s,
+        epoch=stretch.epoch,
+        first_index=stretch.first_index,
+        rate_hz=stretch.rate_hz,
+        n_samples=stretch.samples.shape[1],
+        channels={
+            id_: ChannelSamplesModel(
+                unit=units[id_],
+                quality=quality_model(quality),
+                sample=listed(row),
+            )
+            for id_, row, quality in found
+        },
+    )
+
+
+MAX_NUMBERS = 200_000
+"""Maximum number of samples in one answer, all channels together."""
+
+PROBLEMS = described_problems(
+    {404: "Unknown unit", 409: "There are no samples", 422: "A wrong parameter"}
+)
+
+
+def channel_router(context: Context) -> APIRouter:
+    """Return the routes of channels."""
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}", tags=["plant"], dependencies=[needs(Permission.READ)]
+    )
+
+    @router.get("/channels", summary="Channels", responses=problem_responses(404))
+    async def channels(unit: UnitId) -> ChannelsModel:
+        """List settings and state of every waveform channel and slow channel of a unit.
+
+        The state is that of the newest block; a bad channel has null values.
+        """
+        return channels_model(context.live, context.unit(unit))
+
+    @router.get("/waveform", summary="Waveform", responses=PROBLEMS, response_model=WaveformModel)
+    async def waveform(
+        unit: UnitId,
+        channel: Annotated[
+            list[str] | None,
+            Query(
+                max_length=32,
+                description="Waveform channels; default: all. May be repeated.",
+                examples=[["ujb_shaft_x", "ujb_shaft_y"]],
+            ),
+        ] = None,
+        seconds: Annotated[
+            float,
+            Query(
+                gt=0.0,
+                le=HELD_S,
+                allow_inf_nan=False,
+                description="Duration of the newest samples; limited to those in memory.",
+            ),
+        ] = 2.0,
+    ) -> Response:
+        """Return the newest samples of a unit from memory, in engineering units.
+
+        Missing samples, and those of a bad channel, are null.
+        """
+        settings = context.unit(unit)
+        chosen = _chosen(settings, channel)
+        blocks, age_s = context.live.blocks(unit), context.live.data_age_s(unit)
+        if not blocks or age_s is None:
+            raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")
+        n_samples = _n_samples(seconds, blocks[-1].rate_hz, len(chosen))
+        rows = [rows_of(settings, each)[0] for each in chosen]
+        return await rendered(
+            lambda: waveform_model(settings, chosen, newest_stretch(blocks, rows, n_samples), age_s)
+        )
+
+    return router
+
+
+def _chosen(settings: UnitSettings, channels: list[str] | None) -> list[str]:
+    if isinstance(settings.source, ModbusVectorSettings):
+        detail = f"unit {settings.id!r} is read from a rack that gives amplitudes, not samples"
+        raise ProblemError(409, "No samples", detail)
+    known = [channel.id for channel in settings.channel]
+    for each in channels or ():
+        if each not in known:
+            detail = f"unit {settings.id!r} has no waveform channel {each!r}; see its channels"
+            raise ProblemError(422, "Wrong parameter", detail, "channel")
+    return list(dict.fromkeys(channels or known))
+
+
+def _n_samples(seconds: float, rate_hz: float, n_channels: int) -> int:
+    n_samples = max(1, round(seconds * rate_hz))
+    if n_samples * n_channels > MAX_NUMBERS:
+        longest_s = MAX_NUMBERS / n_channels / rate_hz
+        detail = f"{seconds:g} s of {n_channels} channels are too long; at most {longest_s:g} s"
+        raise ProblemError(422, "Wrong parameter", detail, "seconds")
+    return n_samples

@@ -1,0 +1,355 @@
+"""Readings of a film over time, with the condition of each."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal, cast
+
+import numpy as np
+import numpy.typing as npt
+from fastapi import APIRouter, Depends, Query, Response
+
+from core.baseline.history import CodeArray, ReadingOutcome
+from core.change.decision import Verdict
+from core.condition.operating_state import OperatingState
+from core.units import NS_PER_S
+from service.api.answers import rendered, worked
+from service.api.auth.declared import needs
+from service.api.context import BearingId, Context, UnitId
+from service.api.parameters import States, TimeRange, eccentricity_range, oil_temperature_range
+from service.api.problems import described_problems
+from service.api.routes.films import (
+    LevelHeldName,
+    VerdictName,
+    level_name,
+    verdict_name,
+    watched_place,
+)
+from service.api.tables import Column, ColumnKind, Format, table_content, table_response
+from service.api.values import (
+    STATE_NAMES,
+    ApiModel,
+    EstimatorName,
+    OperatingStateName,
+    Time,
+    listed,
+    states_named,
+)
+from service.runtime.times import rfc3339
+from service.store.access.identities import Permission
+from service.store.film_port import FilmHistory, FilmQuery
+from service.store.port import QueryTooLargeError
+from service.store.value_range import ValueRange
+
+EvidenceName = Literal["measured", "insufficient_excitation", "bad_quality"]
+
+ProvenanceName = Literal["measured", "simulated"]
+
+
+class FilmSeriesModel(ApiModel):
+    """Readings of a film in one direction; one value per time, null without a number."""
+
+    stiffness_n_per_m: list[float | None]
+    """Stiffness by the watched estimator."""
+
+    u_random_n_per_m: list[float | None]
+    """Random standard uncertainty."""
+
+    shaft_um_pk: list[float | None]
+    """Shaft motion relative to the bearing at 1×, zero to peak."""
+
+    bearing_um_pk: list[float | None]
+    """Bearing motion at 1×, zero to peak."""
+
+    evidence: list[EvidenceName]
+    """"measured", or why there is no number."""
+
+    verdict: list[VerdictName]
+    """Verdict when the reading was made."""
+
+    level: list[LevelHeldName | None]
+    """Level in force at that time."""
+
+    change_percent: list[float | None]
+    """Most significant mean change of stiffness at that time, %."""
+
+    deviation_percent: list[float | None]
+    """Deviation of the reading alone, %; null if it was not compared."""
+
+
+class FilmReadingsModel(ApiModel):
+    """Readings of a film with their operating conditions, oldest first."""
+
+    unit: str
+    """Identifier of the unit."""
+
+    bearing: str
+    """Identifier of the bearing."""
+
+    estimator: EstimatorName
+    """Estimator of the stiffness."""
+
+    start: Time
+    """Start of the requested range."""
+
+    end: Time
+    """End of the requested range."""
+
+    n_found: int
+    """Readings in this range that match; more than given here if they were thinned."""
+
+    next_end: Time | None
+    """Without thinning, value of ``end`` for the page of older readings; null if there are none."""
+
+    time: list[float]
+    """Seconds since 1970 UTC."""
+
+    provenance: list[ProvenanceName]
+    """"measured" on the machine, or "simulated" without samples."""
+
+    operating_state: list[OperatingStateName]
+    """Operating state of the unit."""
+
+    is_settled: list[bool]
+    """Whether the state had lasted long enough for films to be compared."""
+
+    speed_rpm: list[float | None]
+    """Speed, r/min."""
+
+    power_mw: list[float | None]
+    """Active power, MW."""
+
+    eccentricity_ratio: list[float | None]
+    """Eccentricity over clearance."""
+
+    attitude_deg: list[float | None]
+    """Attitude angle, degrees."""
+
+    oil_temperature_c: list[float | None]
+    """Oil temperature, °C."""
+
+    baseline_version: list[int | None]
+    """Version of the baseline; null where none was in force."""
+
+    x: FilmSeriesModel
+    """Readings in x."""
+
+    y: FilmSeriesModel
+    """Readings in y."""
+
+
+Rows = npt.NDArray[np.int64]
+
+EVIDENCE_NAMES = {code: cast("EvidenceName", code.name.lower()) for code in ReadingOutcome}
+
+
+def rows_shown(n_found: int, max_points: int, is_thinned: bool) -> Rows:
+    """Return the rows to show: evenly thinned including the newest, or the newest rows."""
+    if n_found <= max_points:
+        return np.arange(n_found)
+    if not is_thinned:
+        return np.arange(n_found - max_points, n_found)
+    return np.unique(np.round(np.linspace(0, n_found - 1, max_points)).astype(np.int64))
+
+
+def film_readings_model(query: FilmQuery, found: FilmHistory, rows: Rows) -> FilmReadingsModel:
+    """Return the model of some readings of a film.
+
+    Parameters
+    ----------
+    rows
+        Rows of the history to show.
+    """
+    history, first = found.history, int(rows[0]) if rows.size else 0
+    x, y = (_series(found, direction, rows) for direction in range(2))
+    return FilmReadingsModel(
+        unit=query.unit,
+        bearing=query.bearing,
+        estimator=query.estimator.value,
+        start=rfc3339(query.start_ns),
+        end=rfc3339(query.end_ns),
+        n_found=len(found),
+        next_end=rfc3339(int(history.time_ns[first])) if first else None,
+        time=(history.time_ns[rows] / NS_PER_S).tolist(),
+        provenance=["simulated" if one else "measured" for one in found.is_simulated[rows]],
+        operating_state=[STATE_NAMES[OperatingState(code)] for code in found.state[rows]],
+        is_settled=found.is_settled[rows].tolist(),
+        speed_rpm=listed(history.speed_rpm[rows]),
+        power_mw=listed(history.power_mw[rows]),
+        eccentricity_ratio=listed(history.eccentricity_ratio[rows]),
+        attitude_deg=listed(history.attitude_deg[rows]),
+        oil_temperature_c=listed(history.oil_temperature_c[rows]),
+        baseline_version=[int(v) or None for v in found.baseline_version[rows]],
+        x=x,
+        y=y,
+    )
+
+
+def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
+    history = found.history
+
+    def column(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        return np.asarray(values[direction, rows])
+
+    stiffness = np.exp(column(history.ln_k))
+    return FilmSeriesModel(
+        stiffness_n_per_m=listed(stiffness),
+        u_random_n_per_m=listed(stiffness * column(history.u_random)),
+        shaft_um_pk=listed(column(history.shaft_um_pk)),
+        bearing_um_pk=listed(column(history.bearing_um_pk)),
+        evidence=[EVIDENCE_NAMES[ReadingOutcome(code)] for code in column(history.outcome)],
+        verdict=[verdict_name(Verdict(code)) for code in column(found.verdict)],
+        level=_levels(column(found.level)),
+        change_percent=listed(100.0 * np.expm1(column(found.change))),
+        deviation_percent=listed(100.0 * np.expm1(column(found.deviation))),
+    )
+
+
+def _levels(codes: CodeArray) -> list[Any]:
+    return [level_name(int(code) or None) for code in codes]
+
+
+UNITS = {
+    "_n_per_m": "N/m",
+    "_um_pk": "µm 0-pk",
+    "_percent": "%",
+    "_rpm": "r/min",
+    "_mw": "MW",
+    "_ratio": "1",
+    "_deg": "deg",
+    "_c": "°C",
+}
+"""Units by the suffix of a name."""
+
+SHARED: dict[str, ColumnKind] = {
+    "provenance": "text",
+    "operating_state": "text",
+    "is_settled": "flag",
+    "speed_rpm": "number",
+    "power_mw": "number",
+    "eccentricity_ratio": "number",
+    "attitude_deg": "number",
+    "oil_temperature_c": "number",
+    "baseline_version": "count",
+}
+
+OWN: dict[str, ColumnKind] = {
+    "stiffness_n_per_m": "number",
+    "u_random_n_per_m": "number",
+    "shaft_um_pk": "number",
+    "bearing_um_pk": "number",
+    "evidence": "text",
+    "verdict": "text",
+    "level": "text",
+    "change_percent": "number",
+    "deviation_percent": "number",
+}
+
+
+def film_table(model: FilmReadingsModel, found: FilmHistory, rows: list[int]) -> list[Column]:
+    """Return readings as columns.
+
+    Parameters
+    ----------
+    rows
+        Rows of the history that the model shows.
+    """
+    times = found.history.time_ns[rows].tolist()
+    shared = [Column(n, kind, getattr(model, n), _unit(n)) for n, kind in SHARED.items()]
+    return [Column("time_utc", "time", times), *shared, *_side("x", model.x), *_side("y", model.y)]
+
+
+def _side(direction: str, series: FilmSeriesModel) -> Iterator[Column]:
+    for name, kind in OWN.items():
+        yield Column(f"{direction}_{name}", kind, getattr(series, name), _unit(name))
+
+
+def _unit(name: str) -> str | None:
+    return next((unit for end, unit in UNITS.items() if name.endswith(end)), None)
+
+
+MAX_POINTS = 20_000
+
+MAX_READ = 120_000
+"""Maximum number of readings read by one request: over two years of one every ten minutes."""
+
+
+READING_PROBLEMS = described_problems(
+    {
+        404: "Unknown unit or bearing",
+        409: "The film is not watched",
+        422: "A wrong parameter",
+        503: "The store cannot be read",
+    }
+)
+
+
+def film_history_router(context: Context) -> APIRouter:
+    """Return the route of the readings of a film."""
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings/{bearing}/film",
+        tags=["film"],
+        dependencies=[needs(Permission.READ)],
+    )
+
+    @router.get(
+        "/readings",
+        summary="Readings of a film",
+        response_model=FilmReadingsModel,
+        responses={**READING_PROBLEMS, **table_content("Readings, by column")},
+    )
+    async def readings(
+        unit: UnitId,
+        bearing: BearingId,
+        times: TimeRange,
+        wanted: Format,
+        eccentricity: Annotated[ValueRange, Depends(eccentricity_range)],
+        oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
+        state: States = None,
+        max_points: Annotated[
+            int, Query(ge=2, le=MAX_POINTS, description="Maximum number of readings.")
+        ] = 2000,
+        thin: Annotated[
+            bool,
+            Query(
+                description="Whether to thin more readings than that evenly, keeping the newest;"
+                " otherwise the newest readings are given, and `next_end` for the page"
+                " before."
+            ),
+        ] = True,
+    ) -> Response:
+        """List stiffness with the operating condition of each reading, by column, oldest first.
+
+        As CSV or Parquet: one row per reading.
+        """
+        place = watched_place(context, unit, bearing)
+        query = FilmQuery(
+            unit=unit,
+            bearing=bearing,
+            estimator=place.estimator,
+            start_ns=times[0],
+            end_ns=times[1],
+            states=states_named(state),
+            eccentricity_ratio=eccentricity,
+            oil_temperature_c=oil_temperature,
+            newest=MAX_READ + 1,
+        )
+
+        def read() -> tuple[FilmReadingsModel, FilmHistory, list[int]]:
+            found = _history(context, query)
+            rows = rows_shown(len(found), max_points, thin)
+            return film_readings_model(query, found, rows), found, rows.tolist()
+
+        def read_columns() -> list[Column]:
+            return film_table(*read())
+
+        if wanted == "json":
+            return await rendered(lambda: read()[0])
+        return table_response(wanted, await worked(read_columns), f"film-{unit}-{bearing}")
+
+    return router
+
+
+def _history(context: Context, query: FilmQuery) -> FilmHistory:
+    found = context.store.films.history(query)
+    if len(found) > MAX_READ:
+        raise QueryTooLargeError(f"more than {MAX_READ} readings in this range: ask for less")
+    return found

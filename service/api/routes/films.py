@@ -1,0 +1,473 @@
+"""The film of a bearing now: verdict, change with its uncertainty, cause, condition."""
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Literal, cast
+
+from fastapi import APIRouter, Response
+from pydantic import Field
+
+from core.baseline.baseline import BearingBaseline, QuantityBaseline
+from core.baseline.history import DIRECTIONS, Watched
+from core.change.decision import Decision, Verdict
+from core.change.film_judge import FilmFinding, FilmNews
+from core.change.film_reading import FilmReading
+from core.change.settings import FilmRules
+from core.condition.cells import FilmConditions
+from service.api.answers import rendered
+from service.api.auth.declared import needs
+from service.api.context import BearingId, Context, UnitId
+from service.api.problems import ProblemError, problem_responses
+from service.api.values import ApiModel, EstimatorName, FilmConditionModel, Time, condition_model
+from service.live.commands import FilmPlace
+from service.live.live_view import CurrentBearing
+from service.runtime.times import rfc3339
+from service.store.access.identities import Permission
+
+VerdictName = Literal[
+    "normal",
+    "alert",
+    "danger",
+    "gathering_evidence",
+    "no_baseline",
+    "insufficient_excitation",
+    "bad_quality",
+    "transient",
+    "no_reading",
+]
+
+CauseName = Literal["film", "oil", "bracket_or_transducer", "unknown"]
+
+
+LevelHeldName = Literal["alert", "danger"]
+
+
+class FilmChangeModel(ApiModel):
+    """The most significant mean deviation of stiffness from the baseline."""
+
+    percent: Annotated[float, Field(examples=[-19.2])]
+    """Change of stiffness, %; negative is softer."""
+
+    low_95: Annotated[float, Field(examples=[-21.9])]
+    """Lower end of its 95 % interval, %."""
+
+    high_95: Annotated[float, Field(examples=[-16.4])]
+    """Upper end of that interval, %."""
+
+    ln: Annotated[float, Field(examples=[-0.213])]
+    """The same change as ln of stiffness over baseline; the limits apply to this value."""
+
+    ln_std: float
+    """Standard uncertainty."""
+
+    time_scale_h: Annotated[float, Field(examples=[4.0])]
+    """Running hours of the average."""
+
+    significance: Annotated[float, Field(examples=[12.4])]
+    """Change over its standard uncertainty."""
+
+    significance_wanted: Annotated[float, Field(examples=[6.5])]
+    """Significance that a change over that time must reach."""
+
+    as_of: Time | None
+    """Newest reading in the average; null if it is older than the start of the service or than
+    the baseline in force."""
+
+
+class FilmDeviationModel(ApiModel):
+    """Deviation of one reading from its baseline."""
+
+    percent: float
+    """Deviation of stiffness, %."""
+
+    low_95: float
+    """Lower end of its 95 % interval, %."""
+
+    high_95: float
+    """Upper end of that interval, %."""
+
+
+class FilmCauseModel(ApiModel):
+    """Cause of a change, inferred from the motion of the shaft."""
+
+    cause: CauseName
+    """Film of this bearing, oil of all bearings, bracket or transducer, or unknown."""
+
+    reason: str
+    """Reason in words."""
+
+    film_share: float | None
+    """Share of the change due to the film if an accelerometer causes the rest, 0 to 1 within its
+    uncertainty; null if unknown, or if no such mixture explains the motion."""
+
+    film_share_std: float | None
+    """Standard uncertainty."""
+
+
+class FilmDirectionModel(ApiModel):
+    """State of a film in one direction."""
+
+    verdict: VerdictName
+    """Verdict on the newest reading. Only "normal", "alert" and "danger" judge the film; the others
+    give the reason why not: too little evidence yet ("gathering_evidence"), no baseline for this
+    condition ("no_baseline"), too little motion ("insufficient_excitation"), a doubtful value
+    ("bad_quality"), a unit that has not settled ("transient"), or no current reading
+    ("no_reading")."""
+
+    reason: Annotated[str, Field(examples=["condition_not_learned"])]
+    """Why the film is not judged; "ok" if it is."""
+
+    level: LevelHeldName | None
+    """Level in force, also while the newest reading cannot be judged."""
+
+    change: FilmChangeModel | None
+    """Change; null without a baseline, before the shortest time scale is full, and without a
+    current reading."""
+
+    deviation: FilmDeviationModel | None
+    """Deviation of the newest reading alone; null if it was not compared."""
+
+    stiffness_n_per_m: float | None
+    """Stiffness of the newest reading; null if there is none."""
+
+    cause: FilmCauseModel | None
+    """Cause, while a level is in force."""
+
+
+class FilmLimitsModel(ApiModel):
+    """Limits of change for alert and danger."""
+
+    alert: Annotated[float, Field(examples=[0.035])]
+    """Absolute change of ln of stiffness for alert: 0.04 is 4 %."""
+
+    danger: Annotated[float, Field(examples=[0.15])]
+    """Absolute change of ln of stiffness for danger."""
+
+
+class FilmModel(ApiModel):
+    """Film of a bearing now."""
+
+    unit: str
+    """Identifier of the unit."""
+
+    bearing: str
+    """Identifier of the bearing."""
+
+    is_watched: bool
+    """Whether stiffness is compared with a baseline."""
+
+    why_not: str | None
+    """Why it is not compared; null if it is."""
+
+    estimator: EstimatorName | None
+    """Estimator whose stiffness is compared; always the same one for comparable readings."""
+
+    time: Time | None
+    """Time of the newest reading; null if there is none since the service started."""
+
+    is_current: bool
+    """Whether that reading is current."""
+
+    next_reading: Time | None
+    """Time of the next reading; null without current data."""
+
+    condition: FilmConditionModel | None
+    """Condition of the newest result; null without current data."""
+
+    baseline_version: int | None
+    """Version in force; null if there is none."""
+
+    limits: FilmLimitsModel | None
+    """Limits of change; null if the film is not watched."""
+
+    x: FilmDirectionModel | None
+    """State in x; null if the film is not watched."""
+
+    y: FilmDirectionModel | None
+    """State in y, likewise."""
+
+
+class FilmWordModel(ApiModel):
+    """Verdict on a film in one direction."""
+
+    verdict: VerdictName
+    """Verdict on the newest reading; "no_reading" if that is not current."""
+
+    level: LevelHeldName | None
+    """Level in force."""
+
+    change_percent: float | None
+    """Most significant mean change of stiffness, %."""
+
+
+class FilmBriefModel(ApiModel):
+    """Summary of the film of a bearing."""
+
+    bearing: str
+    """Identifier of the bearing."""
+
+    why_not: str | None
+    """Why the film is not watched; null if it is."""
+
+    x: FilmWordModel | None
+    """State in x; null if the film is not watched."""
+
+    y: FilmWordModel | None
+    """State in y, likewise."""
+
+
+CURRENT_PERIODS = 2.5
+"""Age of a reading at the newest result, in reading periods, above which it is not current."""
+
+NORMAL_95 = 1.96
+"""Half-width of the 95 % interval of a normal distribution, in standard deviations."""
+
+NONE_IN_FORCE = "none_in_force"
+NOT_LEARNED, ATTITUDE_NOT_LEARNED = "condition_not_learned", "attitude_not_learned"
+
+
+@dataclass(frozen=True)
+class WatchedFilm:
+    """A watched film with its newest reading.
+
+    Parameters
+    ----------
+    news
+        Newest reading with its findings.
+    why_not_current
+        Why the reading is not current; None if it is.
+    """
+
+    rules: FilmRules
+    current: CurrentBearing
+    news: FilmNews | None
+    baseline: BearingBaseline | None
+    why_not_current: str | None
+
+
+def why_unwatched(context: Context, unit: str, bearing: str) -> str | None:
+    """Return why a film is not watched; None if it is."""
+    if unit in context.films.unwatched:
+        return context.films.unwatched[unit]
+    is_watched = context.films.place(unit, bearing) is not None
+    return None if is_watched else "conditions need the oil_temperature of the bearing"
+
+
+def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
+    """Film of a bearing now."""
+    seen, place = _seen(context, unit, bearing), context.films.place(unit, bearing)
+    x, y = _directions(seen) if seen else (None, None)
+    limits = seen.rules.change if seen else None
+    return FilmModel(
+        unit=unit,
+        bearing=bearing,
+        is_watched=seen is not None,
+        why_not=why_unwatched(context, unit, bearing),
+        estimator=place.estimator.value if place else None,
+        time=rfc3339(seen.news.reading.time_ns) if seen and seen.news else None,
+        is_current=seen is not None and seen.why_not_current is None,
+        next_reading=_next_reading(seen) if seen else None,
+        condition=_condition(seen) if seen else None,
+        baseline_version=_version(seen.baseline) if seen else None,
+        limits=FilmLimitsModel(alert=limits.alert_change, danger=limits.danger_change)
+        if limits
+        else None,
+        x=x,
+        y=y,
+    )
+
+
+def film_brief(context: Context, unit: str, bearing: str) -> FilmBriefModel:
+    """Summary of the film of a bearing."""
+    seen = _seen(context, unit, bearing)
+    x, y = (_word(found) for found in _directions(seen)) if seen else (None, None)
+    return FilmBriefModel(bearing=bearing, why_not=why_unwatched(context, unit, bearing), x=x, y=y)
+
+
+def _word(found: FilmDirectionModel) -> FilmWordModel:
+    percent = found.change.percent if found.change else None
+    return FilmWordModel(verdict=found.verdict, level=found.level, change_percent=percent)
+
+
+def _seen(context: Context, unit: str, bearing: str) -> WatchedFilm | None:
+    rules = context.films.rules(unit)
+    if rules is None or context.films.place(unit, bearing) is None:
+        return None
+    baseline = context.films.baseline(unit, bearing)
+    news, current = context.films.newest(unit, bearing), context.live.current(unit, bearing)
+    why = _why_not_current(news, current, rules, _version(baseline))
+    return WatchedFilm(rules, current, news, baseline, why)
+
+
+def _version(baseline: BearingBaseline | None) -> int | None:
+    return baseline.origin.version if baseline else None
+
+
+def _why_not_current(
+    news: FilmNews | None, current: CurrentBearing, rules: FilmRules, version: int | None
+) -> str | None:
+    if current.assessment is None or not current.is_current:
+        return current.quality.reason.value
+    if news is None:
+        return "waiting_for_data"
+    if current.assessment.time_ns - news.reading.time_ns > CURRENT_PERIODS * rules.reading_ns:
+        return "stale"
+    return None if news.findings[0].baseline_version == version else "baseline_changed"
+
+
+def _next_reading(seen: WatchedFilm) -> str | None:
+    """Return the start of the first reading slot after the newest result."""
+    newest, period_ns = seen.current.assessment, seen.rules.reading_ns
+    if newest is None or not seen.current.is_current:
+        return None
+    return rfc3339((newest.time_ns // period_ns + 1) * period_ns)
+
+
+def _condition(seen: WatchedFilm) -> FilmConditionModel | None:
+    newest = seen.current.assessment
+    if newest is None or newest.condition is None or not seen.current.is_current:
+        return None
+    return condition_model(newest.time_ns, newest.condition, seen.rules.grid)
+
+
+def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionModel]:
+    if seen.news is None or seen.why_not_current is not None:
+        levels = [f.level for f in seen.news.findings] if seen.news else [None, None]
+        x, y = (_unread(seen.why_not_current or "", level_name(level)) for level in levels)
+        return x, y
+    x, y = (_direction(seen, seen.news, row) for row in range(len(DIRECTIONS)))
+    return x, y
+
+
+def _unread(reason: str, level: LevelHeldName | None) -> FilmDirectionModel:
+    """Return the state without a current reading: only the level in force."""
+    return FilmDirectionModel(
+        verdict="no_reading",
+        reason=reason,
+        level=level,
+        change=None,
+        deviation=None,
+        stiffness_n_per_m=None,
+        cause=None,
+    )
+
+
+def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionModel:
+    finding, ln_k = news.findings[row], news.reading.values[row].ln_k
+    attribution = finding.attribution
+    return FilmDirectionModel(
+        verdict=verdict_name(finding.verdict),
+        reason=_reason(seen, news.reading, finding, row),
+        level=level_name(finding.level),
+        change=_change(finding, news.decisions[row], seen.rules),
+        deviation=_deviation(finding),
+        stiffness_n_per_m=None if math.isnan(ln_k) else math.exp(ln_k),
+        cause=FilmCauseModel(
+            cause=attribution.cause.value,
+            reason=attribution.reason,
+            film_share=attribution.film_share,
+            film_share_std=attribution.film_share_std,
+        )
+        if attribution
+        else None,
+    )
+
+
+def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: int) -> str:
+    match finding.verdict:
+        case Verdict.NO_BASELINE:
+            learned = (
+                seen.baseline.of(Watched.STIFFNESS, DIRECTIONS[row]) if seen.baseline else None
+            )
+            return NONE_IN_FORCE if learned is None else _unseen(learned, reading)
+        case Verdict.TRANSIENT:
+            return "not_settled"
+        case _:
+            return reading.values[row].reason.value
+
+
+def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
+    """Return what was not learned: the cell, or only the attitude angle within it."""
+    here = FilmConditions.one(
+        reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
+    )
+    is_seen = learned.table.find(learned.grid.cells(here))[0] >= 0
+    return ATTITUDE_NOT_LEARNED if is_seen else NOT_LEARNED
+
+
+def _change(finding: FilmFinding, decision: Decision, rules: FilmRules) -> FilmChangeModel | None:
+    change, std, time_scale_h = finding.change, finding.change_std, finding.time_scale_h
+    if change is None or std is None or time_scale_h is None:
+        return None
+    low, high = interval_percent(change, std)
+    counted_ns = decision.last_counted_ns
+    return FilmChangeModel(
+        percent=percent_of(change),
+        low_95=low,
+        high_95=high,
+        ln=change,
+        ln_std=std,
+        time_scale_h=time_scale_h,
+        significance=abs(change) / std,
+        significance_wanted=rules.change.significance_threshold(time_scale_h),
+        as_of=None if counted_ns is None else rfc3339(round(counted_ns / rules.time_lapse)),
+    )
+
+
+def _deviation(finding: FilmFinding) -> FilmDeviationModel | None:
+    if finding.deviation is None or finding.deviation_std is None:
+        return None
+    low, high = interval_percent(finding.deviation, finding.deviation_std)
+    return FilmDeviationModel(percent=percent_of(finding.deviation), low_95=low, high_95=high)
+
+
+def percent_of(ln: float) -> float:
+    """Return the relative change, %, for a change in ln."""
+    return 100.0 * math.expm1(ln)
+
+
+def interval_percent(ln: float, std: float) -> tuple[float, float]:
+    """Return the 95 % interval of a change in ln, %."""
+    return percent_of(ln - NORMAL_95 * std), percent_of(ln + NORMAL_95 * std)
+
+
+def verdict_name(verdict: Verdict) -> VerdictName:
+    """Return the name of a verdict."""
+    return cast("VerdictName", verdict.name.lower())
+
+
+def level_name(level: int | None) -> LevelHeldName | None:
+    """Return the name of a level."""
+    return None if level is None else cast("LevelHeldName", Verdict(int(level)).name.lower())
+
+
+def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
+    """Return a watched bearing; raise a problem of status 404 or 409 otherwise."""
+    context.bearing(unit, bearing)
+    place = context.films.place(unit, bearing)
+    if place is None:
+        detail = f"the film of unit {unit} bearing {bearing} is not watched: "
+        raise ProblemError(409, "Not watched", f"{detail}{why_unwatched(context, unit, bearing)}")
+    return place
+
+
+def film_router(context: Context) -> APIRouter:
+    """Return the route of the film now."""
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings/{bearing}/film",
+        tags=["film"],
+        dependencies=[needs(Permission.READ)],
+    )
+
+    @router.get(
+        "", summary="A film now", response_model=FilmModel, responses=problem_responses(404)
+    )
+    async def film(unit: UnitId, bearing: BearingId) -> Response:
+        """Show verdict, change with its uncertainty, cause and condition, by direction.
+
+        A film that cannot be judged is never reported as normal: the verdict says why not.
+        """
+        context.bearing(unit, bearing)
+        return await rendered(lambda: film_model(context, unit, bearing))
+
+    return router

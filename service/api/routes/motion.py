@@ -1,0 +1,406 @@
+"""Motion of a shaft in its bearing, sample by sample."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from fastapi import APIRouter, Query, Response
+from pydantic import Field
+
+from acquisition.errors import ConfigError
+from core.arrays import FloatArray
+from core.machine.unit import Bearing
+from core.monitor.assessment import OrbitTrace
+from core.samples.blocks import SampleBlock
+from service.api.answers import Renderings, rendered, worked
+from service.api.auth.declared import needs
+from service.api.context import BearingId, Context, UnitId
+from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.routes.bearings import no_result
+from service.api.routes.recordings import (
+    RecordingId,
+    damaged_recording,
+    shelf_of,
+    unknown_recording,
+)
+from service.api.values import ApiModel, Time, listed
+from service.live.live_view import HELD_S
+from service.live.samples import newest_of, stretch_of
+from service.recordings.library import Kept
+from service.recordings.motion import (
+    NoMotionError,
+    Order1,
+    ShaftMotion,
+    channels_for,
+    motion_of,
+    recorded_motion,
+)
+from service.runtime.times import rfc3339
+from service.settings.core_values import machine_of
+from service.settings.sources.devices import ModbusVectorSettings
+from service.settings.units import UnitSettings
+from service.store.access.identities import Permission
+
+
+class EllipseModel(ApiModel):
+    """Orbit at running speed, in the middle of the samples."""
+
+    major_um_pk: float
+    """Semi-major axis."""
+
+    minor_um_pk: float
+    """Semi-minor axis."""
+
+    angle_deg: float
+    """Angle of the major axis from x towards y, -90 to 90."""
+
+    sense: Literal["x_to_y", "y_to_x", "straight"]
+    """Sense of rotation on the orbit."""
+
+
+class MotionOrder1Model(ApiModel):
+    """Motion at running speed, from a taper of eight turns around each sample."""
+
+    frequency_hz: float
+    """Running speed."""
+
+    shaft_x_um: list[float | None]
+    """Displacement in x; null with too few samples around it."""
+
+    shaft_y_um: list[float | None]
+    """Displacement in y, likewise."""
+
+    ellipse: EllipseModel
+    """Orbit."""
+
+
+class MotionModel(ApiModel):
+    """Motion of a shaft relative to its bearing, at the full sampling rate."""
+
+    unit: str
+    """Identifier of the unit."""
+
+    bearing: str
+    """Identifier of the bearing."""
+
+    recording: Annotated[str | None, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]
+    """Name of the recording; null for the newest samples."""
+
+    start: Time
+    """Time of the first sample."""
+
+    offset_s: float | None
+    """From the first sample of the recording to the first of these; null for the newest samples."""
+
+    total_s: float | None
+    """Length of the recording with its gaps, s; null for the newest samples."""
+
+    age_s: float | None
+    """Age of the newest samples, s; null for a recording."""
+
+    epoch: int
+    """Changes when the device restarts its count."""
+
+    first_index: int
+    """Index of the first sample."""
+
+    rate_hz: float
+    """Samples per second."""
+
+    n_samples: int
+    """Samples in each direction."""
+
+    shaft_x_um: list[float | None]
+    """Displacement in x, mean removed; null where a sample is missing or bad."""
+
+    shaft_y_um: list[float | None]
+    """Displacement in y, likewise."""
+
+    centre_um: Annotated[list[float] | None, Field(examples=[[-12.5, -61.0]])]
+    """Mean position [x, y] in the clearance circle, by the reference now in force; null if the gaps
+    do not determine it."""
+
+    clearance_um: float
+    """Radius of the clearance circle."""
+
+    speed_rpm: float | None
+    """Running speed, r/min, from the key-phase, else from the slow channel."""
+
+    order1: MotionOrder1Model | None
+    """Motion at running speed; null without a speed, or with too few samples."""
+
+    mark: list[float] | None
+    """Passages of the key-phase mark, in samples from the first, interpolated; null for a unit
+    without a key-phase."""
+
+
+class OrbitModel(ApiModel):
+    """The newest turns of the shaft relative to its bearing, means removed."""
+
+    time: Time
+    """Time of the first sample."""
+
+    rate_hz: float
+    """Samples per second."""
+
+    duration_s: float
+    """Length."""
+
+    shaft_x_um: list[float]
+    """Displacement in x."""
+
+    shaft_y_um: list[float]
+    """Displacement in y."""
+
+
+DECIMALS = 3
+"""Decimals of samples in µm; finer than a tenth of a count."""
+
+SENSES: dict[int, Literal["x_to_y", "y_to_x", "straight"]] = {
+    1: "x_to_y",
+    -1: "y_to_x",
+    0: "straight",
+}
+
+
+@dataclass(frozen=True)
+class MotionOrigin:
+    """Origin of samples: memory, with their age, or a recording."""
+
+    age_s: float | None = None
+    recording: str | None = None
+    offset_s: float | None = None
+    total_s: float | None = None
+
+
+def motion_model(
+    unit: str, bearing: Bearing, motion: ShaftMotion, origin: MotionOrigin
+) -> MotionModel:
+    """Return the model of a motion and its origin."""
+    stretch, marks = motion.stretch, motion.marks
+    return MotionModel(
+        unit=unit,
+        bearing=bearing.id,
+        recording=origin.recording,
+        start=rfc3339(stretch.start_ns),
+        offset_s=origin.offset_s,
+        total_s=origin.total_s,
+        age_s=origin.age_s,
+        epoch=stretch.epoch,
+        first_index=stretch.first_index,
+        rate_hz=stretch.rate_hz,
+        n_samples=motion.x_um.size,
+        shaft_x_um=_rounded(motion.x_um),
+        shaft_y_um=_rounded(motion.y_um),
+        centre_um=None if motion.centre_um is None else list(motion.centre_um),
+        clearance_um=bearing.clearance_um,
+        speed_rpm=motion.speed_rpm,
+        order1=None if motion.order1 is None else _order1(motion.order1),
+        mark=None if marks is None else np.round(marks, DECIMALS).tolist(),
+    )
+
+
+def _order1(found: Order1) -> MotionOrder1Model:
+    ellipse = found.ellipse
+    return MotionOrder1Model(
+        frequency_hz=found.frequency_hz,
+        shaft_x_um=_rounded(found.x_um),
+        shaft_y_um=_rounded(found.y_um),
+        ellipse=EllipseModel(
+            major_um_pk=ellipse.major_um_pk,
+            minor_um_pk=ellipse.minor_um_pk,
+            angle_deg=ellipse.angle_deg,
+            sense=SENSES[ellipse.sense],
+        ),
+    )
+
+
+def _rounded(values_um: FloatArray) -> list[float | None]:
+    return listed(np.round(values_um, DECIMALS))
+
+
+def orbit_model(orbit: OrbitTrace) -> OrbitModel:
+    """Return the model of an orbit."""
+    return OrbitModel(
+        time=rfc3339(orbit.start_ns),
+        rate_hz=orbit.rate_hz,
+        duration_s=orbit.shaft_x_um.size / orbit.rate_hz,
+        shaft_x_um=orbit.shaft_x_um.tolist(),
+        shaft_y_um=orbit.shaft_y_um.tolist(),
+    )
+
+
+MAX_SAMPLES = 60_000
+"""Maximum number of samples of each direction in one answer: 100 s at 600 Hz, 2 MB."""
+
+MAX_SECONDS = 600.0
+
+LIVE_PROBLEMS = described_problems(
+    {404: "Unknown unit or bearing", 409: "There are no samples", 422: "A wrong parameter"}
+)
+RECORDING_PROBLEMS = described_problems(
+    {
+        404: "Unknown recording or bearing",
+        409: "It has no samples of that bearing, or none at that time",
+        422: "A wrong parameter",
+        410: "Damaged on the disk",
+    }
+)
+
+
+def motion_router(context: Context) -> APIRouter:
+    """Return the routes of the newest motion."""
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}/bearings",
+        tags=["bearing"],
+        dependencies=[needs(Permission.READ)],
+    )
+    orbits = Renderings()
+
+    @router.get(
+        "/{bearing}/orbit",
+        summary="Orbit",
+        response_model=OrbitModel,
+        responses=problem_responses(404, 409),
+    )
+    async def orbit(unit: UnitId, bearing: BearingId) -> Response:
+        """Return the newest turns of the shaft relative to the bearing."""
+        context.bearing(unit, bearing)
+        assessment = context.live.assessment(unit, bearing)
+        if assessment is None or assessment.orbit is None:
+            raise no_result(unit, bearing)
+        return await orbits.of((unit, bearing), assessment.orbit, orbit_model)
+
+    @router.get(
+        "/{bearing}/motion",
+        summary="Motion of the shaft",
+        responses=LIVE_PROBLEMS,
+        response_model=MotionModel,
+    )
+    async def motion(
+        unit: UnitId,
+        bearing: BearingId,
+        seconds: Annotated[
+            float,
+            Query(
+                gt=0.0,
+                le=HELD_S,
+                allow_inf_nan=False,
+                description="Duration of the newest samples; limited to those in memory.",
+                examples=[5.0],
+            ),
+        ] = 5.0,
+    ) -> Response:
+        """Return the newest motion of a shaft in its bearing: all of it, and 1× alone."""
+        context.bearing(unit, bearing)
+        settings, watched = context.unit(unit), context.references.bearing(unit, bearing)
+        if isinstance(settings.source, ModbusVectorSettings):
+            detail = f"unit {unit!r} is read from a rack that gives amplitudes, not samples"
+            raise ProblemError(409, "No samples", detail)
+        blocks, age_s = context.live.blocks(unit), context.live.data_age_s(unit)
+        if not blocks or age_s is None:
+            raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")
+        _require_few(seconds, blocks[-1].rate_hz)
+        origin = MotionOrigin(age_s=age_s)
+        return await rendered(lambda: _newest(settings, watched, blocks, seconds, origin))
+
+    return router
+
+
+def recorded_motion_router(context: Context) -> APIRouter:
+    """Return the route of the motion in recordings."""
+    router = APIRouter(
+        prefix="/api/v1/recordings", tags=["recordings"], dependencies=[needs(Permission.READ)]
+    )
+
+    @router.get(
+        "/{recording}/motion",
+        summary="Motion of the shaft in a recording",
+        responses=RECORDING_PROBLEMS,
+        response_model=MotionModel,
+    )
+    async def motion(
+        recording: RecordingId,
+        bearing: Annotated[
+            str, Query(max_length=32, description="Identifier of the bearing.", examples=["UJB"])
+        ],
+        start_s: Annotated[
+            float,
+            Query(
+                ge=0.0,
+                le=1e7,
+                allow_inf_nan=False,
+                description="Start, seconds from the first sample of the recording.",
+                examples=[30.0],
+            ),
+        ] = 0.0,
+        seconds: Annotated[
+            float,
+            Query(gt=0.0, le=MAX_SECONDS, allow_inf_nan=False, description="Duration."),
+        ] = 10.0,
+    ) -> Response:
+        """Return the motion of a shaft in its bearing at a time of a recording.
+
+        The calibration of the recording applies. The answer ends before a restart of the device.
+        """
+        kept = await worked(lambda: shelf_of(context).one(recording))
+        if kept is None:
+            raise unknown_recording(recording)
+        unit = _unit_of(context, kept)
+        context.bearing(unit, bearing)
+        watched = context.references.bearing(unit, bearing)
+        if kept.manifest is not None:
+            _require_few(seconds, kept.manifest.rate_hz)
+        try:
+            return await rendered(lambda: _recorded(context, kept.name, watched, start_s, seconds))
+        except NoMotionError as error:
+            detail = f"recording {recording}: {error}"
+            raise ProblemError(409, "No samples", detail) from error
+        except ConfigError as error:
+            raise damaged_recording(recording, error) from error
+
+    return router
+
+
+def _newest(
+    settings: UnitSettings,
+    bearing: Bearing,
+    blocks: Sequence[SampleBlock],
+    seconds: float,
+    origin: MotionOrigin,
+) -> MotionModel:
+    machine = machine_of(settings)
+    ids = [channel.id for channel in machine.channels]
+    rows = {id_: ids.index(id_) for id_ in channels_for(machine, bearing)}
+    held, first_index, n_samples = newest_of(blocks, seconds)
+    found = motion_of(stretch_of(held, rows, first_index, n_samples), machine, bearing)
+    return motion_model(settings.id, bearing, found, origin)
+
+
+def _recorded(
+    context: Context, name: str, bearing: Bearing, start_s: float, seconds: float
+) -> MotionModel:
+    recording = shelf_of(context).opened(name)
+    unit = recording.manifest.unit
+    machine = machine_of(context.unit(unit))
+    found = recorded_motion(recording, machine, bearing, start_s, seconds)
+    origin = MotionOrigin(recording=name, offset_s=found.offset_s, total_s=found.total_s)
+    return motion_model(unit, bearing, found.motion, origin)
+
+
+def _unit_of(context: Context, kept: Kept) -> str:
+    if kept.manifest is None:
+        raise damaged_recording(kept.name, ConfigError(kept.fault or "no manifest"))
+    if kept.manifest.unit not in context.units:
+        detail = (
+            f"recording {kept.name} is of unit {kept.manifest.unit!r}, which is not in this plant"
+        )
+        raise ProblemError(409, "No samples", detail)
+    return kept.manifest.unit
+
+
+def _require_few(seconds: float, rate_hz: float) -> None:
+    if seconds * rate_hz > MAX_SAMPLES:
+        detail = f"{seconds:g} s are too long; at most {MAX_SAMPLES / rate_hz:g} s"
+        raise ProblemError(422, "Wrong parameter", detail, "seconds")

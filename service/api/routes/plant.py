@@ -1,0 +1,389 @@
+"""Units, their sources and gaps, the configuration, the catalogue of quantities."""
+
+import asyncio
+import json
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Response
+from pydantic import Field
+
+from core.monitor.catalogue import CATALOGUE
+from core.samples.gaps import Gap
+from core.units import ns_from_s
+from service.api.auth.declared import Reach, needs
+from service.api.context import Context, LiveLook, UnitId
+from service.api.parameters import TimeRange
+from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.values import ApiModel, Time
+from service.live.live_view import UnitStatus
+from service.runtime.metrics import Seen
+from service.runtime.times import rfc3339
+from service.settings.loading import plant_file_schema
+from service.settings.units import UnitSettings
+from service.store.access.identities import Permission
+
+
+class DeviceClockModel(ApiModel):
+    """Clock of the device compared with the host's."""
+
+    offset_s: float | None
+    """Lead of the device's time stamps over the host's clock, s; null if it sends none."""
+
+    drift_ppm: float | None
+    """Deviation of the sampling rate from nominal by the host's clock, in parts per million; null
+    during the first minute, and for a device that samples on request."""
+
+    drift_uncertainty_ppm: float | None
+    """Standard uncertainty of the drift."""
+
+    n_stamp_faults: int
+    """Blocks whose own time stamp did not fit the sample index and was not used."""
+
+    stamp_fault: Literal["stamp_regressed", "stamp_repeated", "stamp_jumped"] | None
+    """Fault of the newest time stamp."""
+
+
+class SourceModel(ApiModel):
+    """State of the source of a unit, and account of its samples."""
+
+    state: Literal["connecting", "connected", "not_connected", "ended"]
+    """State of the link; only a recording ends."""
+
+    reason: str | None
+    """Reason, if samples do not arrive."""
+
+    since: Time | None
+    """Start of this state."""
+
+    data_age_s: float | None
+    """Age of the newest sample, s."""
+
+    last_sample_time: Time | None
+    """Time of that sample by the device's clock."""
+
+    n_offered: int
+    """Samples per channel counted by the device: stored + flagged + gap + rejected."""
+
+    n_stored: int
+    """Accepted, all channels good."""
+
+    n_flagged: int
+    """Accepted, some channel not good."""
+
+    n_gap: int
+    """Never arrived."""
+
+    n_repeated: int
+    """Repeated and dropped."""
+
+    n_restarts: int
+    """Restarts of the count of the device."""
+
+    rejected: dict[str, int]
+    """Rejected, by reason."""
+
+    clock: DeviceClockModel | None
+    """Clock of the device; null if it cannot be compared with the host's."""
+
+
+SourceKind = Literal[
+    "modbus_ring", "modbus_fifo", "modbus_polled", "modbus_vector", "can", "simulated"
+]
+
+
+class PollsModel(ApiModel):
+    """Duration of polls, including decoding."""
+
+    n: int
+    """Number of answered polls since the service started."""
+
+    newest_s: Annotated[float, Field(examples=[0.012])]
+    """Duration of the newest poll, s."""
+
+    mean_s: Annotated[float, Field(examples=[0.011])]
+    """Mean duration, s."""
+
+
+class SourceHealthModel(SourceModel):
+    """Source of a unit: kind, state, and account of its samples."""
+
+    unit: Annotated[str, Field(examples=["U1"])]
+    """Identifier of the unit."""
+
+    kind: SourceKind
+    """Kind of source."""
+
+    n_failed: int
+    """Failed connections and lost links since the service started."""
+
+    rate_hz: float
+    """Samples per second and channel."""
+
+    poll_period_s: float | None
+    """Poll period, s; null for a device that sends by itself."""
+
+    polls: PollsModel | None
+    """Duration of polls; null for a device that sends by itself, and before the second poll."""
+
+    refused_frames: Annotated[dict[str, int], Field(examples=[{"duplicate": 2}])]
+    """CAN frames rejected since the service started, by reason."""
+
+
+def source_model(live: LiveLook, unit: str) -> SourceModel:
+    """Return the state of the source of a unit."""
+    status = live.status(unit)
+    account = status.account
+    last = status.last_sample_ns
+    return SourceModel(
+        state=status.state.value,
+        reason=status.reason,
+        since=None if status.since_ns is None else rfc3339(status.since_ns),
+        data_age_s=live.data_age_s(unit),
+        last_sample_time=None if last is None else rfc3339(last),
+        n_offered=account.n_offered,
+        n_stored=account.n_stored,
+        n_flagged=account.n_flagged,
+        n_gap=account.n_gap,
+        n_repeated=account.n_repeated,
+        n_restarts=account.n_restarts,
+        rejected=dict(account.rejected),
+        clock=_clock_model(status),
+    )
+
+
+def _clock_model(status: UnitStatus) -> DeviceClockModel | None:
+    if status.clock is None:
+        return None
+    return DeviceClockModel(
+        offset_s=status.clock.offset_s,
+        drift_ppm=status.clock.drift_ppm,
+        drift_uncertainty_ppm=status.clock.u_drift_ppm,
+        n_stamp_faults=status.clock.n_faults,
+        stamp_fault=None if status.stamp_fault is None else status.stamp_fault.value,
+    )
+
+
+class GapModel(ApiModel):
+    """Samples that were not delivered, or not received while the service was stopped."""
+
+    epoch: int
+    """Epoch of the count of the device."""
+
+    first_index: int
+    """Index of the first missing sample."""
+
+    n_samples: int
+    """Number of missing samples per channel."""
+
+    start: Time
+    """Time of the first missing sample."""
+
+    end: Time
+    """Time of the first sample after the gap."""
+
+    is_estimated: bool
+    """Whether the device restarted its count in the gap: `n_samples` is then estimated from the
+    times, and otherwise exact."""
+
+
+class UnitModel(ApiModel):
+    """A unit and the state of its source."""
+
+    id: str
+    """Stable identifier."""
+
+    name: str
+    """Display name."""
+
+    rated_speed_rpm: float
+    """Rated running speed."""
+
+    bearing_ids: list[str]
+    """Identifiers of its guide bearings."""
+
+    source: SourceModel
+    """State of its source."""
+
+
+class QuantityModel(ApiModel):
+    """A quantity that trends can be asked for."""
+
+    name: str
+    """Name in readings and trends."""
+
+    unit: str
+    """Unit and detector."""
+
+    label: str
+    """Description in words."""
+
+
+def plant_router(context: Context) -> APIRouter:
+    """Return the routes of units and quantities."""
+    router = APIRouter(prefix="/api/v1", tags=["plant"], dependencies=[needs(Permission.READ)])
+
+    @router.get("/units", summary="All units")
+    async def units() -> list[UnitModel]:
+        """List all units with the state of their sources."""
+        return [_unit(context, unit) for unit in context.units]
+
+    @router.get("/units/{unit}", summary="One unit", responses=problem_responses(404))
+    async def one_unit(unit: UnitId) -> UnitModel:
+        """A unit and the state of its source."""
+        return _unit(context, context.unit(unit).id)
+
+    @router.get(
+        "/quantities",
+        summary="The catalogue of quantities",
+        dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
+    )
+    async def quantities() -> list[QuantityModel]:
+        """List name, unit and meaning of all quantities of a bearing."""
+        return [QuantityModel(name=q.name, unit=q.unit, label=q.label) for q in CATALOGUE]
+
+    return router
+
+
+def _unit(context: Context, unit: str) -> UnitModel:
+    settings = context.units[unit]
+    return UnitModel(
+        id=unit,
+        name=settings.name,
+        rated_speed_rpm=settings.rated_speed_rpm,
+        bearing_ids=[bearing.id for bearing in settings.bearing],
+        source=source_model(context.live, unit),
+    )
+
+
+def source_router(context: Context) -> APIRouter:
+    """Return the route of sources."""
+    router = APIRouter(
+        prefix="/api/v1/sources", tags=["plant"], dependencies=[needs(Permission.READ)]
+    )
+
+    @router.get("", summary="Health of each source")
+    async def sources() -> list[SourceHealthModel]:
+        """List state and reason, failed attempts, account of samples, and device clock."""
+        return [_health(context, unit) for unit in context.units.values()]
+
+    return router
+
+
+def _health(context: Context, settings: UnitSettings) -> SourceHealthModel:
+    arriving, source = source_model(context.live, settings.id), context.sources.get(settings.id)
+    return SourceHealthModel(
+        **arriving.model_dump(),
+        unit=settings.id,
+        kind=settings.source.kind,
+        n_failed=context.live.status(settings.id).n_failed,
+        rate_hz=settings.sampling_hz,
+        poll_period_s=getattr(settings.source, "poll_period_s", None),
+        polls=None if source is None else _polls(source.polls.seen()),
+        refused_frames={} if source is None else dict(source.refused_frames),
+    )
+
+
+def _polls(seen: Seen) -> PollsModel | None:
+    if seen.newest_s is None:
+        return None
+    n_polls = seen.n_up_to[-1]
+    return PollsModel(n=n_polls, newest_s=seen.newest_s, mean_s=seen.sum_s / n_polls)
+
+
+def gap_router(context: Context) -> APIRouter:
+    """Return the route of gaps."""
+    router = APIRouter(
+        prefix="/api/v1/units/{unit}", tags=["plant"], dependencies=[needs(Permission.READ)]
+    )
+
+    @router.get("/gaps", summary="Gaps", responses=problem_responses(404, 422, 503))
+    async def gaps(unit: UnitId, times: TimeRange) -> list[GapModel]:
+        """List gaps in the samples of a unit, including stops of the service, by their end."""
+        found = await asyncio.to_thread(context.store.gaps, context.unit(unit).id, *times)
+        rate_hz = context.unit(unit).sampling_hz
+        return [_gap_model(gap, rate_hz) for gap in found]
+
+    return router
+
+
+def _gap_model(gap: Gap, rate_hz: float) -> GapModel:
+    start_ns = gap.start_ns
+    if start_ns is None:
+        start_ns = gap.stop_ns - ns_from_s(gap.n_samples / rate_hz)
+    return GapModel(
+        epoch=gap.epoch,
+        first_index=gap.first_index,
+        n_samples=gap.n_samples,
+        start=rfc3339(start_ns),
+        end=rfc3339(gap.stop_ns),
+        is_estimated=gap.is_estimated,
+    )
+
+
+class ConfigurationModel(ApiModel):
+    """Plant file as read, with defaults, without secrets."""
+
+    version: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", examples=["9f86d081" * 8])]
+    """SHA-256 of the configuration; evidence of alarms refers to it."""
+
+    padwatch: Annotated[str, Field(examples=["0.1.0"])]
+    """Version of the program."""
+
+    commit: str | None
+    """Commit that it was built from; null if unknown."""
+
+    json_schema: Annotated[str, Field(examples=["/api/v1/configuration/schema"])]
+    """Path of the JSON schema with meaning, limits and default of every key."""
+
+    settings: dict[str, Any]
+    """All settings, by the keys of the plant file."""
+
+
+SCHEMA = "/api/v1/configuration/schema"
+
+SCHEMA_TYPE = "application/schema+json"
+
+ABSENT = described_problems({404: "The service keeps no configuration"})
+
+
+def configuration_router(context: Context) -> APIRouter:
+    """Return the routes of the configuration."""
+    router = APIRouter(
+        prefix="/api/v1/configuration", tags=["plant"], dependencies=[needs(Permission.READ)]
+    )
+
+    @router.get("", summary="Configuration", responses=ABSENT)
+    async def configuration() -> ConfigurationModel:
+        """Show the plant file as read when the service started, without secrets.
+
+        Evidence of alarms refers to its version.
+        """
+        if context.configuration is None:
+            raise ProblemError(404, "No configuration", "no configuration is kept here")
+        found = context.configuration
+        document = json.loads(found.text)
+        return ConfigurationModel(
+            version=found.version,
+            padwatch=document["padwatch"],
+            commit=document["commit"],
+            json_schema=SCHEMA,
+            settings=document["settings"],
+        )
+
+    @router.get(
+        "/schema",
+        dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
+        summary="JSON schema of plant files",
+        response_class=Response,
+        responses={200: _schema_content()},
+    )
+    async def schema() -> Response:
+        """Return meaning, limits and default of every key of a plant file as a JSON schema."""
+        return Response(json.dumps(plant_file_schema()), media_type=SCHEMA_TYPE)
+
+    return router
+
+
+def _schema_content() -> dict[str, Any]:
+    schema = {"type": "object", "examples": [{"title": "PlantFile", "type": "object"}]}
+    return {"description": "A JSON schema", "content": {SCHEMA_TYPE: {"schema": schema}}}

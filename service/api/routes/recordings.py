@@ -1,0 +1,377 @@
+"""Recordings of samples: list, description, download."""
+
+from collections.abc import Callable, Generator
+from typing import Annotated, Any, Literal
+
+import structlog
+from fastapi import APIRouter, Path, Query, Response
+from fastapi.responses import StreamingResponse
+from pydantic import Field
+
+from acquisition.errors import ConfigError
+from service.api.answers import rendered, worked
+from service.api.auth.declared import needs
+from service.api.context import Context
+from service.api.downloads import TooManyDownloadsError
+from service.api.problems import ProblemError, described_problems
+from service.api.routes.channels import UNITS, ChannelUnit
+from service.api.values import ApiModel, Time
+from service.recordings.library import Kept, Shelf
+from service.runtime.times import rfc3339
+from service.store.access.identities import Permission
+from service.store.waveform_port import WaveformKind
+
+
+class RecordingAlarmModel(ApiModel):
+    """Event of an alarm that a recording was made for."""
+
+    alarm: Annotated[str, Field(examples=["U1:UJB:shaft_x"])]
+    """Identifier of the alarm."""
+
+    occurrence: int
+    """Occurrence of the alarm."""
+
+    change: Annotated[str, Field(examples=["raised"])]
+    """Kind of event."""
+
+    level: str | None
+    """Level of the alarm at that time."""
+
+    time: Time
+    """Time of the event."""
+
+
+class RunningRecordingModel(ApiModel):
+    """An occurrence of an alarm whose samples are still being written."""
+
+    alarm: Annotated[str, Field(examples=["U1:UJB:shaft_x"])]
+    """Identifier of the alarm."""
+
+    occurrence: int
+    """Occurrence of the alarm."""
+
+
+class RecordingModel(ApiModel):
+    """A finished recording."""
+
+    id: Annotated[str, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]
+    """Name of the recording."""
+
+    kind: Literal["capture", "continuous"]
+    """Samples around an alarm, or part of a continuous recording."""
+
+    state: Literal["complete", "damaged"]
+    """State by its manifest and the newest check."""
+
+    reason: str | None
+    """Why it is damaged; null if it is complete."""
+
+    unit: str | None
+    """Unit; null, like the other fields from the manifest, if that cannot be read."""
+
+    start: Time | None
+    """Time of the first sample."""
+
+    duration_s: float | None
+    """Length without gaps, s."""
+
+    rate_hz: float | None
+    """Samples per second and channel."""
+
+    n_samples: int | None
+    """Samples of each channel."""
+
+    n_bytes: int
+    """Size of all its files, bytes."""
+
+    alarms: list[RecordingAlarmModel]
+    """Events it was made for, the first started it; empty for a continuous recording."""
+
+
+class RecordingsModel(ApiModel):
+    """Recordings of samples around alarms, and continuous recordings."""
+
+    recordings: list[RecordingModel]
+    """Finished recordings, newest first."""
+
+    being_made: list[RunningRecordingModel]
+    """Recordings in progress."""
+
+    error: str | None
+    """Why samples around alarms are not recorded now; null if they are."""
+
+    continuous: list[str]
+    """Units recorded continuously."""
+
+    continuous_error: str | None
+    """Why continuous recording fails now; null if it does not."""
+
+
+class RecordedChannelModel(ApiModel):
+    """A recorded waveform channel."""
+
+    id: str
+    """Identifier within the unit."""
+
+    unit: ChannelUnit
+    """Engineering unit."""
+
+    n_not_ok: int
+    """Samples in blocks that the device flagged as not OK."""
+
+
+class RecordedSlowModel(ApiModel):
+    """A recorded slow channel."""
+
+    id: str
+    """Identifier within the unit."""
+
+    unit: str
+    """Unit of its readings."""
+
+
+class RecordedFileModel(ApiModel):
+    """A file of a recording."""
+
+    size: int
+    """Size, bytes."""
+
+    sha256: str
+    """SHA-256 checksum."""
+
+
+class RecordingInfoModel(ApiModel):
+    """Description of a recording after a full check."""
+
+    recording: RecordingModel
+    """Entry of the list."""
+
+    made_by: str
+    """Program and purpose."""
+
+    sample_type: Literal["int16", "float32"]
+    """Counts of the converter, or engineering units."""
+
+    end: Time
+    """Time of the first sample after the last."""
+
+    n_gaps: int
+    """Gaps in the samples."""
+
+    n_gap_samples: int
+    """Missing samples per channel."""
+
+    rejected: dict[str, int]
+    """Rejected samples, by reason."""
+
+    epochs: list[int]
+    """Epochs; more than one if the device restarted its count."""
+
+    channels: list[RecordedChannelModel]
+    """Waveform channels in the order of the columns."""
+
+    slow_channels: list[RecordedSlowModel]
+    """Slow channels, likewise."""
+
+    files: dict[str, RecordedFileModel]
+    """Files, except the manifest and the alarms."""
+
+
+def recording_model(kept: Kept) -> RecordingModel:
+    """Return the entry of a recording in the list."""
+    manifest = kept.manifest
+    return RecordingModel(
+        id=kept.name,
+        kind=kept.kind.value,
+        state="complete" if kept.fault is None else "damaged",
+        reason=kept.fault,
+        unit=None if manifest is None else manifest.unit,
+        start=None if manifest is None else manifest.start,
+        duration_s=None if manifest is None else manifest.n_samples / manifest.rate_hz,
+        rate_hz=None if manifest is None else manifest.rate_hz,
+        n_samples=None if manifest is None else manifest.n_samples,
+        n_bytes=kept.n_bytes,
+        alarms=[RecordingAlarmModel(**each) for each in kept.alarms],
+    )
+
+
+def recording_info(shelf: Shelf, kept: Kept) -> RecordingInfoModel:
+    """Return the description of a recording.
+
+    Raises
+    ------
+    ConfigError
+        If the recording is damaged.
+    """
+    manifest = kept.manifest
+    if manifest is None or kept.fault is not None:
+        raise ConfigError(kept.fault or "its manifest cannot be read")
+    summary = shelf.summary(kept.name)
+    return RecordingInfoModel(
+        recording=recording_model(kept),
+        made_by=manifest.made_by,
+        sample_type=manifest.sample_type,
+        end=rfc3339(summary.stop_ns),
+        n_gaps=summary.n_gaps,
+        n_gap_samples=summary.n_gap_samples,
+        rejected=dict(summary.rejected),
+        epochs=list(summary.epochs),
+        channels=[
+            RecordedChannelModel(
+                id=each.id, unit=UNITS[each.measurand], n_not_ok=summary.n_not_ok.get(each.id, 0)
+            )
+            for each in manifest.channels
+        ],
+        slow_channels=[RecordedSlowModel(id=e.id, unit=e.unit) for e in manifest.slow_channels],
+        files={
+            name: RecordedFileModel(size=file.size, sha256=file.sha256)
+            for name, file in manifest.files.items()
+        },
+    )
+
+
+RecordingId = Annotated[
+    str,
+    Path(
+        pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,119}$",
+        description="Name of a recording.",
+        examples=["U1-20261121T090312.400Z-shaft_x"],
+    ),
+]
+
+LIST_PROBLEMS = described_problems({404: "No recordings are kept here", 422: "A wrong parameter"})
+
+PROBLEMS = described_problems(
+    {
+        404: "Unknown recording",
+        422: "A wrong parameter",
+        410: "Damaged on the disk",
+        503: "Too many concurrent downloads",
+    }
+)
+
+Pieces = Generator[bytes, None, None]
+
+log = structlog.get_logger()
+
+
+def recording_router(context: Context) -> APIRouter:
+    """Return the routes of recordings."""
+    router = APIRouter(
+        prefix="/api/v1/recordings", tags=["recordings"], dependencies=[needs(Permission.READ)]
+    )
+
+    @router.get("", summary="Recordings", responses=LIST_PROBLEMS)
+    async def recordings(
+        unit: Annotated[str | None, Query(description="Only this unit.", examples=["U1"])] = None,
+        kind: Annotated[
+            WaveformKind | None, Query(description="Only this kind.", examples=["capture"])
+        ] = None,
+        limit: Annotated[
+            int, Query(ge=1, le=500, description="Maximum number of recordings.")
+        ] = 100,
+    ) -> RecordingsModel:
+        """List the newest recordings, and recordings around alarms in progress."""
+        if unit is not None:
+            context.unit(unit)
+        found = await worked(lambda: shelf_of(context).newest(limit, unit, kind))
+        running = sorted(context.captures.being_made)
+        return RecordingsModel(
+            recordings=[recording_model(kept) for kept in found],
+            being_made=[RunningRecordingModel(alarm=a, occurrence=n) for a, n in running],
+            error=context.captures.trouble,
+            continuous=sorted(context.tape.units) if context.tape else [],
+            continuous_error=context.tape.trouble if context.tape else None,
+        )
+
+    @router.get(
+        "/{recording}",
+        summary="One recording",
+        responses=PROBLEMS,
+        response_model=RecordingInfoModel,
+    )
+    async def one_recording(recording: RecordingId) -> Response:
+        """Check a recording and describe its channels, gaps, rejected samples and files."""
+        shelf = shelf_of(context)
+        kept = await worked(lambda: shelf.one(recording))
+        if kept is None:
+            raise unknown_recording(recording)
+        try:
+            return await rendered(lambda: recording_info(shelf, kept))
+        except ConfigError as error:
+            raise damaged_recording(recording, error) from error
+
+    @router.get(
+        "/{recording}/files.zip",
+        summary="The files of a recording",
+        response_class=StreamingResponse,
+        responses={**PROBLEMS, 200: _content("application/zip", "A ZIP file")},
+    )
+    async def files(recording: RecordingId) -> StreamingResponse:
+        """Return the files of a recording, which `padwatch recording` and `padwatch replay` read.
+
+        The manifest has their checksums.
+        """
+        make = shelf_of(context).zip_pieces
+        return await _download(context, recording, make, "application/zip", "zip")
+
+    @router.get(
+        "/{recording}/samples.csv",
+        summary="The samples of a recording",
+        response_class=StreamingResponse,
+        responses={**PROBLEMS, 200: _content("text/csv", "A CSV file")},
+    )
+    async def samples(recording: RecordingId) -> StreamingResponse:
+        """Return one row per sample, in the engineering units of the headings.
+
+        The format is that of `padwatch recording export`: missing samples have no rows, and cells
+        of a bad channel are nan.
+        """
+        make = shelf_of(context).csv_pieces
+        return await _download(context, recording, make, "text/csv", "csv")
+
+    return router
+
+
+async def _download(
+    context: Context, recording: str, make: Callable[[str], Pieces], media_type: str, suffix: str
+) -> StreamingResponse:
+    shelf = shelf_of(context)
+    if await worked(lambda: shelf.one(recording)) is None:
+        raise unknown_recording(recording)
+    try:
+        pieces = await context.downloads.download(await worked(lambda: make(recording)))
+    except TooManyDownloadsError as error:
+        raise ProblemError(503, "Busy", f"{error}; try again later") from error
+    except (ConfigError, OSError) as error:
+        raise damaged_recording(recording, error) from error
+    headers = {
+        "Content-Disposition": f'attachment; filename="{recording}.{suffix}"',
+        "X-Content-Type-Options": "nosniff",
+    }
+    return StreamingResponse(pieces, media_type=media_type, headers=headers)
+
+
+def shelf_of(context: Context) -> Shelf:
+    """Return the library of recordings; raise a problem of status 404 without one."""
+    if context.recordings is None:
+        words = "no recordings are kept here; see the process that analyses the unit"
+        raise ProblemError(404, "No recordings", words)
+    return Shelf(context.recordings, context.faults())
+
+
+def unknown_recording(recording: str) -> ProblemError:
+    """Return the problem of an unknown recording."""
+    return ProblemError(404, "Unknown recording", f"there is no recording {recording!r}")
+
+
+def damaged_recording(recording: str, error: Exception) -> ProblemError:
+    """Log a damaged recording and return its problem."""
+    log.error("a recording cannot be read", recording=recording, reason=str(error))
+    words = f"recording {recording} is damaged on the disk and cannot be read"
+    return ProblemError(410, "Damaged", words)
+
+
+def _content(media_type: str, words: str) -> dict[str, Any]:
+    schema = {"type": "string", "format": "binary"}
+    return {"description": words, "content": {media_type: {"schema": schema}}}

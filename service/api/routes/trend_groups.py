@@ -1,0 +1,117 @@
+"""Trends grouped by condition: operating state, or cell along one axis."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from core.condition.cells import CellGrid
+from core.condition.operating_state import OperatingState
+from service.api.values import STATE_NAMES, bounds
+from service.store.port import Store, Trend, TrendQuery
+from service.store.value_range import ValueRange
+
+GroupName = Literal["state", "eccentricity", "oil_temperature"]
+
+MAX_GROUPS = 60
+
+SURVEY_POINTS = 5000
+
+BIN_TOLERANCE = 1e-9
+"""Distance from a bound, in bins, within which a value may lie in either bin."""
+
+
+class TooManyGroupsError(ValueError):
+    """More than `MAX_GROUPS` groups; the message gives the limit."""
+
+
+@dataclass(frozen=True)
+class TrendGroup:
+    """A trend of the readings in one condition.
+
+    Parameters
+    ----------
+    low, high
+        Bounds of the cell; None for operating states.
+    """
+
+    name: str
+    low: float | None
+    high: float | None
+    trend: Trend
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """Axis of eccentricity or temperature, divided into bins."""
+
+    quantity: str
+    width: float
+
+    def requested(self, query: TrendQuery) -> ValueRange:
+        by_eccentricity = self.quantity == "eccentricity_ratio"
+        return query.eccentricity_ratio if by_eccentricity else query.oil_temperature_c
+
+    def narrowed(self, query: TrendQuery, low: float, high: float) -> TrendQuery:
+        """Return the query for one bin, which includes its lower but not its upper bound."""
+        requested, below = self.requested(query), math.nextafter(high, -math.inf)
+        within = ValueRange(
+            low if requested.low is None else max(low, requested.low),
+            below if requested.high is None else min(below, requested.high),
+        )
+        if self.quantity == "eccentricity_ratio":
+            return replace(query, eccentricity_ratio=within)
+        return replace(query, oil_temperature_c=within)
+
+
+def trend_groups(
+    store: Store, query: TrendQuery, by: GroupName, grid: CellGrid
+) -> list[TrendGroup]:
+    """Read a trend for each condition with readings.
+
+    Raises
+    ------
+    TooManyGroupsError
+        If there are more than `MAX_GROUPS`.
+    """
+    if by == "state":
+        found = list(_by_state(store, query))
+    else:
+        found = list(_by_cell(store, query, _axis(by, grid)))
+    return [group for group in found if group.trend.time_ns]
+
+
+def _axis(by: GroupName, grid: CellGrid) -> _Axis:
+    if by == "eccentricity":
+        return _Axis("eccentricity_ratio", grid.eccentricity_width)
+    return _Axis("oil_temperature_c", grid.temperature_width_c)
+
+
+def _by_state(store: Store, query: TrendQuery) -> Iterator[TrendGroup]:
+    for state in query.states or tuple(OperatingState):
+        trend = store.trend(replace(query, states=(state,)))
+        yield TrendGroup(STATE_NAMES[state], None, None, trend)
+
+
+def _by_cell(store: Store, query: TrendQuery, axis: _Axis) -> Iterator[TrendGroup]:
+    for number in _bins(store, query, axis):
+        low, high = bounds(number, axis.width)
+        trend = store.trend(axis.narrowed(query, low, high))
+        yield TrendGroup(f"{low:g} to {high:g}", low, high, trend)
+
+
+def _bins(store: Store, query: TrendQuery, axis: _Axis) -> list[int]:
+    """Return the bins between the extremes of every bucket."""
+    survey = replace(query, quantities=(axis.quantity,), max_points=SURVEY_POINTS)
+    series = store.trend(survey).series[axis.quantity]
+    bins: set[int] = set()
+    for low, high in zip(series.minimum, series.maximum, strict=True):
+        if low is not None and high is not None:
+            first, last = (
+                math.floor(low / axis.width - BIN_TOLERANCE),
+                math.floor(high / axis.width + BIN_TOLERANCE),
+            )
+            bins |= set(range(first, min(last, first + MAX_GROUPS) + 1))
+    if len(bins) > MAX_GROUPS:
+        raise TooManyGroupsError(f"more than {MAX_GROUPS} groups: request a narrower range")
+    return sorted(bins)
