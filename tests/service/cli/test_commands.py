@@ -149,7 +149,7 @@ def test_a_thread_without_end_does_not_hold_the_end_up() -> None:
 
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.startswith("over")
-    assert "left behind" in ended.stdout + ended.stderr
+    assert "threads are still running" in ended.stdout + ended.stderr
 
 
 def test_a_command_ends_with_its_code_before_libraries_are_taken_down() -> None:

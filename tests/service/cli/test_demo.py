@@ -8,8 +8,8 @@ import pytest
 from rigs.command_line import padwatch
 
 from core.machine.unit import Estimator
+from service.cli import run as demo
 from service.cli.daq import RunningDaq
-from service.cli.run import demo
 from service.measuring.simulated_sources import simulated_history
 from service.settings.plant import PlantFile
 from service.store.baselines import versions_after

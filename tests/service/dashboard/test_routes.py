@@ -13,8 +13,8 @@ from starlette.types import Message
 
 from service.api.answers import EditionHeader
 from service.api.http.middleware import BoundedAnswers
+from service.dashboard import assets as told
 from service.dashboard.assets import Asset, edition, pages, plotly
-from service.dashboard.assets import edition as told
 from service.dashboard.routes import dashboard_router
 from service.settings.processes import HttpLimitSettings
 

@@ -164,6 +164,7 @@ async def test_a_store_that_comes_back_late_is_told_of(
     monkeypatch.setattr(pair.service.alarms, "_put", lambda _: None)
     monkeypatch.setattr(pair.service.recorder, "stored", _never)
     monkeypatch.setattr(Asking, "_give_up", _after(pair))
+    monkeypatch.setattr("service.cluster.reported_commands.EXPIRES_S", 1e6)  # time only steps here
     async with at_work(pair.carrying_out.run()):
         answer = await post(pair, "acknowledge", occurrence=1)
 
