@@ -23,9 +23,8 @@ from service.api.auth.refusals import Refusals
 from service.api.downloads import Downloads
 from service.api.load import LoadWatch
 from service.api.problems import ProblemError
-from service.live.alarm_board import AlarmBoard
+from service.live.alarm_board import AlarmBoard, EvidenceStatus
 from service.live.commands import BaselineAction, FilmPlace
-from service.live.evidence import EvidenceStatus
 from service.live.live_view import CurrentBearing, UnitStatus
 from service.measuring.references_in_force import ReferencesInForce
 from service.notifications.sender import ReceiverView

@@ -70,6 +70,15 @@ End = Annotated[
     Query(description="End, RFC 3339 with offset.", examples=["2026-11-21T09:00:00Z"]),
 ]
 
+FirstTime = Annotated[
+    Moment | None,
+    Query(description="First time, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
+]
+EndTime = Annotated[
+    Moment | None,
+    Query(description="End, RFC 3339 with offset.", examples=["2026-11-21T09:00:00Z"]),
+]
+
 
 def _bound(description: str, example: float) -> Any:
     return Query(allow_inf_nan=False, description=description, examples=[example])

@@ -35,7 +35,7 @@ from service.measuring.timings import Timings, timed_monitors
 from service.notifications.message import Around
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.process import stop_on_signals
-from service.runtime.service_manager import NOBODY, ServiceManager
+from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
 from service.settings.storage import Origin
@@ -53,7 +53,7 @@ async def run_acquire(
     listener: socket.socket,
     clock: Clock,
     announce: Callable[[str], None],
-    manager: ServiceManager = NOBODY,
+    manager: ServiceManager = NO_MANAGER,
 ) -> None:
     """Acquire and publish until SIGINT or SIGTERM.
 
@@ -124,7 +124,7 @@ async def run_analyse(
     listener: socket.socket,
     clock: Clock,
     announce: Callable[[str], None],
-    manager: ServiceManager = NOBODY,
+    manager: ServiceManager = NO_MANAGER,
 ) -> None:
     """Analyse the units of a partition until SIGINT or SIGTERM.
 

@@ -23,7 +23,7 @@ from service.settings.notifications import (
 )
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
-from service.store.outbox import Address, nobody
+from service.store.outbox import Address, no_recipients
 
 LEVELS = {"alert": AlarmLevel.ALERT, "danger": AlarmLevel.DANGER}
 
@@ -59,7 +59,7 @@ def receivers(settings: ReceiverSettings, clock: Clock) -> Iterator[Receiver]:
 def router_of(plant: PlantFile, origin: Origin, look: LookAround, clock: Clock) -> Address:
     """Return the router that queues messages of stored events; a replay queues none."""
     if origin is not Origin.LIVE or not plant.delivery.receiver:
-        return nobody
+        return no_recipients
     routes = [route for each in plant.delivery.receiver for route in _routes(each)]
     return Router(routes, composer_of(plant, look), clock.now_ns)
 

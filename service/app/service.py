@@ -21,7 +21,7 @@ from service.measuring.timings import Timings, timed, timed_sources
 from service.notifications.message import Around
 from service.runtime.heartbeats import Heartbeats
 from service.runtime.process import stop_on_signals
-from service.runtime.service_manager import NOBODY, ServiceManager
+from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.holds import only_one
@@ -55,7 +55,7 @@ async def run_service(
     listener: socket.socket,
     clock: Clock,
     announce: Callable[[str], None],
-    manager: ServiceManager = NOBODY,
+    manager: ServiceManager = NO_MANAGER,
 ) -> None:
     """Run until SIGINT or SIGTERM, or until all sources have ended if the run ends with them.
 

@@ -40,7 +40,7 @@ from service.reports.routes import EvidenceDesk
 from service.runtime.heartbeats import Heartbeats
 from service.runtime.polls import TimedSource
 from service.runtime.process import stop_on_signals
-from service.runtime.service_manager import NOBODY, ServiceManager
+from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.core_values import chatter_rule_of, machine_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -261,7 +261,7 @@ async def run_serve(
     listener: socket.socket,
     clock: Clock,
     announce: Callable[[str], None],
-    manager: ServiceManager = NOBODY,
+    manager: ServiceManager = NO_MANAGER,
 ) -> None:
     """Serve until SIGINT or SIGTERM.
 

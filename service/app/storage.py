@@ -39,7 +39,7 @@ from service.settings.storage import Origin, RetentionSettings, SpaceSettings
 from service.settings.units import UnitSettings
 from service.store.access.audit_verification import head_path
 from service.store.audit import Trail
-from service.store.outbox import Address, nobody
+from service.store.outbox import Address, no_recipients
 from service.store.port import Store
 from service.store.retention.limits import RetentionLimits
 from service.store.spectra_port import SpectraLimits, TierLimits
@@ -77,7 +77,9 @@ def head_file(plant: PlantFile) -> Path:
     return head_path(database_path(plant))
 
 
-def open_store(plant: PlantFile, origin: Origin = Origin.LIVE, address: Address = nobody) -> Store:
+def open_store(
+    plant: PlantFile, origin: Origin = Origin.LIVE, address: Address = no_recipients
+) -> Store:
     """Open the plant's database: a file, created if missing, or a PostgreSQL database.
 
     Parameters

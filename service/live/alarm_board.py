@@ -81,3 +81,19 @@ class AlarmBoard(Protocol):
     def count(self) -> AlarmCount:
         """How many alarms are on the list."""
         ...
+
+
+@dataclass(frozen=True)
+class EvidenceStatus:
+    """Bundles of evidence since the start.
+
+    Parameters
+    ----------
+    error
+        Why none is written just now; None if nothing hinders.
+    """
+
+    error: str | None
+    n_waiting: int
+    n_written: int
+    n_lost: int

@@ -77,4 +77,4 @@ def _one_line(value: str) -> str:
     return " ".join(value.split())
 
 
-NOBODY = ServiceManager({})
+NO_MANAGER = ServiceManager({})

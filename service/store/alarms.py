@@ -19,7 +19,7 @@ from service.settings.alarm_kinds import ALARM_KINDS
 from service.store.access.audit_entries import Deed
 from service.store.audit_deeds import alarm_deeds
 from service.store.database import Connection
-from service.store.outbox import Address, insert_letters, nobody
+from service.store.outbox import Address, insert_letters, no_recipients
 from service.store.port import AlarmQuery, StoredEvent, StoreError
 from service.store.sharing import DONE, answer_command
 from service.store.trends import BETWEEN_BOUNDS, IN_STATES, at_least, at_most, condition_arguments
@@ -68,7 +68,7 @@ def insert_alarms(
     writer: Connection,
     news: Iterable[AlarmNews],
     tell: Callable[[Connection, Iterable[Deed]], None],
-    address: Address = nobody,
+    address: Address = no_recipients,
 ) -> None:
     """Add events, queue what tells of them, and bring the alarms to what they are after them."""
     for told in news:

@@ -55,8 +55,8 @@ Address = Callable[[Alarm, AlarmEvent], Iterable[Letter]]
 """Who is to be told of an event of an alarm."""
 
 
-def nobody(alarm: Alarm, event: AlarmEvent) -> Iterable[Letter]:  # noqa: ARG001
-    """Tell nobody."""
+def no_recipients(alarm: Alarm, event: AlarmEvent) -> Iterable[Letter]:  # noqa: ARG001
+    """Queue no letters."""
     return ()
 
 

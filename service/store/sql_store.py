@@ -20,7 +20,7 @@ from service.store.films import SqlFilms
 from service.store.gap_reference import GapReference
 from service.store.integrity_port import Integrity, Unmarked
 from service.store.moments import free_moment
-from service.store.outbox import Address, SqlOutbox, nobody
+from service.store.outbox import Address, SqlOutbox, no_recipients
 from service.store.port import (
     AlarmQuery,
     QueryTooLargeError,
@@ -85,7 +85,7 @@ class SqlStore:
         self,
         database: Database,
         head: Path,
-        address: Address = nobody,
+        address: Address = no_recipients,
         spectra: SpectraLimits | None = None,
     ) -> None:
         self.database, self._address = database, address

@@ -169,7 +169,7 @@ class Indexer:
             self._expected_ns = None
 
     def _require_rate(self, piece: TimeArray) -> None:
-        """Refuse another rate, every step of which would look like a gap."""
+        """Refuse stamps at another rate: each step between them would look like a gap."""
         steps = np.diff(piece) / self._period_ns
         if len(steps) >= _MIN_STEPS or (self._row == 0 and len(steps) > 1):
             low, high = _MEDIAN_STEP

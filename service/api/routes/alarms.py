@@ -26,7 +26,8 @@ from service.api.auth.gate import actor_or, identity_of
 from service.api.context import Context
 from service.api.load import Allowance
 from service.api.parameters import (
-    Moment,
+    EndTime,
+    FirstTime,
     States,
     attitude_range,
     eccentricity_range,
@@ -324,17 +325,8 @@ async def event_query(
         AlarmKindName | None,
         Query(description="Only this kind.", examples=["channel_not_ok"]),
     ] = None,
-    start: Annotated[
-        Moment | None,
-        Query(description="First time, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
-    ] = None,
-    end: Annotated[
-        Moment | None,
-        Query(
-            description="End, RFC 3339 with offset.",
-            examples=["2026-11-21T09:00:00Z"],
-        ),
-    ] = None,
+    start: FirstTime = None,
+    end: EndTime = None,
     before: Annotated[
         int | None,
         Query(ge=1, le=10**15, description="Only events older than this id.", examples=[117]),

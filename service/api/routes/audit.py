@@ -10,7 +10,7 @@ from pydantic import Field
 from service.api.answers import rendered, worked
 from service.api.auth.declared import needs
 from service.api.context import Context
-from service.api.parameters import Moment, ns_from_datetime, require_order
+from service.api.parameters import EndTime, FirstTime, ns_from_datetime, require_order
 from service.api.problems import described_problems
 from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import ApiModel, Time
@@ -149,17 +149,8 @@ async def audit_query(
             examples=["U1:ujb_shaft_x:channel_not_ok"],
         ),
     ] = None,
-    start: Annotated[
-        Moment | None,
-        Query(description="First time, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
-    ] = None,
-    end: Annotated[
-        Moment | None,
-        Query(
-            description="End, RFC 3339 with offset.",
-            examples=["2026-11-21T09:00:00Z"],
-        ),
-    ] = None,
+    start: FirstTime = None,
+    end: EndTime = None,
     before: Annotated[
         int | None,
         Query(ge=1, le=10**15, description="Only entries older than this number.", examples=[117]),

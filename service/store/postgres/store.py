@@ -7,7 +7,7 @@ from service.settings.storage import Origin
 from service.store.access.audit_entries import Deed, acting
 from service.store.access.audit_verification import AuditHead, write_head
 from service.store.audit_chain import newest_of
-from service.store.outbox import Address, nobody
+from service.store.outbox import Address, no_recipients
 from service.store.port import StoreError
 from service.store.postgres.address import PostgresAddress
 from service.store.postgres.database import PostgresDatabase
@@ -44,7 +44,7 @@ class PostgresStore(SqlStore):
         address: PostgresAddress,
         head: Path,
         origin: Origin = Origin.LIVE,
-        to: Address = nobody,
+        to: Address = no_recipients,
         spectra: SpectraLimits | None = None,
     ) -> None:
         database = PostgresDatabase(address, origin)

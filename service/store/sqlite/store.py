@@ -8,7 +8,7 @@ from service.settings.storage import Origin
 from service.store.access.audit_verification import head_path
 from service.store.audit_chain import begin_head
 from service.store.integrity import Marked
-from service.store.outbox import Address, nobody
+from service.store.outbox import Address, no_recipients
 from service.store.port import StoreError
 from service.store.retention.sql import SqlRetention
 from service.store.spectra_port import SpectraLimits
@@ -41,7 +41,7 @@ class SqliteStore(SqlStore):
         self,
         path: Path,
         origin: Origin = Origin.LIVE,
-        address: Address = nobody,
+        address: Address = no_recipients,
         spectra: SpectraLimits | None = None,
     ) -> None:
         self._path = path

@@ -10,7 +10,7 @@ from service.app.notifications import receivers_of, router_of
 from service.notifications.message import Surroundings
 from service.settings.loading import load_plant_file
 from service.settings.storage import Origin
-from service.store.outbox import nobody
+from service.store.outbox import no_recipients
 
 WEBHOOK = """
 [[delivery.receiver]]
@@ -56,7 +56,7 @@ def test_every_recipient_is_a_receiver_and_secrets_in_addresses_are_not_shown(
     assert quiet == [False, True, True, False, False, False, False, False]
     # A replay tells nobody.
     assert receivers_of(plant, Origin.REPLAY, clock) == []
-    assert router_of(plant, Origin.REPLAY, lambda _: Surroundings(), clock) is nobody
+    assert router_of(plant, Origin.REPLAY, lambda _: Surroundings(), clock) is no_recipients
 
 
 @pytest.mark.parametrize(
