@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import cast
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
-from core.baseline.history import DIRECTIONS, Watched
+from core.baseline.history import DIRECTIONS
 from core.change.decision import Decision, Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
 from core.change.settings import FilmRules
-from core.condition.cells import FilmConditions
 from service.api.context import Context
 from service.api.film_conditions import condition_model
 from service.api.film_models import (
@@ -189,9 +188,7 @@ def _direction(seen: SeenFilm, news: FilmNews, row: int) -> FilmDirectionModel:
 def _reason(seen: SeenFilm, reading: FilmReading, finding: FilmFinding, row: int) -> str:
     match finding.verdict:
         case Verdict.NO_BASELINE:
-            learned = (
-                seen.baseline.of(Watched.STIFFNESS, DIRECTIONS[row]) if seen.baseline else None
-            )
+            learned = seen.baseline.of(DIRECTIONS[row]) if seen.baseline else None
             return NONE_IN_FORCE if learned is None else _unseen(learned, reading)
         case Verdict.TRANSIENT:
             return "not_settled"
@@ -201,10 +198,7 @@ def _reason(seen: SeenFilm, reading: FilmReading, finding: FilmFinding, row: int
 
 def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
     """What about a condition has not been learned: its cell, or only where the shaft lies in it."""
-    here = FilmConditions.one(
-        reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
-    )
-    is_seen = learned.table.find(learned.grid.cells(here))[0] >= 0
+    is_seen = learned.table.find(learned.grid.cells(reading.conditions))[0] >= 0
     return NOT_TURNED_SO if is_seen else NOT_LEARNED
 
 

@@ -18,6 +18,9 @@ from service.settings.plant import PlantFile
 from service.settings.recorded_units import recorded_unit
 from service.settings.units import UnitSettings
 
+ANALYSED_S = 10.0
+"""Length of the blocks of a recording that is analysed and raises no alarm."""
+
 
 def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
     """A recording of a unit, about to be written; of counts if the first block is just that.
@@ -86,7 +89,7 @@ def recording_source(
     """
     if unit is not None:
         selection = replace(selection, calibration=calibration_of(unit))
-    return RecordingSource(recording, clock, selection)
+    return RecordingSource(recording, clock, selection, block_s=ANALYSED_S)
 
 
 def replay_source(

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 from acquisition.clock import Clock
-from acquisition.delivery.calibration import UnitCalibration
 from acquisition.simulated.devices.fifo_device import FifoDevice
 from acquisition.simulated.devices.map_device import MapDevice, VectorDevice
 from acquisition.simulated.devices.modbus_device import ModbusDevice
@@ -11,6 +10,7 @@ from acquisition.simulated.devices.modbus_links import ModbusRtuServer, ModbusTc
 from acquisition.simulated.devices.modbus_server import ModbusServer
 from acquisition.simulated.feed import SampleFeed
 from core.machine.unit import Unit
+from core.samples.calibration import UnitCalibration
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_sources import (
     ModbusFifoSettings,

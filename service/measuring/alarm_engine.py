@@ -9,7 +9,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmNews
-from core.alarms.board import AlarmMemory
+from core.alarms.board import AlarmBoard, AlarmMemory
 from core.alarms.judgements import VectorReference
 from core.alarms.kinds import LINK_LOST
 from core.alarms.operation import Action
@@ -41,7 +41,7 @@ from service.settings.film_rules import film_rules_of
 from service.settings.origin import Origin
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
-from service.store.access.audit_entries import acting
+from service.store.access.audit_entries import ActedNews, acting
 from service.store.port import AlarmQuery, Store
 
 log = structlog.get_logger()
@@ -54,8 +54,6 @@ NO_FILMS: Mapping[str, Judgement] = MappingProxyType({})
 
 WITHOUT_LINK = (LINK_LOST, MESSAGES_REFUSED)
 """Kinds that are judged also while no samples arrive."""
-
-Board = UnitAlarms | ServiceAlarms | ToldAlarms
 
 LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
 
@@ -208,7 +206,7 @@ class AlarmEngine:
         own = self._owner(id_)
         news = own.operate(id_, action, self._clock.now_ns())
         who = acting()
-        self._publish([replace(told, peer=who.peer, command=who.command) for told in news])
+        self._publish([ActedNews(told.alarm, told.events, who.peer, who.command) for told in news])
         return own.alarm(id_)
 
     def alarm(self, id_: str) -> Alarm:
@@ -269,10 +267,10 @@ class AlarmEngine:
                 self._chatter.note(event, now_ns)
 
     @property
-    def _boards(self) -> list[Board]:
+    def _boards(self) -> list[AlarmBoard]:
         return [*self._units.values(), self._service, *self._kept]
 
-    def _owner(self, id_: str) -> Board:
+    def _owner(self, id_: str) -> AlarmBoard:
         """Who keeps an alarm, if there is one of that name."""
         for board in self._kept:
             if id_ in board:

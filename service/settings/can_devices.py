@@ -6,7 +6,6 @@ from typing import Any
 from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.clock import Clock
-from acquisition.delivery.calibration import COUNTS_FULL_SCALE
 from acquisition.delivery.units import UNIT_OF
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_server import CanBusServer
@@ -14,6 +13,7 @@ from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_set
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.server import DaqServer
 from acquisition.simulated.feed import SampleFeed
+from core.checks.channels import COUNTS_FULL_SCALE
 from service.settings import can as settings
 from service.settings.core_values import calibration_of
 from service.settings.units import UnitSettings

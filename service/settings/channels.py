@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from acquisition.delivery.calibration import COUNTS_FULL_SCALE
+from core.checks.channels import COUNTS_FULL_SCALE
 from core.machine.channel import Measurand
 from core.units import STANDARD_GRAVITY_M_S2
 from service.settings.base import Identifier, MisfitError, MissingError, Settings

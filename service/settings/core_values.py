@@ -1,11 +1,11 @@
 """From the plant file's settings to the plain values that core and adapters take."""
 
-from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.checks.sensor_checks import SensorLimits
 from core.machine.channel import Channel
 from core.machine.unit import Bearing, BearingAccuracy, GapAccuracy, Unit
 from core.monitor.assessment import AnalysisSettings
-from core.stiffness.dynamic_lines import DynamicSettings, LineSelection
+from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from core.stiffness.dynamic_lines import DynamicSettings
 from service.settings.bearings import BearingSettings
 from service.settings.channels import ChannelSettings
 from service.settings.plant import AnalysisModel
@@ -122,7 +122,7 @@ def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
         ),
         dynamic=DynamicSettings(
             band_hz=dynamic.band_hz,
-            selection=LineSelection(guard_bins=dynamic.guard_bins),
+            guard_bins=dynamic.guard_bins,
             probe_noise_um2_per_hz=None if noise is None else (noise, noise),
             quiet_band_hz=dynamic.quiet_band_hz,
             min_segments=max(settings.min_segments, 3),

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from acquisition.modbus.transport import ConnectionUse, SerialTransport, TcpTransport, Transport
+from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
 from service.settings.expected_identity import identity_of
 from service.settings.modbus_link import ModbusLinkSettings
 from service.settings.modbus_sources import MappedDeviceSettings
@@ -26,13 +26,13 @@ def transport_of(source: ModbusLinkSettings) -> Transport:
 
 def link_fields(source: ModbusLinkSettings) -> dict[str, Any]:
     """How a device is reached and known, as every source's settings take it."""
-    use = source.connection if isinstance(source, MappedDeviceSettings) else ConnectionUse.KEPT
+    is_per_reply = isinstance(source, MappedDeviceSettings) and source.connection == "per_reply"
     return {
         "transport": transport_of(source),
         "device_id": source.device_id,
         "timeout_s": source.timeout_s,
         "identity": identity_of(source.identity),
-        "connection": ConnectionUse(use),
+        "keeps_connection": not is_per_reply,
         "requests_in_flight": _requests_in_flight(source),
     }
 

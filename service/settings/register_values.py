@@ -3,19 +3,29 @@
 import math
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from acquisition.modbus.cells import ByteOrder, NumberType
+from acquisition.modbus.cells import FLOATS, INTEGERS, N_BYTES, ByteOrder, NumberType
 from acquisition.modbus.register_map import Meaning
 from core.spectra.polls import AMPLITUDE_PARTS, VectorPart, VectorRow
 from service.settings.base import Identifier, MisfitError, Settings
 
 Function = Literal[1, 2, 3, 4]
 Address = Annotated[int, Field(ge=0, le=465_535)]
+ALL_BITS = 0xFFFF
 PK_PER = {"pk": 1.0, "pp": 0.5, "rms": math.sqrt(2.0)}
 """Zero-to-peak amplitude of a sine per amplitude of each detector."""
 
 SIGN_OF = {"lead": 1.0, "lag": -1.0}
+
+
+def _refuse_zero(number: float) -> float:
+    if number == 0.0:
+        raise MisfitError("must not be 0")
+    return number
+
+
+NotZero = Annotated[float, AfterValidator(_refuse_zero)]
 
 
 class CellSettings(Settings):
@@ -40,7 +50,7 @@ class CellSettings(Settings):
 class ScaleRegisterSettings(CellSettings):
     """value = raw / divisor * this register; both must be read in one request."""
 
-    divisor: float = 32767.0
+    divisor: NotZero = 32767.0
     """What the raw number is divided by; not 0."""
 
 
@@ -70,13 +80,15 @@ class FullScaleSettings(Settings):
         for key in ("minimum", "maximum"):
             if (getattr(self, key) is None) == (getattr(self, f"{key}_register") is None):
                 raise MisfitError(f"give either this or {key}_register", key)
+        if not self.raw_minimum < self.raw_maximum:
+            raise MisfitError(f"must be below raw_maximum {self.raw_maximum:g}", "raw_minimum")
         return self
 
 
 class FlagSettings(CellSettings):
     """What a status register says of the value."""
 
-    mask: Annotated[int, Field(ge=1, le=0xFFFF)] = 0xFFFF
+    mask: Annotated[int, Field(ge=1, le=ALL_BITS)] = ALL_BITS
     """Bits of the register that count; example: 0x0020."""
 
     set_means: Meaning | None = None
@@ -87,6 +99,32 @@ class FlagSettings(CellSettings):
 
     clipped_values: Annotated[tuple[int, ...], Field(max_length=64)] = ()
     """With ``ok_values``: numbers that mean a clipped value."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.type in FLOATS:
+            raise MisfitError(
+                'must be "uint16" or other whole numbers: a float has no flags', "type"
+            )
+        if self.type is NumberType.BIT and self.mask not in (1, ALL_BITS):
+            raise MisfitError("must be left out: this is one bit already", "mask")
+        if (self.set_means is None) == (not self.ok_values):
+            words = "must be given unless ok_values are, and not with them"
+            raise MisfitError(words, "set_means")
+        if self.clipped_values and not self.ok_values:
+            raise MisfitError("can only be given with ok_values", "clipped_values")
+        highest = self.counted_bits // (self.counted_bits & -self.counted_bits)
+        for name in ("ok_values", "clipped_values"):
+            for number in getattr(self, name):
+                if not 0 <= number <= highest:
+                    words = f"must be numbers of the mask, 0 to {highest}, got {number}"
+                    raise MisfitError(words, name)
+        return self
+
+    @property
+    def counted_bits(self) -> int:
+        """The mask; 1 for a single bit."""
+        return 1 if self.type is NumberType.BIT else self.mask
 
 
 class ValueSettings(CellSettings):
@@ -105,7 +143,7 @@ class ValueSettings(CellSettings):
     phase: Literal["lag", "lead"] | None = None
     """Whether a growing phase in degrees means that the signal comes later or earlier."""
 
-    scale: float = 1.0
+    scale: NotZero = 1.0
     """Factor to the channel's unit; not 0; example: 25.4 from mil to µm."""
 
     offset: float = 0.0
@@ -138,6 +176,16 @@ class ValueSettings(CellSettings):
             )
         if (self.phase is not None) != (self.quantity == VectorPart.ORDER1_PHASE):
             raise MisfitError('must be "lag" or "lead" of phases, and of nothing else', "phase")
+        if self.scale_register is not None and self.full_scale is not None:
+            raise MisfitError("cannot be had together with full_scale", "scale_register")
+        low, high = self.invalid_below, self.invalid_above
+        if low is not None and high is not None and not low < high:
+            raise MisfitError(f"must be below invalid_above {high:g}", "invalid_below")
+        n_bits = 8 * N_BYTES[self.type]
+        for number in self.invalid_values if self.type in INTEGERS else ():
+            if number % 1 or not -(1 << n_bits - 1) <= number < 1 << n_bits:
+                words = f"must each be a whole number of {n_bits} bits, got {number:.12g}"
+                raise MisfitError(words, "invalid_values")
         return self
 
     @property

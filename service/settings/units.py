@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from acquisition.delivery.calibration import BLOCK_SAMPLES
+from core.samples.calibration import BLOCK_SAMPLES
 from service.settings.alarm_fit import require_alarm_fit
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 from service.settings.bearings import (

@@ -8,9 +8,10 @@ from acquisition.can.assembly import FrameAssembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanSettings
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.messages import MAX_DATA, Frames
+from core.samples.calibration import UnitCalibration
 from service.settings.can import CanSettings as CanSourceSettings
 from service.settings.can_devices import can_settings_of
 from service.settings.core_values import calibration_of
@@ -30,13 +31,7 @@ class CanLogDecoder:
 
     def __init__(self, settings: CanSettings, calibration: UnitCalibration) -> None:
         plan = compile_plan(settings, calibration)
-        self._assembler = FrameAssembler(
-            plan,
-            n_channels=len(calibration.channels),
-            n_slow=len(calibration.slow),
-            rate_hz=calibration.rate_hz,
-            hold_s=settings.hold_s,
-        )
+        self._assembler = FrameAssembler(plan)
         self._gate = FrameGate(plan, self._assembler.refused)
 
     def take(self, frames: Frames) -> list[RawBlock]:

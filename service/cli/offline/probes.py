@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-from acquisition.delivery.polling import wrong_replies_drop_the_link
 from acquisition.errors import AcquisitionError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import MapDecoder
@@ -36,8 +35,7 @@ async def read_once(device: ModbusLinkSettings, function: int, address: int, cou
     """
     client = ModbusClient(link_settings_of(device))
     async with client.connected():
-        with wrong_replies_drop_the_link():
-            return await client.read(address, count, function)
+        return await client.read(address, count, function)
 
 
 async def read_map_once(
@@ -69,10 +67,9 @@ async def read_ring_once(
     client = ModbusClient(link_settings_of(device))
     reader = RingReader(client, base_address, function)
     async with client.connected():
-        with wrong_replies_drop_the_link():
-            header = await reader.header()
-            [slot] = await reader.slots(header.layout, [header.newest])
-            return header, slot
+        header = await reader.header()
+        [slot] = await reader.slots(header.layout, [header.newest])
+        return header, slot
 
 
 async def identify_once(device: ModbusLinkSettings) -> Identification:
@@ -85,8 +82,7 @@ async def identify_once(device: ModbusLinkSettings) -> Identification:
     """
     client = ModbusClient(link_settings_of(device))
     async with client.connected():
-        with wrong_replies_drop_the_link():
-            return await client.identify()
+        return await client.identify()
 
 
 async def measure_in_flight(
@@ -113,11 +109,10 @@ async def measure_in_flight(
     for n_requests in range(2, most + 1):
         client = ModbusClient(replace(link_settings_of(device), requests_in_flight=n_requests))
         spans = [Span(address, 1, function)] * n_requests
-        content = memoryview(bytearray(sum(span.n_bytes for span in spans)))
         try:
             async with client.connected():
                 for _ in range(_TRIES_IN_FLIGHT):
-                    await client.read_into(spans, content)
+                    await client.read_spans(spans)
         except AcquisitionError:
             break
         n_taken = n_requests

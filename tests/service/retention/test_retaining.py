@@ -10,7 +10,7 @@ from acquisition.clock import Clock
 from core.units import DAY_NS
 from service.app.retention import retention_limits
 from service.settings.retention import RetentionSettings
-from service.store.loops import LOOK_S, PERIOD_S, REST_SHARE, Retaining
+from service.store.loops import LOOK_S, RETAINING_PERIOD_S, RETAINING_REST_SHARE, Retaining
 from service.store.port import StoreError
 from service.store.retention.limits import RetentionLimits
 
@@ -78,8 +78,8 @@ async def test_it_rests_longer_than_it_works(retaining: Retaining, stepped_clock
     await retaining.round()
 
     lasted_s = stepped_clock.monotonic_s() - begun_s
-    assert lasted_s == pytest.approx(2.0 * (1.0 + REST_SHARE))
-    assert LOOK_S < PERIOD_S
+    assert lasted_s == pytest.approx(2.0 * (1.0 + RETAINING_REST_SHARE))
+    assert LOOK_S < RETAINING_PERIOD_S
 
 
 async def test_a_store_that_fails_is_asked_again(old: OldStore, retaining: Retaining) -> None:
