@@ -1,16 +1,16 @@
-"""What can go wrong between a plant and padwatch, sorted by what the caller should do.
+"""Errors of sources, by what the caller should do.
 
 ::
 
     AcquisitionError
     ├─ ConfigError   can never work     → stop trying this source, tell the operator
     ├─ LinkError     not answering now  → wait, retry
-    └─ FrameError    answered nonsense  → drop it, count it
+    └─ FrameError    a wrong frame      → drop it, count it
 """
 
 
 class AcquisitionError(Exception):
-    """Base of all errors an adapter lets out."""
+    """Base class of the errors that adapters raise."""
 
 
 class ConfigError(AcquisitionError):
@@ -22,4 +22,4 @@ class LinkError(AcquisitionError):
 
 
 class FrameError(AcquisitionError):
-    """The device answered something that is not an answer to the question."""
+    """The device sent a reply or frame that cannot be right."""

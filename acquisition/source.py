@@ -1,4 +1,4 @@
-"""The one port through which samples enter padwatch."""
+"""`SampleSource`: the port through which samples enter padwatch."""
 
 from collections.abc import AsyncIterator, Mapping
 from contextlib import AbstractAsyncContextManager
@@ -8,10 +8,10 @@ from core.samples.blocks import SampleBlock
 
 
 class SampleSource(Protocol):
-    """Somewhere samples come from.
+    """Source of the samples of one unit.
 
-    A source may be connected again after it was left; it then reports what it missed through the
-    sample index. It neither retries nor logs: the runner does both, once for all sources.
+    A source may be connected again after it was left; the sample index then shows what it missed.
+    It neither retries nor logs: the runner does both, once for all sources.
     """
 
     def connect(self) -> AbstractAsyncContextManager[AsyncIterator[SampleBlock]]:
@@ -29,7 +29,7 @@ class SampleSource(Protocol):
 
 @runtime_checkable
 class RefusesFrames(Protocol):
-    """A source that counts what it heard and could not use, before there is a sample to count."""
+    """Source that counts the frames it refuses before they become samples."""
 
     @property
     def refused_frames(self) -> Mapping[str, int]:
@@ -38,5 +38,5 @@ class RefusesFrames(Protocol):
 
 
 def refused_frames_of(source: SampleSource) -> Mapping[str, int]:
-    """What a source says of refused frames; nothing where it knows none."""
+    """Refused frames of a source by reason; empty if it does not count them."""
     return source.refused_frames if isinstance(source, RefusesFrames) else {}

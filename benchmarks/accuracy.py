@@ -63,7 +63,9 @@ def simulate(job: tuple[str, int]) -> dict[str, list[Estimate]]:
     if row.amplitudes:
         return {bearing: amplitudes(found[bearing]) for bearing in row.bearings}
     return {
-        bearing: estimates(found[bearing], row.accuracy, row.lines, row.c_over_k_xx, row.limits)
+        bearing: estimates(
+            found[bearing], row.accuracy, row.lines, row.c_over_k_xx, row.runout_um_pk
+        )
         for bearing in row.bearings
     }
 

@@ -11,15 +11,14 @@ from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from core.spectra.segments import ORDER1, VORTEX
 from core.stiffness.dynamic import dynamic_stiffness
 from core.stiffness.dynamic_lines import DynamicSettings
-from core.stiffness.evidence import LineLimits, line_excitation
-from core.stiffness.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
-from core.stiffness.transfer import line_transfer
+from core.stiffness.dynamic_readings import dynamic_budgets
+from core.stiffness.estimators import DYNAMIC_COEFFICIENTS
+from core.stiffness.evidence import line_excitation
+from core.stiffness.stiffness_budget import ratio_budget, transfer_budgets
 from core.uncertainty import Budget
 
 LINES = {"1×": ORDER1, "vortex": VORTEX}
 AXES = {"xx": (SHAFT_X, BEARING_X), "yy": (SHAFT_Y, BEARING_Y)}
-
-NO_RUNOUT_LIMITS = LineLimits()
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ def estimates(
     accuracy: BearingAccuracy,
     lines: tuple[str, ...] = ("1×",),
     c_over_k_xx: bool = False,
-    limits: LineLimits = NO_RUNOUT_LIMITS,
+    runout_um_pk: float = 0.0,
 ) -> list[Estimate]:
     """Evaluate every estimator.
 
@@ -63,7 +62,7 @@ def estimates(
     """
     found = list(_dynamic(spectra, accuracy, c_over_k_xx))
     for name in lines:
-        found += _at_line(spectra, accuracy, name, limits)
+        found += _at_line(spectra, accuracy, name, runout_um_pk)
     return found
 
 
@@ -97,12 +96,13 @@ def _dynamic(
             scale = film.k_xx_n_per_m / omega
         for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
             name = f"{letter}_{'xy'[row]}{'xy'[column]}"
+            quantity = DYNAMIC_COEFFICIENTS[row]["kc".index(letter) * 2 + column]
             true = float(truth[row, column])
-            yield _compared(f"dynamic {name}", budgets.get(name), true, scale)
+            yield _compared(f"dynamic {name}", budgets.get(quantity), true, scale)
 
 
 def _at_line(
-    spectra: BearingSpectra, accuracy: BearingAccuracy, line_name: str, limits: LineLimits
+    spectra: BearingSpectra, accuracy: BearingAccuracy, line_name: str, runout_um_pk: float
 ) -> Iterator[Estimate]:
     line, film = LINES[line_name], spectra.film
     omega = 2.0 * math.pi * float(spectra.orders.frequency_hz[line])
@@ -110,11 +110,14 @@ def _at_line(
     true = (film.k_xx_n_per_m, film.k_yy_n_per_m)
     for index, (axes, (shaft, bearing)) in enumerate(AXES.items()):
         orders, bracket = spectra.orders, spectra.bracket
-        excited = line_excitation(orders, line, shaft, bearing, limits) is Reason.OK
-        transfer = line_transfer(orders, line, shaft, bearing, bracket) if excited else None
-        budget = transfer_budgets(transfer, bracket, accuracy)[0] if transfer else None
+        excited = (
+            line_excitation(orders, line, shaft, bearing, runout_um_pk=runout_um_pk) is Reason.OK
+        )
+        at = orders, line, shaft, bearing, bracket, accuracy
+        transfer = transfer_budgets(*at) if excited else None
+        budget = transfer[0] if transfer else None
         yield _compared(f"transfer {line_name} k_{axes}", budget, true[index], true[0])
-        ratio = ratio_budget(orders, line, shaft, bearing, bracket, accuracy) if excited else None
+        ratio = ratio_budget(*at) if excited else None
         # what equation (5) asks for leaves out the bracket's inertia
         asked = effective[index] * bracket.stiffness_n_per_m
         asked /= float(bracket.dynamic_stiffness_n_per_m(orders.frequency_hz[[line]])[0].real)

@@ -9,12 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from acquisition.delivery.calibration import (
-    ChannelCalibration,
-    SlowCalibration,
-    UnitCalibration,
-    calibrate,
-)
+from acquisition.delivery.blocks import sample_block
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES
 from acquisition.simulated.plant.rotor import (
@@ -33,6 +28,7 @@ from core.machine.response import Response
 from core.machine.unit import Bearing, BracketDynamics, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.samples.ring import Ring
 from core.spectra.cross_spectrum import CrossSpectrum, average
 from core.spectra.segments import SegmentTransform
@@ -226,7 +222,7 @@ def _blocks(unit: Unit, scenario: Scenario, seed: int, n_blocks: int) -> Iterato
     )
     simulated = SimulatedUnit(unit, calibration, scenario, seed, START_NS)
     for _ in range(n_blocks):
-        yield calibrate(simulated.advance(CHUNK_SAMPLES), calibration)
+        yield sample_block([simulated.advance(CHUNK_SAMPLES)], calibration)
 
 
 def _transform(

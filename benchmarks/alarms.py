@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.blocks import sample_block
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
-from core.quality import GOOD, Reading, Reason, bad
+from core.quality import Reading
 from core.samples.blocks import DeviceClock, SampleBlock
 from service.app.storage import captures_of
 from service.measuring.simulated_sources import simulated_feed
@@ -43,7 +43,7 @@ def main() -> None:
     )
     rules = UnitRules(bearings={bearing.id: limits for bearing in machine.bearings})
     feed = simulated_feed(unit, SystemClock())
-    first = calibrate(feed.advance(50), calibration_of(unit))
+    first = sample_block([feed.advance(50)], calibration_of(unit))
     first = replace(first, clock=DeviceClock(0.01, 1.0, 0.5))
 
     def judging(blocks: list[SampleBlock]) -> float:
@@ -52,8 +52,8 @@ def main() -> None:
         return mean_us(blocks, lambda block: alarms.take(block, [], block.stop_ns))
 
     healthy = list(blocks_like(first))
-    broken = [replace(b, channel_quality=(bad(Reason.CLIPPED),) * 12) for b in healthy]
-    hot = [replace(b, slow={**b.slow, **dict.fromkeys(b.slow, Reading(85.0))}) for b in healthy]
+    broken = [replace(b, counts=np.full_like(b.counts, 32767)) for b in healthy]
+    hot = [replace(b, elsewhere=dict.fromkeys(b.slow, Reading(85.0))) for b in healthy]
     chatter = [b if n // 20 % 2 else broken[n] for n, b in enumerate(healthy)]
     with tempfile.TemporaryDirectory() as folder:
         service = plant.service.model_copy(update={"data_folder": folder})
@@ -81,9 +81,7 @@ def blocks_like(first: SampleBlock) -> Iterator[SampleBlock]:
         yield replace(
             first,
             first_index=number * 50,
-            start_ns=first.start_ns + round(number * BLOCK_S * 1e9),
-            samples=np.asarray(first.samples),
-            channel_quality=(GOOD,) * 12,
+            side=replace(first.side, start_ns=first.side.start_ns + round(number * BLOCK_S * 1e9)),
         )
 
 

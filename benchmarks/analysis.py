@@ -24,7 +24,7 @@ from core.machine.channel import Measurand
 from core.machine.unit import BearingAccuracy, BracketDynamics, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.quality import GOOD, Reading
-from core.samples.blocks import SampleBlock
+from core.samples.ring import Window
 from core.spectra.cross_spectrum import (
     BEARING_X,
     BEARING_Y,
@@ -37,8 +37,8 @@ from core.spectra.segments import ORDER1, VORTEX, SegmentTransform
 from core.spectra.vortex import roundness
 from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
 from core.stiffness.dynamic_lines import DynamicSettings
-from core.stiffness.stiffness_budget import dynamic_budgets, ratio_budget, transfer_budgets
-from core.stiffness.transfer import line_transfer
+from core.stiffness.dynamic_readings import dynamic_budgets
+from core.stiffness.stiffness_budget import ratio_budget, transfer_budgets
 
 REQUIRED_RATIO = 300.0
 WINDOW_S = 300
@@ -69,7 +69,7 @@ class Analysis:
     def add(self, samples: FloatArray, index: int) -> int:
         """Take in the newest segment and evaluate all bearings; count the results of `dynamic`."""
         self._transform.add(
-            SampleBlock(
+            Window(
                 unit=self._unit.id,
                 epoch=1,
                 first_index=index,
@@ -110,9 +110,7 @@ class Analysis:
             roundness(orders, line)
             for shaft, bearing in ((SHAFT_X, BEARING_X), (SHAFT_Y, BEARING_Y)):
                 ratio_budget(orders, line, shaft, bearing, bracket, accuracy)
-                transfer = line_transfer(orders, line, shaft, bearing, bracket)
-                if transfer is not None:
-                    transfer_budgets(transfer, bracket, accuracy)
+                transfer_budgets(orders, line, shaft, bearing, bracket, accuracy)
         return isinstance(found, DynamicStiffness)
 
 

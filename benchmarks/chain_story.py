@@ -172,7 +172,7 @@ class Watch:
         self._judge = FilmJudge(rules, BRACKETS_N_PER_M)
         for bearing, baseline in learned.baselines.items():
             self._judge.activate_baseline(bearing, baseline)
-        self._judge.set_response(learned.response)
+        self._judge.response = learned.response
         self._operation = UNKNOWN_OPERATION
         for row in range(max(first - WARM_UP_H * ROWS_PER_H, 0), first):
             self._operate(

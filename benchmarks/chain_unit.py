@@ -8,7 +8,6 @@ import math
 from dataclasses import dataclass
 
 from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.simulated.life.bearing import LIFE_BEARINGS, LifeBearing
 from acquisition.simulated.life.truth import RUNOUT_UM_PK
 from acquisition.simulated.plant.plant import CHUNK_SAMPLES
@@ -22,6 +21,7 @@ from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Estimator, Unit
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
+from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.units import ns_from_s
 
 RATE_HZ = 600.0

@@ -14,7 +14,7 @@ from acquisition.simulated.plant.rotor import RotorParameters
 from benchmarks.detection_fixed import BANDS, FixedThreshold
 from core.arrays import FloatArray
 from core.baseline.baseline import Origin, QuantityBaseline
-from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched, watched_values
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import DecisionHistory, decide_all, operation_history
@@ -79,7 +79,7 @@ class LearnedUnit:
         return decide_all(readings, found, LIMITS)
 
     def stiffness(self, bearing: str, direction: str) -> QuantityBaseline:
-        found = self.baselines[bearing].of(Watched.STIFFNESS, direction)
+        found = self.baselines[bearing].of(direction)
         if found is None:
             raise RuntimeError(f"unit {self.seed} has learned nothing of {bearing} {direction}")
         return found
@@ -113,8 +113,7 @@ class LearnedUnit:
 
     def _deviation(self, later: Later, bearing: str, direction: str) -> FloatArray:
         history, baseline = later.histories[bearing], self.stiffness(bearing, direction)
-        value, u_random = watched_values(history, Watched.STIFFNESS, direction)
-        found = baseline.compare(history.conditions, value, u_random)
+        found = baseline.compare_history(history)
         return np.where(later.is_settled, found.deviation, np.nan)
 
 

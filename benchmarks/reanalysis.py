@@ -32,7 +32,7 @@ def record(folder: Path) -> None:
     with RecordingWriter(folder, recorded_unit(unit), "benchmark") as writer:
         for _ in range(round(SECONDS * unit.rate_hz / unit.block_samples)):
             for block in delivery.take(feed.advance(unit.block_samples)):
-                writer.write_calibrated(block)
+                writer.write_block(block)
 
 
 def main() -> None:

@@ -27,16 +27,12 @@ from hypothesis import settings as hypothesis_settings
 from rigs.assessments import assessment as build_assessment
 from scipy.signal import lfilter
 
-from acquisition.delivery.calibration import (
-    ChannelCalibration,
-    RawBlock,
-    SlowCalibration,
-    UnitCalibration,
-)
+from acquisition.delivery.blocks import RawBlock
 from acquisition.simulated.feed import FeedEndedError
 from core.arrays import FloatArray
 from core.baseline.history import StiffnessHistory
 from core.monitor.assessment import Assessment
+from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 
 NS_PER_S = 1_000_000_000
 

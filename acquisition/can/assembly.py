@@ -15,7 +15,7 @@ from acquisition.can.gate import Frame
 from acquisition.can.plan import Part, Plan, Refusal, RefusalCounts
 from acquisition.can.side_values import RawBlockBuilder
 from acquisition.delivery.arrival import LeastDelay
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import FrameError
 from core.samples.axis import Epochs, SampleAxis
 from core.units import NS_PER_S
@@ -52,10 +52,6 @@ class FrameAssembler:
 
     Parameters
     ----------
-    n_channels, n_slow
-        Waveform and slow channels of the unit.
-    hold_s
-        For how long a message without counter is valid.
     begun_ns
         When this run of the adapter began, UTC; 0 where a log is read, which is the same each time.
     device_waits
@@ -70,28 +66,16 @@ class FrameAssembler:
         Instants that have been complete so far, confirmed or not.
     """
 
-    def __init__(
-        self,
-        plan: Plan,
-        n_channels: int,
-        n_slow: int,
-        rate_hz: float,
-        hold_s: float,
-        begun_ns: int = 0,
-        *,
-        device_waits: bool = False,
-    ) -> None:
-        self._plan, self._rate_hz = plan, rate_hz
-        self._device_waits = device_waits
-        self._hold = max(1, round(hold_s * rate_hz))
-        self._instant_s = plan.samples_per_frame / rate_hz
+    def __init__(self, plan: Plan, begun_ns: int = 0, *, device_waits: bool = False) -> None:
+        self._plan, self._device_waits = plan, device_waits
+        self._instant_s = plan.samples_per_frame / plan.rate_hz
         self.refused: RefusalCounts = Counter()
         is_exact = plan.reports_epoch and plan.widest_modulus >= _WIDE
-        self._axis = SampleAxis(rate_hz, Epochs(begun_ns, trusts_device=is_exact))
+        self._axis = SampleAxis(plan.rate_hz, Epochs(begun_ns, trusts_device=is_exact))
         self._senders = DuplicateSenderDetector()
-        self._counters = CounterFollower(plan, self._axis, rate_hz, self.refused, self._senders)
+        self._counters = CounterFollower(plan, self._axis, self.refused, self._senders)
         self._sets = FrameSets(plan, self.refused, self._senders)
-        self._builder = RawBlockBuilder(plan, n_channels, n_slow, rate_hz)
+        self._builder = RawBlockBuilder(plan)
         self._early: dict[str | int, float] = {}
         self._reported_epoch: int | None = None
         self.n_complete = 0
@@ -103,8 +87,7 @@ class FrameAssembler:
         self._epoch = self._axis.epoch
         self._sets.begin()
         self._held: list[Instant] = []
-        self._next, self._last_wave, self._is_spoilt = 0, self._plan.n_waves, False
-        self._n_lost = 0
+        self._next, self._last_wave = 0, self._plan.n_waves
         self._begin_timing()
         self._builder.begin_epoch()
 
@@ -171,7 +154,10 @@ class FrameAssembler:
         part = message.parts[number]
         if part.counter is None:
             self._note_now(part, data)
-            placed = [] if part.wave is None else self._place_in_turn(part, part.wave, data)
+            placed = []
+            if part.wave is not None:
+                self._begin_set(part.wave)
+                placed = [PlacedFrame(part, data, self._next)]
         else:
             placed = self._counters.place(part, data, passed_ns)
         blocks: list[RawBlock] = []
@@ -183,51 +169,28 @@ class FrameAssembler:
                 self._note(frame)
             instant = self._sets.add(frame, self._epoch)
             if instant is not None:
-                self._hold_instant(instant)
+                self._held.append(instant)
+                self._next = instant.stop_index
+                self.n_complete += 1
         return blocks
-
-    def _hold_instant(self, instant: Instant) -> None:
-        if self._n_lost:
-            rejected = {**instant.rejected, Refusal.UNCOUNTED_LOSS: self._n_lost}
-            instant = replace(instant, rejected=rejected)
-            self._n_lost = 0
-        self._held.append(instant)
-        self._next = instant.stop_index
-        self.n_complete += 1
 
     def _refuse(self, wave: int) -> None:
         if self._plan.counted:
             self._sets.refuse(wave)
             return
         self._begin_set(wave)
-        self._spoil()
-
-    def _place_in_turn(self, part: Part, wave: int, data: bytes) -> list[PlacedFrame]:
-        """Place a frame without counter: one that is out of turn begins another set."""
-        self._begin_set(wave)
-        if self._is_spoilt:
-            self.refused[Refusal.INCOMPLETE] += 1
-            return []
-        return [PlacedFrame(part, data, self._next)]
+        self._sets.open(self._next)
 
     def _begin_set(self, wave: int) -> None:
-        if wave <= self._last_wave:
-            if self._sets.pending:
-                self._spoil()
-            self._is_spoilt = False
-        self._last_wave = wave
-
-    def _spoil(self) -> None:
-        """Give up the set that is being collected."""
-        if not self._is_spoilt:
-            self._is_spoilt = True
-            self._sets.give_up(self._next)
+        """Without counters, a frame that is out of turn gives up a set and begins another one."""
+        if wave <= self._last_wave and self._next in self._sets.pending:
             self._next += self._plan.samples_per_frame
+        self._last_wave = wave
 
     def _note(self, frame: PlacedFrame) -> None:
         """Note the values beside a counted frame's waveforms, for the samples it belongs to."""
         for key, value in self._early.items():
-            self._builder.side.set(key, frame.first_index, value, self._hold)
+            self._builder.side.set(key, frame.first_index, value, self._plan.hold_uncounted)
         self._early.clear()
         part = frame.part
         hold = self._plan.hold_samples if part.wave is None else self._plan.samples_per_frame
@@ -246,7 +209,7 @@ class FrameAssembler:
             if start is None:
                 self._early[key] = read(data)
             else:
-                self._builder.side.set(key, start, read(data), self._hold)
+                self._builder.side.set(key, start, read(data), self._plan.hold_uncounted)
 
     def _note_epoch(self, reported: int) -> None:
         """Begin another count if a device without counters reports another epoch."""
@@ -282,7 +245,7 @@ class FrameAssembler:
         if self._origin_ns is None:
             self._origin_ns = now_ns
         now_s = (now_ns - self._origin_ns) / NS_PER_S
-        late_s = self._delay.late_s(now_s - stop / self._rate_hz, now_s)
+        late_s = self._delay.late_s(now_s - stop / self._plan.rate_hz, now_s)
         self._early_s += max(0.0, -late_s)
         passed_s = now_s - self._window_s
         if abs(passed_s) >= _WINDOW_S:
@@ -304,9 +267,8 @@ class FrameAssembler:
         n_lost = n_instants * self._plan.samples_per_frame
         n_held = sum(instant.n_samples for instant in self._held)
         n_rejected = sum(sum(instant.rejected.values()) for instant in self._held)
-        self._n_lost += n_lost + n_held + n_rejected
         self._next += n_lost
-        self._sets.move(n_lost)
+        self._sets.lose(n_lost, n_held + n_rejected)
         self._held = []
 
     def _built(self, arrived_ns: int) -> list[RawBlock]:

@@ -5,11 +5,10 @@ from contextlib import contextmanager
 from typing import Any
 
 import can
-from cantools.errors import Error as CantoolsError
 from serial import SerialException
 
 from acquisition.can.settings import CanLinkSettings
-from acquisition.can.slcan import SlcanBus, open_slcan
+from acquisition.can.slcan import SlcanBus
 from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
 
 _ID_MASK = 0x1FFFFFFF
@@ -25,7 +24,7 @@ LINUX_ERROR_FRAMES = ("socketcan", "slcan", "gs_usb", "virtual")
 
 @contextmanager
 def foreign_errors_renamed(where: str) -> Iterator[None]:
-    """Rename every exception of python-can, pyserial, cantools and the system."""
+    """Rename every exception of python-can, pyserial and the system."""
     try:
         yield
     except AcquisitionError:
@@ -34,18 +33,18 @@ def foreign_errors_renamed(where: str) -> Iterator[None]:
         raise ConfigError(f"{where}: {exc}") from exc
     except (can.CanError, SerialException, OSError, EOFError) as exc:
         raise LinkError(f"{where}: {exc or type(exc).__name__}") from exc
-    except (CantoolsError, ValueError) as exc:
+    except ValueError as exc:
         raise FrameError(f"{where}: {exc}") from exc
 
 
-def open_bus(settings: CanLinkSettings, ids: Iterable[int] | None) -> can.BusABC:
+def open_bus(settings: CanLinkSettings, ids: Iterable[int]) -> can.BusABC:
     """Open a bus for listening.
 
     Parameters
     ----------
     ids
         Frame ids that are wanted, as standard and as extended ones, so that a confusion of the two
-        is seen; None for all.
+        is seen.
 
     Raises
     ------
@@ -57,7 +56,7 @@ def open_bus(settings: CanLinkSettings, ids: Iterable[int] | None) -> can.BusABC
     where = str(settings)
     with foreign_errors_renamed(where):
         try:
-            return _opened(settings, None if ids is None else sorted(set(ids)))
+            return _opened(settings, sorted(set(ids)))
         except OSError as exc:
             if exc.errno == _NO_SUCH_FAMILY:
                 raise ConfigError(
@@ -75,17 +74,17 @@ def open_bus(settings: CanLinkSettings, ids: Iterable[int] | None) -> can.BusABC
             raise ConfigError(f"{where}: cannot be opened with these settings: {exc}") from exc
 
 
-def _opened(settings: CanLinkSettings, ids: list[int] | None) -> can.BusABC:
+def _opened(settings: CanLinkSettings, ids: list[int]) -> can.BusABC:
     options: dict[str, Any] = dict(settings.options)
     if settings.interface == "slcan":
-        return open_slcan(settings.channel, ids, **_slcan_speed(settings), **options)
+        return SlcanBus(settings.channel, frozenset(ids), **_slcan_speed(settings), **options)
     if settings.bitrate is not None:
         options["bitrate"] = settings.bitrate
     if settings.fd:
         options["fd"] = True
     if settings.data_bitrate is not None:
         options["data_bitrate"] = settings.data_bitrate
-    if ids is not None and settings.interface in _FILTERED_BY_KERNEL:
+    if settings.interface in _FILTERED_BY_KERNEL:
         options["can_filters"] = [{"can_id": i, "can_mask": _ID_MASK} for i in ids]
     return can.Bus(
         channel=settings.channel, interface=settings.interface, ignore_config=True, **options

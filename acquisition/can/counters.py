@@ -50,11 +50,10 @@ class CounterFollower:
         self,
         plan: Plan,
         axis: SampleAxis,
-        rate_hz: float,
         refused: RefusalCounts,
         senders: DuplicateSenderDetector,
     ) -> None:
-        self._plan, self._axis, self._rate_hz = plan, axis, rate_hz
+        self._plan, self._axis, self._rate_hz = plan, axis, plan.rate_hz
         self._near_samples = _NEAR_FRAMES * plan.samples_per_frame
         self._refused, self._senders = refused, senders
         self._epoch: int | None = None
@@ -71,7 +70,7 @@ class CounterFollower:
         """
         if part.counter is None:
             return []
-        counter, modulus = int(part.counter.read(data)) * part.counter.step, part.counter.modulus
+        counter, modulus = int(part.counter(data)) * part.counter_step, part.modulus
         epoch = int(part.epoch(data)) if part.epoch else None
         fits = epoch is None or epoch == self._epoch
         if fits and not self._doubted:

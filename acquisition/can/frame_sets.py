@@ -99,24 +99,13 @@ class Instant:
         return self.index + self.n_samples
 
 
-class PendingInstant:
-    """A set of frames that is still being collected."""
+@dataclass
+class _Pending:
+    """A set of frames, by number of the message, that is still being collected."""
 
-    def __init__(self, n_waves: int, n_samples: int) -> None:
-        self._frames: list[bytes | None] = [None] * n_waves
-        self._n_missing = n_waves
-        self.n_samples = n_samples
-        self._spoilt = False
-
-    def put(self, wave: int, data: bytes, n_samples: int) -> tuple[bytes, ...] | None:
-        """Take a frame; return all of them once they are complete and agree with each other."""
-        if self._frames[wave] is None:
-            self._n_missing -= 1
-        self._frames[wave] = data
-        self._spoilt |= n_samples != self.n_samples
-        if self._n_missing or self._spoilt:
-            return None
-        return tuple(frame for frame in self._frames if frame is not None)
+    n_samples: int
+    frames: dict[int, bytes] = field(default_factory=dict)
+    is_spoilt: bool = False
 
 
 class FrameSets:
@@ -137,96 +126,97 @@ class FrameSets:
     def begin(self) -> None:
         """Forget what belongs to the epoch that has ended."""
         n_waves = self._plan.n_waves
-        self.pending: dict[int, PendingInstant] = {}
-        self._newest = [-1] * n_waves
+        self.pending: dict[int, _Pending] = {}
         self._seen: list[dict[int, bytes]] = [{} for _ in range(n_waves)]
         self.stop = -1 if self._plan.counted else 0
-        self._n_incomplete = 0
+        self._n_incomplete = self._n_lost = 0
         self._n_unusable = [0] * n_waves
 
     def refuse(self, wave: int) -> None:
-        """Note that a frame of a waveform message came but could not be used."""
+        """Note that a counted frame of a waveform message came but could not be used."""
         self._n_unusable[wave] += self._plan.samples_per_frame
 
-    def give_up(self, index: int) -> None:
-        """Give up the set at an index: it is counted, but not used."""
-        self.pending.pop(index, None)
-        self._n_incomplete += self._plan.samples_per_frame
+    def open(self, index: int) -> None:
+        """Begin a set, whether or not a frame of it can be used."""
+        self.pending.setdefault(index, _Pending(self._plan.samples_per_frame))
 
-    def move(self, n_samples: int) -> None:
-        """Move the sets that are still collected, since samples before them were lost."""
+    def lose(self, n_samples: int, n_dropped: int) -> None:
+        """Move the sets that are still collected, since samples before them were lost.
+
+        Parameters
+        ----------
+        n_dropped
+            Samples of complete sets that cannot be used since others among them were lost.
+        """
+        self._n_lost += n_samples + n_dropped
         self.pending = {index + n_samples: found for index, found in self.pending.items()}
 
     def add(self, frame: PlacedFrame, epoch: int) -> Instant | None:
         """Put a frame to the others of its instant; return that, if it is complete."""
-        part, index, wave = frame.part, frame.first_index, frame.part.wave
-        if wave is None:
-            return None
-        if self._plan.counted and not self._is_new(wave, index, frame.data):
+        part, data, index = frame
+        wave = part.wave
+        if wave is None or not self._is_new(wave, index, data):
             return None
         n_samples = self._plan.samples_per_frame
-        if part.n_samples is not None and self._plan.counted:
-            n_samples = min(n_samples, int(part.n_samples(frame.data)))
+        if part.n_samples is not None:
+            n_samples = min(n_samples, int(part.n_samples(data)))
         pending = self.pending.get(index)
         if pending is None:
-            pending = self.pending[index] = PendingInstant(self._plan.n_waves, n_samples)
-        frames = pending.put(wave, frame.data, n_samples)
-        if frames is None:
-            if len(self.pending) > MAX_PENDING:
-                self._n_incomplete += self.pending.pop(min(self.pending)).n_samples
-            return None
-        return self._finished(epoch, index, pending.n_samples, frames)
+            pending = self.pending[index] = _Pending(n_samples)
+        pending.frames[wave] = data
+        pending.is_spoilt |= n_samples != pending.n_samples
+        if len(pending.frames) == self._plan.n_waves and not pending.is_spoilt:
+            return self._finished(epoch, index, pending)
+        if len(self.pending) > MAX_PENDING:
+            self._n_incomplete += self.pending.pop(min(self.pending)).n_samples
+        return None
 
     def _is_new(self, wave: int, index: int, data: bytes) -> bool:
         """Whether a frame is of a sample that is not past; it is then remembered."""
-        last = self._newest[wave]
+        seen = self._seen[wave]
+        last = next(reversed(seen), -1)
         if index <= last or index < self.stop:
-            self._refuse_old(wave, index, data)
+            self._refuse_old(seen, index, data)
             return False
         self._senders.note_fit()
-        self._newest[wave] = index
-        seen = self._seen[wave]
         seen[index] = data
         if len(seen) > _MAX_REMEMBERED:
             del seen[next(iter(seen))]
         return True
 
-    def _refuse_old(self, wave: int, index: int, data: bytes) -> None:
+    def _refuse_old(self, seen: dict[int, bytes], index: int, data: bytes) -> None:
         """Count a frame of a sample that is past; a device alone never sends one in two ways."""
-        if self._contradicts(self._seen[wave], index, data):
+        n_samples = self._plan.samples_per_frame
+        near = range(index - n_samples + 1, index + n_samples)
+        if seen[index] != data if index in seen else any(n in seen for n in near):
             self._refused[Refusal.CONTRADICTORY] += 1
             self._senders.note_contradiction()
             return
-        again = Refusal.DUPLICATE if index == self._newest[wave] else Refusal.OUT_OF_ORDER
-        self._refused[again] += 1
+        again = index == next(reversed(seen), -1)
+        self._refused[Refusal.DUPLICATE if again else Refusal.OUT_OF_ORDER] += 1
 
-    def _contradicts(self, seen: dict[int, bytes], index: int, data: bytes) -> bool:
-        if index in seen:
-            return seen[index] != data
-        n_samples = self._plan.samples_per_frame
-        return any(n in seen for n in range(index - n_samples + 1, index + n_samples))
-
-    def _finished(
-        self, epoch: int, index: int, n_samples: int, frames: tuple[bytes, ...]
-    ) -> Instant | None:
+    def _finished(self, epoch: int, index: int, complete: _Pending) -> Instant | None:
         """Hand an instant on; those before it will never be complete, since all parts are past."""
         for earlier in [i for i in self.pending if i <= index]:
             given_up = self.pending.pop(earlier)
             self._n_incomplete += given_up.n_samples if earlier < index else 0
-        if n_samples == 0:
+        if complete.n_samples == 0:
             return None
         rejected = self._rejected(index)
-        self.stop = index + n_samples
-        return Instant(epoch, index, n_samples, frames, rejected)
+        self.stop = index + complete.n_samples
+        frames = tuple(complete.frames[wave] for wave in range(self._plan.n_waves))
+        return Instant(epoch, index, complete.n_samples, frames, rejected)
 
     def _rejected(self, index: int) -> dict[Refusal, int]:
         """What of the jump up to an index was refused; the rest of it never came."""
         n_jump = index - self.stop if self.stop >= 0 else 0
         incomplete = min(self._n_incomplete, n_jump)
         unusable = min(*self._n_unusable, n_jump - incomplete)
-        self._n_incomplete = 0
+        found = {
+            Refusal.INCOMPLETE: incomplete,
+            Refusal.WRONG_LENGTH: unusable,
+            Refusal.UNCOUNTED_LOSS: self._n_lost,
+        }
+        self._n_incomplete = self._n_lost = 0
         self._n_unusable = [0] * self._plan.n_waves
-        if not n_jump:
-            return {}
-        found = {Refusal.INCOMPLETE: incomplete, Refusal.WRONG_LENGTH: unusable}
         return {reason: n for reason, n in found.items() if n}

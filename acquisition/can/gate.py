@@ -1,6 +1,8 @@
 """Only exact frames of configured messages pass; error frames are counted."""
 
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
+
+from can import Message
 
 from acquisition.can.dbc import frame_key
 from acquisition.can.plan import Plan, Refusal, RefusalCounts
@@ -8,18 +10,6 @@ from acquisition.errors import LinkError
 
 Frame: TypeAlias = tuple[int, bytes | None]
 """Frame key and data; None as data if it came but cannot be used."""
-
-
-class Message(Protocol):
-    """The part of python-can's message that the gate reads."""
-
-    arbitration_id: int
-    is_extended_id: bool
-    is_remote_frame: bool
-    is_error_frame: bool
-    is_fd: bool
-    dlc: int
-    data: bytearray
 
 
 class FrameGate:

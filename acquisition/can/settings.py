@@ -5,8 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from acquisition.errors import ConfigError
-
 
 @dataclass(frozen=True, kw_only=True)
 class CanLinkSettings:
@@ -120,16 +118,3 @@ class CanSettings:
     stamps: Literal["host", "interface"] = "host"
     queue_frames: int = 65536
     when_full: Literal["drop", "wait"] = "drop"
-
-    def __post_init__(self) -> None:
-        for name, value in (
-            ("hold_s", self.hold_s),
-            ("stale_after_s", self.stale_after_s),
-            ("queue_frames", self.queue_frames),
-        ):
-            if not 0 < value < float("inf"):
-                raise ConfigError(f"can: {name} is {value}, must be above 0")
-        if isinstance(self.hold_samples, int) and self.hold_samples < 1:
-            raise ConfigError(f"can: hold_samples is {self.hold_samples}, must be 1 or more")
-        if (self.seconds is None) != (self.microseconds is None):
-            raise ConfigError("can: seconds and microseconds must be given together, or neither")

@@ -20,7 +20,7 @@ from acquisition.can.plan import (
     RefusalCounts,
 )
 from acquisition.delivery.arrival import HostStamps
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from core.arrays import RawArray
 from core.samples.blocks import Rejection
 from core.units import NS_PER_S
@@ -39,9 +39,8 @@ class SideTable:
     An old value never passes for a new one: beyond the samples that it holds for there is none.
     """
 
-    def __init__(self, plan: Plan, rate_hz: float) -> None:
+    def __init__(self, plan: Plan) -> None:
         self._plan = plan
-        self._rate_hz = rate_hz
         self.clear()
 
     def clear(self) -> None:
@@ -78,7 +77,7 @@ class SideTable:
             part = self._entry(MICROSECONDS, start)
             if part is not None and part[0] == start and part[1] < _US_PER_S:
                 stamp_ns = (int(second) * _US_PER_S + int(part[1])) * 1000
-                return stamp_ns + round((index - start) * NS_PER_S / self._rate_hz)
+                return stamp_ns + round((index - start) * NS_PER_S / self._plan.rate_hz)
         return None
 
     def _entry(self, key: str | int, index: int) -> _Entry | None:
@@ -111,14 +110,10 @@ class RawBlockBuilder:
         What the device sent beside the samples.
     """
 
-    def __init__(self, plan: Plan, n_channels: int, n_slow: int, rate_hz: float) -> None:
+    def __init__(self, plan: Plan) -> None:
         self._plan = plan
-        self._n_channels, self._n_slow = n_channels, n_slow
-        self._rate_hz = rate_hz
-        parts = (part for m in plan.messages.values() for part in m.parts.values())
-        self._needs_header = any(p.epoch and p.counter and p.wave is None for p in parts)
-        self.side = SideTable(plan, rate_hz)
-        self._stamps = HostStamps(rate_hz)
+        self.side = SideTable(plan)
+        self._stamps = HostStamps(plan.rate_hz)
         self._rejected: RefusalCounts = Counter()
 
     def begin_epoch(self) -> None:
@@ -145,21 +140,21 @@ class RawBlockBuilder:
         return blocks
 
     def _block(self, epoch: int, first_index: int, samples: RawArray) -> RawBlock | None:
-        if self._needs_header and self.side.at(EPOCH, first_index) is None:
+        if self._plan.needs_header and self.side.at(EPOCH, first_index) is None:
             self._rejected[Refusal.NO_HEADER] += samples.shape[1]
             return None
         start_ns = self._start_ns(first_index)
         if start_ns is None:
             self._rejected[Refusal.NO_TIME] += samples.shape[1]
             return None
-        slow = [self.side.at(number, first_index) for number in range(self._n_slow)]
+        slow = [self.side.at(number, first_index) for number in range(self._plan.n_slow)]
         rejected = tuple(Rejection(reason.value, n) for reason, n in self._rejected.items() if n)
         self._rejected.clear()
         return RawBlock(
             epoch=epoch,
             first_index=first_index,
             start_ns=start_ns,
-            rate_hz=self._rate_hz,
+            rate_hz=self._plan.rate_hz,
             counts=samples,
             ok=self._ok(first_index),
             slow=tuple(np.nan if value is None else value for value in slow),
@@ -169,9 +164,9 @@ class RawBlockBuilder:
     def _ok(self, index: int) -> tuple[bool, ...]:
         """The device's verdict on each channel; good only while the device reports it so."""
         if OK_BITS not in self._plan.quantities:
-            return (True,) * self._n_channels
+            return (True,) * self._plan.n_channels
         bits = int(self.side.at(OK_BITS, index) or 0)
-        return tuple(bool(bits >> c & 1) for c in range(self._n_channels))
+        return tuple(bool(bits >> c & 1) for c in range(self._plan.n_channels))
 
     def _start_ns(self, index: int) -> int | None:
         if SECONDS in self._plan.quantities:

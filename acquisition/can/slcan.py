@@ -8,7 +8,7 @@ is refused, and bytes are read in chunks.
 from binascii import Error as HexError
 from binascii import unhexlify
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Container
 from select import select
 from typing import Any
 
@@ -54,21 +54,32 @@ class SlcanBus(slcanBus):
     Parameters
     ----------
     ids
-        Frame ids that are wanted, whatever their kind; None for all.
+        Frame ids that are wanted, whatever their kind.
     """
 
-    def __init__(self, channel: str, ids: Iterable[int] | None = None, **options: Any) -> None:
-        self._ids = None if ids is None else frozenset(ids)
-        self._messages: deque[Message] = deque()
+    def __init__(self, channel: str, ids: Container[int], **options: Any) -> None:
+        self._ids = ids
+        self._found: deque[Message | None] = deque()  # None for a malformed line
         self._rest = b""
         self._skipping = True  # the stream may begin in the middle of a line
-        self._n_malformed = 0
-        super().__init__(channel, **{"timeout": 0.0, **options})
+        try:
+            super().__init__(channel, **{"timeout": 0.0, **options})
+        except Exception:  # its commands could not be sent
+            port = getattr(self, "serialPortOrig", None)
+            if port is not None:
+                port.close()
+            raise
 
     def _recv_internal(self, timeout: float | None) -> tuple[Message | None, bool]:
-        if not self._messages:
+        """Return the next frame; raise FrameError for a line that is neither frame nor answer."""
+        if not self._found:
             self._read_chunk(timeout)
-        return (self._messages.popleft(), True) if self._messages else (None, False)
+        if not self._found:
+            return None, False
+        message = self._found.popleft()
+        if message is None:
+            raise FrameError("a line that is neither an slcan frame nor an answer")
+        return message, True
 
     def _read_chunk(self, timeout: float | None) -> None:
         """Wait until there is something, then take all there is."""
@@ -86,19 +97,18 @@ class SlcanBus(slcanBus):
             try:
                 message = _parsed(line, self._ids)
             except FrameError:
-                self._n_malformed += 1
-                continue
-            if message is not None:
-                self._messages.append(message)
+                self._found.append(None)
+            else:
+                self._found.extend([message] if message else [])
         if len(self._rest) > _MAX_LINE and not self._skipping:
-            self._n_malformed += 1
+            self._found.append(None)
             self._skipping = True
         if self._skipping:
             self._rest = b""
 
     @classmethod
     def require_speed(cls, bitrate: int | None, data_bitrate: int | None) -> None:
-        """Refuse speeds that the protocol cannot express.
+        """Refuse speeds that the protocol cannot express; python-can calls that a lost link.
 
         Raises
         ------
@@ -113,11 +123,6 @@ class SlcanBus(slcanBus):
                 words = ", ".join(str(n) for n in known if n)
                 raise ConfigError(f"slcan: {name} is {speed}, allowed are {words}")
 
-    def take_n_malformed(self) -> int:
-        """Lines since the last call that were neither a frame nor an answer."""
-        n_malformed, self._n_malformed = self._n_malformed, 0
-        return n_malformed
-
     def shutdown(self) -> None:
         """Close the adapter's channel and the port, even if the adapter is gone."""
         port = self.serialPortOrig
@@ -130,20 +135,7 @@ class SlcanBus(slcanBus):
                 socket.close()
 
 
-def open_slcan(channel: str, ids: Iterable[int] | None, **options: Any) -> SlcanBus:
-    """Open an adapter; a port is not left open if its commands cannot be sent."""
-    bus = SlcanBus.__new__(SlcanBus)
-    try:
-        bus.__init__(channel, ids, **options)  # type: ignore[misc]
-    except Exception:
-        port = getattr(bus, "serialPortOrig", None)
-        if port is not None:
-            port.close()
-        raise
-    return bus
-
-
-def _parsed(line: bytes, ids: frozenset[int] | None) -> Message | None:
+def _parsed(line: bytes, ids: Container[int]) -> Message | None:
     """Return the frame of a line; None if it is an answer or not wanted.
 
     Raises
@@ -160,7 +152,7 @@ def _parsed(line: bytes, ids: frozenset[int] | None) -> Message | None:
     try:
         # not int(…, 16), which takes "0x1", "1_0" and " 1" for numbers
         frame_id = int.from_bytes(unhexlify(line[1:end].rjust(8, b"0")), "big")
-        if ids is not None and frame_id not in ids:
+        if frame_id not in ids:
             return None
         code = unhexlify(b"0" + line[end : end + 1])[0]
         data = unhexlify(line[end + 1 :])

@@ -3,22 +3,21 @@
 import asyncio
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterable, Mapping
 from contextlib import aclosing, asynccontextmanager
+from functools import partial
 
 import can
 
 from acquisition.can.assembly import MAX_UNSURE_S, FrameAssembler
-from acquisition.can.bus import LINUX_ERROR_FRAMES, open_bus
+from acquisition.can.bus import open_bus
 from acquisition.can.compiler import compile_plan
-from acquisition.can.gate import FrameGate
 from acquisition.can.plan import SECONDS
 from acquisition.can.reader import FrameReader
 from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.clock import Clock
-from acquisition.delivery.arrival import InterfaceClock
-from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.blocks import BlockAssembler, RawBlock
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import UnitCalibration
 from core.units import ns_from_s
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
@@ -64,13 +63,7 @@ class CanSource:
         self._stale_after_s = max(settings.stale_after_s, _MIN_STALE_INSTANTS * instant_s)
         self._delivery = BlockAssembler(calibration, stamped=SECONDS in self._plan.quantities)
         self._assembler = FrameAssembler(
-            self._plan,
-            n_channels=len(calibration.channels),
-            n_slow=len(calibration.slow),
-            rate_hz=calibration.rate_hz,
-            hold_s=settings.hold_s,
-            begun_ns=clock.now_ns(),
-            device_waits=settings.when_full == "wait",
+            self._plan, clock.now_ns(), device_waits=settings.when_full == "wait"
         )
 
     @property
@@ -89,7 +82,10 @@ class CanSource:
         ConfigError
             If the interface can never work here.
         """
-        reader = self._reader()
+        settings, plan = self._settings, self._plan
+        ids = [message.message.frame_id for message in plan.messages.values()]
+        open_bus = partial(self._opener, settings.link, ids)
+        reader = FrameReader(settings, open_bus, plan, self._assembler.refused, self._clock)
         self._assembler.listen()
         try:
             await reader.start()
@@ -97,21 +93,6 @@ class CanSource:
                 yield blocks
         finally:
             await reader.stop()
-
-    def _reader(self) -> FrameReader:
-        settings, plan = self._settings, self._plan
-        ids = [message.message.frame_id for message in plan.messages.values()]
-        return FrameReader(
-            lambda: self._opener(settings.link, ids),
-            str(settings.link),
-            FrameGate(plan, self._assembler.refused),
-            self._assembler.refused,
-            self._clock,
-            max_frames=settings.queue_frames,
-            when_full=settings.when_full,
-            judges_errors=settings.link.interface in LINUX_ERROR_FRAMES,
-            stamps=InterfaceClock() if settings.stamps == "interface" else None,
-        )
 
     async def _blocks(self, reader: FrameReader) -> AsyncGenerator[SampleBlock, None]:
         silent_s = doubtful_s = 0.0

@@ -1,91 +1,179 @@
-"""The last stage of every adapter: stamps checked, blocks on their grid, counts calibrated."""
+"""The last stage of every adapter: stamps checked, blocks cut and joined on their grid."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from acquisition.delivery.arrival import Arrival, ArrivalModel
-from acquisition.delivery.calibration import RawBlock, UnitCalibration, calibrate
+from core.arrays import RawArray
 from core.samples.axis import ClockTolerance
-from core.samples.blocks import DeviceClock, SampleBlock, StampFault
+from core.samples.blocks import (
+    DeviceClock,
+    Rejection,
+    SampleBlock,
+    SideValues,
+    StampFault,
+    joined,
+)
+from core.samples.calibration import UnitCalibration
 from core.units import NS_PER_S, ns_from_s
+
+MIN_BLOCK_S = 0.25
+"""Shortest blocks of what has no reason to be shorter: alarms of channels come no sooner."""
 
 _STAMP_NS = 1000
 """Resolution of a stamp. Every profile can carry it, and slow values in single precision, so that a
 recording has the same numbers when it is replayed over any wire."""
 
 
-class BlockGrid:
-    """Cuts and joins raw blocks, so that they begin at multiples of a length and are that long.
-
-    Only where samples are missing, or where the device restarts, is a block shorter. A joined
-    block is OK where all its parts are, and has the slow values of its first sample.
+@dataclass(frozen=True)
+class RawBlock:
+    """Consecutive samples as a device delivers them, with one set of values beside them.
 
     Parameters
     ----------
-    block_samples
-        Samples of each channel in a block.
+    counts
+        (n_channels, n_samples) int16 counts of the converter; or, from a device that has none,
+        float32 engineering units, not a number where the device has no sample.
+    start_ns
+        Time of the first sample, by the device's stamps or by the host's clock.
+    ok
+        (n_channels,) the device's own verdict on each channel.
+    slow
+        One value for each configured slow channel, NaN where the device has none.
     """
 
-    def __init__(self, block_samples: int) -> None:
-        self._length = block_samples
-        self._parts: list[RawBlock] = []
+    epoch: int
+    first_index: int
+    start_ns: int
+    rate_hz: float
+    counts: RawArray
+    ok: tuple[bool, ...]
+    slow: tuple[float, ...]
+    rejected: tuple[Rejection, ...] = ()
 
-    def put(self, raw: RawBlock) -> list[RawBlock]:
-        """Take what a device delivered; return the blocks that this completes, in order."""
-        done = [] if self._continued_by(raw) else self.flush()
-        for piece in self._pieces(raw):
-            self._parts.append(piece)
-            if piece.stop_index % self._length == 0:
-                done += self.flush()
-        return done
+    @property
+    def n_samples(self) -> int:
+        """Samples per channel."""
+        return int(self.counts.shape[1])
 
-    def flush(self) -> list[RawBlock]:
-        """Return the block that is not complete, when nothing follows on it."""
-        parts, self._parts = self._parts, []
-        return [_joined(parts)] if parts else []
+    @property
+    def stop_index(self) -> int:
+        """Index of the first sample after the block."""
+        return self.first_index + self.n_samples
 
-    def _continued_by(self, raw: RawBlock) -> bool:
-        if not self._parts:
-            return True
-        last = self._parts[-1]
-        return (
-            not raw.rejected
-            and raw.epoch == last.epoch
-            and raw.first_index == last.stop_index
-            and raw.counts.dtype == last.counts.dtype
+
+def sample_block(raws: Sequence[RawBlock], calibration: UnitCalibration) -> SampleBlock:
+    """Raw blocks that follow each other as one block with a cell for each."""
+    first = raws[0]
+    if len(raws) == 1:
+        counts, side = first.counts, SideValues.of(first.start_ns, first.ok, first.slow)
+    else:
+        counts = np.concatenate([raw.counts for raw in raws], axis=1)
+        side = SideValues(
+            starts=np.array([raw.first_index - first.first_index for raw in raws]),
+            start_ns=np.array([raw.start_ns for raw in raws]),
+            ok=np.array([raw.ok for raw in raws]).T,
+            slow=np.array([raw.slow for raw in raws], dtype=np.float64).T,
+        )
+    return SampleBlock(
+        calibration=calibration,
+        epoch=first.epoch,
+        first_index=first.first_index,
+        counts=counts,
+        side=side,
+        rejected=first.rejected,
+    )
+
+
+def cells_of(block: SampleBlock) -> Iterator[RawBlock]:
+    """The cells of a block as raw blocks, without what another device measures."""
+    side = block.side
+    stops = [*side.starts[1:].tolist(), block.n_samples]
+    columns = (side.starts.tolist(), stops, side.start_ns.tolist(), side.ok.T.tolist())
+    for start, stop, start_ns, ok, slow in zip(*columns, side.slow.T.tolist(), strict=True):
+        yield RawBlock(
+            epoch=block.epoch,
+            first_index=block.first_index + start,
+            start_ns=start_ns,
+            rate_hz=block.rate_hz,
+            counts=block.counts[:, start:stop],
+            ok=tuple(ok),
+            slow=tuple(slow),
+            rejected=() if start else block.rejected,
         )
 
-    def _pieces(self, raw: RawBlock) -> list[RawBlock]:
-        first_cut = -raw.first_index % self._length or self._length
-        starts = [0, *range(first_cut, raw.n_samples, self._length)]
-        return [
-            _part(raw, start, stop)
-            for start, stop in zip(starts, [*starts[1:], raw.n_samples], strict=True)
-        ]
+
+class BlockJoiner:
+    """Joins consecutive blocks into whole cells, which begin at multiples of their length.
+
+    However a wire has cut them, the same samples make the same cells. Only where samples are
+    missing, or where the device restarts, is a cell shorter. It is OK where all that it is made of
+    is, and has the slow values of its first sample.
+
+    Parameters
+    ----------
+    cell_samples
+        Samples of each channel in a cell.
+    """
+
+    def __init__(self, cell_samples: int) -> None:
+        self._cell = cell_samples
+        self._parts: list[SampleBlock] = []
+
+    def put(self, block: SampleBlock) -> list[SampleBlock]:
+        """Take what a device delivered; return the blocks that this completes, in order."""
+        done = [] if self._continued_by(block) else self.flush()
+        self._parts.append(block)
+        n_rest = block.stop_index % self._cell
+        n_whole = block.stop_index - n_rest - self._parts[0].first_index
+        if n_whole <= 0:
+            return done
+        whole = joined(self._parts)
+        done.append(_in_cells(whole.from_sample(0, n_whole), self._cell))
+        self._parts = []
+        if n_rest:
+            self._parts.append(replace(whole.from_sample(n_whole), stamp_fault=None))
+        return done
+
+    def flush(self) -> list[SampleBlock]:
+        """Return the block that is not complete, when nothing follows on it."""
+        parts, self._parts = self._parts, []
+        return [_in_cells(joined(parts), self._cell)] if parts else []
+
+    def _continued_by(self, block: SampleBlock) -> bool:
+        return not self._parts or _follows(self._parts[-1], block)
 
 
-def _part(raw: RawBlock, start: int, stop: int) -> RawBlock:
-    start_ns = raw.start_ns + round(start * NS_PER_S / raw.rate_hz)
-    return replace(
-        raw,
-        first_index=raw.first_index + start,
-        start_ns=start_ns // _STAMP_NS * _STAMP_NS,
-        counts=raw.counts[:, start:stop],
-        slow=tuple(np.array(raw.slow, dtype=np.float32).tolist()),
-        rejected=() if start else raw.rejected,
+def _follows(before: SampleBlock, block: SampleBlock) -> bool:
+    """Whether a block continues another one, without anything missing or refused in between."""
+    return (
+        not block.rejected
+        and block.epoch == before.epoch
+        and block.first_index == before.stop_index
+        and block.counts.dtype == before.counts.dtype
     )
 
 
-def _joined(parts: list[RawBlock]) -> RawBlock:
-    if len(parts) == 1:
-        return parts[0]
-    return replace(
-        parts[0],
-        counts=np.concatenate([part.counts for part in parts], axis=1),
-        ok=tuple(all(oks) for oks in zip(*(part.ok for part in parts), strict=True)),
-    )
+def _in_cells(block: SampleBlock, length: int) -> SampleBlock:
+    """The same block in cells that begin at multiples of a length, with stamps that wires carry."""
+    side, first_cut = block.side, -block.first_index % length or length
+    starts = np.concatenate([[0], np.arange(first_cut, block.n_samples, length)])
+    start_ns, ok, slow = side.start_ns, side.ok, side.slow
+    if not np.array_equal(starts, side.starts):
+        at = np.searchsorted(side.starts, starts, side="right") - 1
+        passed_ns = (starts - side.starts[at]) * NS_PER_S / block.rate_hz
+        start_ns, slow = start_ns[at] + np.rint(passed_ns).astype(np.int64), slow[:, at]
+        edges = np.union1d(side.starts, starts)
+        of_edges = ok[:, np.searchsorted(side.starts, edges, side="right") - 1]
+        ok = np.logical_and.reduceat(of_edges, np.searchsorted(edges, starts), axis=1)
+    start_ns = start_ns // _STAMP_NS * _STAMP_NS
+    slow = slow.astype(np.float32).astype(np.float64)
+    return replace(block, side=SideValues(starts, start_ns, ok, slow))
 
 
 _TOLERANCE = ClockTolerance()
@@ -108,39 +196,73 @@ class StampCheck:
     """
 
     def __init__(self) -> None:
-        self._good: RawBlock | None = None
-        self._doubted: RawBlock | None = None
+        self._good: _Stamp | None = None
+        self._doubted: _Stamp | None = None
         self.n_faults = 0
 
-    def check(self, raw: RawBlock) -> tuple[RawBlock, StampFault | None]:
-        """Return the block with a stamp that can be used, and what was wrong with its own."""
+    def check(self, block: SampleBlock) -> tuple[SampleBlock, StampFault | None]:
+        """Return the block with stamps that can be used, and what was first wrong with its own."""
+        side, index = block.side, block.first_index + block.side.starts
+        if side.n_cells > 1 and self._all_fit(block, index):
+            return block, None
+        stamps = zip(index.tolist(), side.start_ns.tolist(), strict=True)
+        found = [self._checked(_Stamp(block.epoch, *stamp, block.rate_hz)) for stamp in stamps]
+        faults = [fault for _, fault in found if fault]
+        if not faults:
+            return block, None
+        self.n_faults += len(faults)
+        side = replace(side, start_ns=np.array([start_ns for start_ns, _ in found]))
+        return replace(block, side=side), faults[0]
+
+    def _checked(self, stamp: "_Stamp") -> tuple[int, StampFault | None]:
+        """Time of a cell, and what is wrong with its own stamp."""
         good, doubted = self._good, self._doubted
-        if good is None or raw.epoch != good.epoch:
-            return self._believe(raw), None
-        fault = _fault(good, raw)
+        if good is None or stamp.epoch != good.epoch:
+            self._believe(stamp)
+            return stamp.start_ns, None
+        fault = _fault(good, stamp)
         was_set = (
-            doubted is not None and _fault(doubted, raw) is None and not _has_failed(good, raw)
+            doubted is not None and _fault(doubted, stamp) is None and not _has_failed(good, stamp)
         )
         if fault is None or was_set:
-            return self._believe(raw), None
-        self._doubted = raw
-        self.n_faults += 1
-        return replace(raw, start_ns=good.start_ns + _expected_ns(good, raw)), fault
+            self._believe(stamp)
+            return stamp.start_ns, None
+        self._doubted = stamp
+        return good.start_ns + _expected_ns(good, stamp), fault
 
-    def _believe(self, raw: RawBlock) -> RawBlock:
-        self._good, self._doubted = raw, None
-        return raw
+    def _all_fit(self, block: SampleBlock, index: npt.NDArray[np.int64]) -> bool:
+        """Whether all stamps of a block fit beyond doubt; if so, believe them at once."""
+        good, times_ns = self._good, block.side.start_ns
+        if good is not None and good.epoch == block.epoch:
+            index = np.concatenate([[good.first_index], index])
+            times_ns = np.concatenate([[good.start_ns], times_ns])
+        n_passed, elapsed_ns = np.diff(index), np.diff(times_ns)
+        off_ns = np.abs(elapsed_ns - n_passed * (NS_PER_S / block.rate_hz))
+        if (n_passed <= 0).any() or (elapsed_ns <= 0).any() or (off_ns > _TOLERANCE.over(0)).any():
+            return False
+        self._believe(_Stamp(block.epoch, int(index[-1]), int(times_ns[-1]), block.rate_hz))
+        return True
+
+    def _believe(self, stamp: "_Stamp") -> None:
+        self._good, self._doubted = stamp, None
 
 
-def _expected_ns(before: RawBlock, after: RawBlock) -> int:
+class _Stamp(NamedTuple):
+    epoch: int
+    first_index: int
+    start_ns: int
+    rate_hz: float
+
+
+def _expected_ns(before: _Stamp, after: _Stamp) -> int:
     return ns_from_s((after.first_index - before.first_index) / after.rate_hz)
 
 
-def _has_failed(before: RawBlock, after: RawBlock) -> bool:
+def _has_failed(before: _Stamp, after: _Stamp) -> bool:
     return before.start_ns in _POSSIBLE_NS and after.start_ns not in _POSSIBLE_NS
 
 
-def _fault(before: RawBlock, after: RawBlock) -> StampFault | None:
+def _fault(before: _Stamp, after: _Stamp) -> StampFault | None:
     expected_ns = _expected_ns(before, after)
     elapsed_ns = after.start_ns - before.start_ns
     if elapsed_ns == 0 and expected_ns:
@@ -153,7 +275,7 @@ def _fault(before: RawBlock, after: RawBlock) -> StampFault | None:
 
 
 class BlockAssembler:
-    """Checks stamps, brings blocks onto their grid and calibrates them.
+    """Checks stamps and joins what a device delivers into blocks.
 
     An adapter keeps one for as long as it lives, across connections: an unfinished block may be
     finished by the next one.
@@ -176,7 +298,7 @@ class BlockAssembler:
         self._calibration = calibration
         self._stamped = stamped
         self._samples_when_asked = samples_when_asked
-        self._grid = BlockGrid(calibration.block_samples)
+        self._joiner = BlockJoiner(calibration.block_samples)
         self._stamps = StampCheck()
         self._arrivals = ArrivalModel(calibration.rate_hz)
         self._fault: StampFault | None = None
@@ -206,23 +328,10 @@ class BlockAssembler:
         has_stamp
             Whether this block has one of the device's stamps, if the device stamps at all.
         """
-        raw, own_fault = self._stamps.check(raw)
-        blocks = self._grid.put(raw)
-        fault = own_fault or self._fault
-        if blocks:
-            self._fault = None
-        if arrived is None:
-            return [self._sample_block(block, fault) for block in blocks]
-        self._note_arrival(raw, has_stamp and own_fault is None, arrived)
-        clock = self._reading()
-        sampled_s = arrived.steady_s - held_s
-        return [
-            replace(self._sample_block(block, fault), clock=clock, sampled_s=sampled_s)
-            for block in blocks
-        ]
+        return self._joined([self._checked(raw, arrived, held_s, has_stamp)])
 
     def take_together(
-        self, raws: Sequence[RawBlock], arrived: Arrival, read_for_s: float = 0.0
+        self, raws: Sequence[RawBlock], arrived: Arrival | None = None, read_for_s: float = 0.0
     ) -> list[SampleBlock]:
         """Take raw blocks that came together: the device has held all but the last for longer.
 
@@ -235,24 +344,40 @@ class BlockAssembler:
         n_after = sum(raw.n_samples for raw in raws)
         for raw in raws:
             n_after -= raw.n_samples
-            blocks += self.take(raw, arrived, read_for_s + n_after / raw.rate_hz)
-        return blocks
+            blocks.append(self._checked(raw, arrived, read_for_s + n_after / raw.rate_hz))
+        return self._joined(blocks)
+
+    def take_block(self, block: SampleBlock) -> list[SampleBlock]:
+        """Take a recorded block, as `take` does."""
+        return self._joined([self._marked(*self._stamps.check(block))])
 
     def flush(self) -> list[SampleBlock]:
         """Return what is left at the end, as of a recording."""
-        return [calibrate(raw, self._calibration) for raw in self._grid.flush()]
+        return self._joiner.flush()
 
-    def _reading(self) -> DeviceClock:
+    def _checked(
+        self, raw: RawBlock, arrived: Arrival | None, held_s: float, has_stamp: bool = True
+    ) -> SampleBlock:
+        block, fault = self._stamps.check(sample_block([raw], self._calibration))
+        if arrived is not None:
+            stop_ns = block.stop_ns if self._stamped and has_stamp and not fault else None
+            self._arrivals.add(raw.epoch, raw.stop_index, stop_ns, arrived)
+            block = replace(block, sampled_s=arrived.steady_s - held_s)
+        return self._marked(block, fault)
+
+    def _marked(self, block: SampleBlock, own_fault: StampFault | None) -> SampleBlock:
+        fault, self._fault = own_fault or self._fault, None
+        return replace(block, stamp_fault=fault) if fault else block
+
+    def _joined(self, blocks: Sequence[SampleBlock]) -> list[SampleBlock]:
+        """Blocks that these complete, as long as they follow each other."""
+        cuts = [n for n in range(1, len(blocks)) if not _follows(blocks[n - 1], blocks[n])]
+        runs = itertools.pairwise([0, *cuts, len(blocks)])
+        done = [b for run in runs if blocks for b in self._joiner.put(joined(blocks[slice(*run)]))]
+        return [b if b.sampled_s is None else replace(b, clock=self._clock()) for b in done]
+
+    def _clock(self) -> DeviceClock:
         clock = self._arrivals.device_clock(self._stamps.n_faults)
         if self._samples_when_asked:
             return replace(clock, drift_ppm=None, u_drift_ppm=None)
         return clock
-
-    def _note_arrival(self, raw: RawBlock, is_good: bool, arrived: Arrival) -> None:
-        stop_ns = raw.start_ns + ns_from_s(raw.n_samples / raw.rate_hz)
-        own_stamp = self._stamped and is_good
-        self._arrivals.add(raw.epoch, raw.stop_index, stop_ns if own_stamp else None, arrived)
-
-    def _sample_block(self, raw: RawBlock, fault: StampFault | None) -> SampleBlock:
-        block = calibrate(raw, self._calibration)
-        return block if fault is None else replace(block, stamp_fault=fault)

@@ -5,10 +5,10 @@ from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
 from typing import Protocol
 
-from acquisition.delivery.calibration import UnitCalibration
 from acquisition.source import SampleSource, refused_frames_of
 from core.quality import Reading
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import UnitCalibration
 
 
 class SlowValues(Protocol):
@@ -63,7 +63,7 @@ class JoinedSource:
         self, blocks: AsyncIterator[SampleBlock]
     ) -> AsyncGenerator[SampleBlock, None]:
         async for block in blocks:
-            yield replace(block, slow={**block.slow, **self._slow.current()})
+            yield replace(block, elsewhere={**block.elsewhere, **self._slow.current()})
 
 
 def only_slow(calibration: UnitCalibration, ids: frozenset[str]) -> UnitCalibration:

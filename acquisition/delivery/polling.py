@@ -1,11 +1,9 @@
 """When devices are polled, and when a device that answers counts as lost all the same."""
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from acquisition.clock import Clock
-from acquisition.errors import FrameError, LinkError
+from acquisition.errors import LinkError
 
 _EARLY = 1e-6
 """Share of a period by which rounding may put a tick before its time."""
@@ -119,12 +117,3 @@ class Freshness:
                 f"the device answers but its data stand still: {self._what} has not changed for"
                 f" {standing_s:.1f} s"
             )
-
-
-@contextmanager
-def wrong_replies_drop_the_link() -> Iterator[None]:
-    """Turn a wrong reply into a lost link: nothing that comes after it can be trusted."""
-    try:
-        yield
-    except FrameError as exc:
-        raise LinkError(f"wrong reply, connection dropped: {exc}") from exc

@@ -5,27 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from acquisition.errors import ConfigError
-from acquisition.modbus.requests import REGISTER_FUNCTIONS, SPAN_FUNCTIONS
-
-BASES = (0, 1, 10001, 30001, 40001, 100001, 300001, 400001)
-"""Numbers that manuals give to the first register of a table."""
-
 BITS_PER_REGISTER = 16
-
-
-class MapError(ConfigError):
-    """A register map that cannot be used.
-
-    Parameters
-    ----------
-    at
-        Where in the map: field names and element numbers.
-    """
-
-    def __init__(self, message: str, *at: int | str) -> None:
-        super().__init__(message)
-        self.at = at
 
 
 class NumberType(StrEnum):
@@ -110,11 +90,6 @@ class Cell:
         1 (coils) or 2 (discrete inputs) for single bits, 3 (holding) or 4 (input registers).
     bit
         Of a register, 0 the least significant; for type "bit" read by function 3 or 4.
-
-    Raises
-    ------
-    MapError
-        If function, type and bit do not go together.
     """
 
     address: int
@@ -122,21 +97,6 @@ class Cell:
     type: NumberType = NumberType.UINT16
     byte_order: ByteOrder = ByteOrder.ABCD
     bit: int | None = None
-
-    def __post_init__(self) -> None:
-        if self.function not in SPAN_FUNCTIONS:
-            raise MapError(f"must be 1, 2, 3 or 4, got {self.function}", "function")
-        is_bit, in_register = self.type is NumberType.BIT, self.function in REGISTER_FUNCTIONS
-        if not in_register and not is_bit:
-            raise MapError('must be "bit": functions 1 and 2 read single bits', "type")
-        if (self.bit is not None) != (is_bit and in_register):
-            raise MapError(
-                'is the number of a bit in a register: give it with type "bit" and function 3 or 4,'
-                " and only then",
-                "bit",
-            )
-        if self.bit is not None and not 0 <= self.bit < BITS_PER_REGISTER:
-            raise MapError(f"must be 0 to 15, got {self.bit}", "bit")
 
     @property
     def n_places(self) -> int:

@@ -9,8 +9,7 @@ from contextlib import asynccontextmanager
 from itertools import count
 
 from acquisition.delivery.network import KnownAddresses, let_stop_through
-from acquisition.delivery.polling import wrong_replies_drop_the_link
-from acquisition.errors import AcquisitionError, ConfigError, FrameError, LinkError
+from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.connection import (
     CLOSED,
     ReplyProtocol,
@@ -19,7 +18,7 @@ from acquisition.modbus.connection import (
     reason_of,
 )
 from acquisition.modbus.framing import PendingRequest
-from acquisition.modbus.identity import ExpectedRegisters, Identification, Identity
+from acquisition.modbus.identity import ExpectedIdentification, Identification, Identity
 from acquisition.modbus.requests import (
     BUSY,
     EXCEPTION_BIT,
@@ -33,12 +32,7 @@ from acquisition.modbus.requests import (
     identification_request,
     span_requests,
 )
-from acquisition.modbus.transport import (
-    ConnectionUse,
-    LinkSettings,
-    SerialTransport,
-    TcpTransport,
-)
+from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
 
 _N_TRANSACTIONS = 65_000
 """Ids are 1 to this; some devices answer to 0 as to any."""
@@ -59,8 +53,8 @@ class ModbusClient:
     The connection is closed after a wrong or a missing reply, so that a late reply is never taken
     for the next one. Transactions are numbered on from one connection to the next, because a
     gateway may pass a late reply on to the next connection. A serial line stays the same line when
-    it is opened again: all bytes are discarded until the line has been silent for `timeout_s`. With
-    `ConnectionUse.PER_REPLY` each request opens and closes a connection of its own.
+    it is opened again: all bytes are discarded until the line has been silent for `timeout_s`. If
+    connections are not kept, each request opens and closes one of its own.
 
     Attributes
     ----------
@@ -86,7 +80,7 @@ class ModbusClient:
     @property
     def is_kept(self) -> bool:
         """Whether one connection serves all requests, so that all go to the same device."""
-        return self._settings.connection is ConnectionUse.KEPT
+        return self._settings.keeps_connection
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
@@ -95,11 +89,10 @@ class ModbusClient:
         Raises
         ------
         LinkError, ConfigError
-            As `open`; LinkError too if the device's identity is no right reply.
+            As `open`.
         """
         try:
-            with wrong_replies_drop_the_link():
-                await self.open()
+            await self.open()
             yield
         finally:
             self.close()
@@ -110,12 +103,10 @@ class ModbusClient:
         Raises
         ------
         LinkError
-            If the connection is not accepted in time, the port does not exist, or the line is never
-            silent; the message says why.
+            If the connection is not accepted in time, the port does not exist, the line is never
+            silent, or the device does not give its identity; the message says why.
         ConfigError
             If there can be no such host, or the device is not the expected one.
-        FrameError
-            If a reply about its identity is not the right one.
         """
         await self._connect()
         if not self.is_kept:
@@ -129,7 +120,7 @@ class ModbusClient:
         ------
         ConfigError
             Naming what was found and what was expected.
-        LinkError, FrameError
+        LinkError
             As `read`.
         """
         identity = self._settings.identity
@@ -145,58 +136,37 @@ class ModbusClient:
         """Close the connection; again is harmless."""
         self._protocol.close()
 
-    async def read(
-        self, address: int, n_wanted: int, function: int = READ_HOLDING_REGISTERS
-    ) -> bytes:
-        """Read registers, big-endian words, or bits, eight a byte and the first one lowest.
+    async def read(self, address: int, count: int, function: int = READ_HOLDING_REGISTERS) -> bytes:
+        """Read one `Span`; errors as those of `read_spans`, ConfigError too if it cannot exist."""
+        return await self.read_spans([Span(address, count, function)])
 
-        Parameters
-        ----------
-        address, n_wanted, function
-            As of a `Span`.
-
-        Raises
-        ------
-        LinkError, FrameError, ConfigError
-            As `read_into`; ConfigError too if no device can have these.
-        """
-        span = Span(address, n_wanted, function)
-        content = bytearray(span.n_bytes)
-        await self.read_into([span], memoryview(content))
-        return bytes(content)
-
-    async def read_into(self, spans: Sequence[Span], out: memoryview) -> None:
+    async def read_spans(self, spans: Sequence[Span]) -> bytes:
         """Read spans in as many requests as it takes, `requests_in_flight` at a time.
 
-        Parameters
-        ----------
-        out
-            Filled with the content of the spans one after another; as long as that.
+        Returns
+        -------
+        bytes
+            Contents of the spans, one after another: registers as big-endian words, bits eight a
+            byte, the first one lowest.
 
         Raises
         ------
         LinkError
-            If the device does not answer, or answers that it cannot now.
-        FrameError
-            If a reply is not the one to its request.
+            If the device does not answer, answers that it cannot now, or a reply is not the one to
+            its request.
         ConfigError
             If the device answers that it has no such registers or function.
         """
-        step = self._settings.max_registers
-        requests = [request for span in spans for request in span_requests(span, step)]
-        at = 0
-        for reply in await self._replies(requests):
-            stop = at + len(reply) - 2
-            out[at:stop] = reply[2:]
-            at = stop
+        requests = [request for span in spans for request in span_requests(span)]
+        return b"".join([reply[2:] for reply in await self._replies(requests)])
 
     async def read_fifos(self, addresses: Sequence[int]) -> list[bytes]:
         """Read queues of 0 to 31 registers, big-endian words; one for each address.
 
         Raises
         ------
-        LinkError, FrameError, ConfigError
-            As `read_into`; a FrameError too if the device claims more than 31.
+        LinkError, ConfigError
+            As `read_spans`; a LinkError too if the device claims more than 31.
         """
         replies = await self._replies([fifo_request(address) for address in addresses])
         return [fifo_registers(reply) for reply in replies]
@@ -206,8 +176,8 @@ class ModbusClient:
 
         Raises
         ------
-        LinkError, FrameError, ConfigError
-            As `read_into`; a FrameError too if the identification has no end.
+        LinkError, ConfigError
+            As `read_spans`; a LinkError too if the identification has no end.
         """
         objects: dict[int, bytes] = {}
         following: int | None = 0
@@ -218,14 +188,13 @@ class ModbusClient:
             if following is None:
                 return Identification.of_objects(objects)
         self.close()
-        raise FrameError(f"{self.where}: the identification has no end")
+        raise LinkError(f"{self.where}: the identification has no end")
 
     async def _misfit(self, identity: Identity) -> str | None:
-        if isinstance(identity, ExpectedRegisters):
-            n_words = len(identity.words)
-            found = await self.read(identity.address, n_words, identity.function)
-            return identity.misfit(found)
-        return identity.misfit(await self.identify())
+        if isinstance(identity, ExpectedIdentification):
+            return identity.misfit(await self.identify())
+        found = await self.read(identity.address, len(identity.words), identity.function)
+        return identity.misfit(found)
 
     async def _replies(self, requests: Sequence[ReadRequest]) -> list[memoryview]:
         """Replies to requests, from their function codes on."""
@@ -258,24 +227,28 @@ class ModbusClient:
                 await asyncio.sleep(transport.frame_gap_s)
             pending = [PendingRequest(request, unit, next(self._transactions)) for request in burst]
             replies = await self._protocol.exchange(pending, self._settings.timeout_s)
-        except (AcquisitionError, asyncio.CancelledError) as error:
+        except (ConfigError, asyncio.CancelledError):
             self.close()
+            raise
+        except (LinkError, FrameError) as error:
+            self.close()
+            is_wrong = isinstance(error, FrameError)
+            words = f"wrong reply, connection dropped: {error}" if is_wrong else str(error)
             if len(burst) > 1 and self._shows_too_many(error):
                 self.requests_in_flight = 1
-                words = f"{error}, {len(burst)} requests in flight; one at a time from now on"
-                raise type(error)(words) from error
-            raise
+                words += f", {len(burst)} requests in flight; one at a time from now on"
+            raise LinkError(words) from error
         self._n_closed_bursts = 0
         if not self.is_kept:
             self.close()
         return replies
 
-    def _shows_too_many(self, error: BaseException) -> bool:
+    def _shows_too_many(self, error: LinkError | FrameError) -> bool:
         """Whether the device cannot take several requests, by the error that they ended with."""
         if isinstance(error, SilenceError | FrameError):
             return True
-        self._n_closed_bursts += isinstance(error, LinkError)
-        return isinstance(error, LinkError) and self._n_closed_bursts >= _MAX_CLOSED_BURSTS
+        self._n_closed_bursts += 1
+        return self._n_closed_bursts >= _MAX_CLOSED_BURSTS
 
     async def _connect(self) -> None:
         self._protocol.close()
@@ -295,13 +268,15 @@ class ModbusClient:
             raise ConfigError(f"{self.where}: {error}") from error
         if self._addresses is None:
             self._addresses = KnownAddresses(transport.host, transport.port)
-        timeout_s = self._settings.timeout_s
+        loop, timeout_s = asyncio.get_running_loop(), self._settings.timeout_s
         why = f"no connection within {timeout_s} s"
         try:
             for address in await self._addresses.within(timeout_s):
                 try:
                     async with asyncio.timeout(timeout_s):
-                        await self._connect_at(address, transport)
+                        _, self._protocol = await loop.create_connection(
+                            lambda: ReplyProtocol(transport), address, transport.port
+                        )
                 except TimeoutError:
                     continue
                 except OSError as error:
@@ -313,12 +288,6 @@ class ModbusClient:
         except OSError as error:
             why = str(error)
         raise LinkError(f"{self.where}: {why}")
-
-    async def _connect_at(self, address: str, transport: TcpTransport) -> None:
-        loop = asyncio.get_running_loop()
-        protocol = ReplyProtocol(transport)
-        await loop.create_connection(lambda: protocol, address, transport.port)
-        self._protocol = protocol
 
     async def _await_silence(self) -> None:
         """Discard what still comes, until nothing has come for the time a reply may take."""

@@ -49,7 +49,6 @@ class CellDecoder:
     """Numbers of cells from the contents of all spans of a plan."""
 
     def __init__(self, cells: Sequence[Cell], plan: ReadPlan) -> None:
-        self._n_bytes = plan.n_bytes
         self._places: dict[Cell, tuple[tuple[int, ...], np.dtype[np.generic], int | None]] = {}
         for cell in cells:
             start, coil_bit = plan.place_of(cell)
@@ -60,15 +59,7 @@ class CellDecoder:
             self._places[cell] = tuple(positions), np.dtype(DTYPES[cell.type]), cell.bit
 
     def numbers(self, content: bytes) -> Mapping[Cell, float]:
-        """Numbers of the cells, before any scale.
-
-        Raises
-        ------
-        ValueError
-            If the content has not the length of the plan's.
-        """
-        if len(content) != self._n_bytes:
-            raise ValueError(f"{len(content)} bytes instead of {self._n_bytes}")
+        """Numbers of the cells, before any scale."""
         numbers = {}
         for cell, (positions, dtype, bit) in self._places.items():
             number = np.frombuffer(bytes([content[n] for n in positions]), dtype)[0].item()
@@ -88,7 +79,7 @@ class MapDecoder:
     def __init__(self, registers: RegisterMap) -> None:
         self.map = registers
         self.plan = plan_reads(registers)
-        self._cells = CellDecoder([cell for cell, _ in registers.cells()], self.plan)
+        self._cells = CellDecoder(list(registers.cells()), self.plan)
         self._time_cells = list(registers.time.cells()) if registers.time else []
 
     def read(self, content: bytes) -> MapReading:

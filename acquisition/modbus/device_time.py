@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import TypeAlias
 
-from acquisition.modbus.cells import Cell, MapError
+from acquisition.modbus.cells import Cell
 from core.units import ns_from_s
 
 CALENDAR_FIELDS = ("year", "month", "day", "hour", "minute", "second")
@@ -71,10 +71,6 @@ class CalendarTime:
     first: Cell
     fields: tuple[str, ...] = CALENDAR_FIELDS
     utc_offset_s: float = 0.0
-
-    def __post_init__(self) -> None:
-        if sorted(self.fields) != sorted(CALENDAR_FIELDS):
-            raise MapError(f"must name each of {', '.join(CALENDAR_FIELDS)} once", "fields")
 
     @property
     def resolution_s(self) -> float:

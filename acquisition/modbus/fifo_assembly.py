@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquisition.delivery.arrival import LeastDelay
-from acquisition.errors import FrameError
+from acquisition.errors import LinkError
 from acquisition.modbus.fifo_layout import FifoPiece
 from core.arrays import CountArray
 from core.samples.axis import ClockTolerance, Epochs, SampleAxis, signed_distance
@@ -147,7 +147,7 @@ def place_records(
 
     Raises
     ------
-    FrameError
+    LinkError
         If the counter does not count: no device restarts twice within a reading.
     """
     if isinstance(samples, UncountedSamples):
@@ -157,7 +157,7 @@ def place_records(
     counters = () if piece.counters is None else piece.counters
     places = [samples.place(int(counter), now_s) for counter in counters]
     if len({place.epoch for place in places if place is not None}) > _MAX_EPOCHS:
-        raise FrameError("FIFO: what should be its counter does not count")
+        raise LinkError("FIFO: what should be its counter does not count")
     return list(_joined(places, piece.counts))
 
 
@@ -193,7 +193,7 @@ class ChannelAssembly:
 
         Raises
         ------
-        FrameError
+        LinkError
             If the channels count differently, as when the device restarts between two of them.
         """
         first, *others = pieces
@@ -212,7 +212,7 @@ class ChannelAssembly:
             return
         apart = signed_distance(int(piece.counters[0]), self._newest, WRAP)
         if abs(apart) > _MAX_APART:
-            raise FrameError(f"FIFO: channel {channel} counts {apart} samples apart from channel 0")
+            raise LinkError(f"FIFO: channel {channel} counts {apart} samples apart from channel 0")
         start = self._newest + apart
         self._add(channel, range(start, start + piece.n_samples), piece.counts[0])
 
@@ -221,27 +221,17 @@ class ChannelAssembly:
         self._waiting[channel].update((i, count) for i, count in fresh if i >= self._next)
 
     def _common(self) -> list[PlacedSamples]:
-        """What all channels have, and nothing older than that ever again."""
-        shared = set.intersection(*(set(waiting) for waiting in self._waiting))
-        if not shared:
-            self._limit()
-            return []
-        index = np.array(sorted(shared))
+        """What all channels have, and nothing older than that ever again.
+
+        Without any, what waits for a channel that gives nothing is bounded.
+        """
+        shared = sorted(set.intersection(*map(set, self._waiting)))
         counts = np.array(
-            [[waiting[i] for i in index.tolist()] for waiting in self._waiting], dtype=np.int16
+            [[waiting[i] for i in shared] for waiting in self._waiting], dtype=np.int16
         )
-        self._next = int(index[-1]) + 1
-        self._drop_old()
-        places = (SamplePlace(self._epoch, i) for i in index.tolist())
-        return list(_joined(places, counts))
-
-    def _limit(self) -> None:
-        """Bound what waits for a channel that gives nothing."""
         newest = max((max(waiting) for waiting in self._waiting if waiting), default=0)
-        self._next = max(self._next, newest - _MAX_APART)
-        self._drop_old()
-
-    def _drop_old(self) -> None:
+        self._next = shared[-1] + 1 if shared else max(self._next, newest - _MAX_APART)
         for waiting in self._waiting:
             for index in [i for i in waiting if i < self._next]:
                 del waiting[index]
+        return list(_joined([SamplePlace(self._epoch, i) for i in shared], counts))

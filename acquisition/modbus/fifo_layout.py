@@ -6,9 +6,8 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
-from acquisition.errors import FrameError
-from acquisition.modbus.cells import MapError
-from acquisition.modbus.requests import ADDRESS_SPACE, MAX_FIFO_REGISTERS
+from acquisition.errors import LinkError
+from acquisition.modbus.requests import MAX_FIFO_REGISTERS
 from core.arrays import CountArray
 
 
@@ -55,11 +54,6 @@ class FifoLayout:
         Unsigned 16 bit, one more with every sample, wrapping to 0.
     removes
         Whether reading removes the samples from the queue; devices differ.
-
-    Raises
-    ------
-    MapError
-        If no device can have such queues, or their samples could not be put in order.
     """
 
     addresses: tuple[int, ...]
@@ -67,34 +61,6 @@ class FifoLayout:
     kind: FifoKind = FifoKind.INTERLEAVED
     has_counter: bool = True
     removes: bool = True
-
-    def __post_init__(self) -> None:
-        n_queues = 1 if self.kind is FifoKind.INTERLEAVED else self.n_channels
-        if len(self.addresses) != n_queues:
-            raise MapError(f"must be {n_queues}, got {len(self.addresses)}", "addresses")
-        for n, address in enumerate(self.addresses):
-            if not 0 <= address < ADDRESS_SPACE:
-                raise MapError(f"must be 0 to {ADDRESS_SPACE - 1}, got {address}", "addresses", n)
-        if len(set(self.addresses)) < n_queues:
-            raise MapError("names a queue twice", "addresses")
-        if self.record_registers > MAX_FIFO_REGISTERS:
-            raise MapError(
-                f"makes records of {self.record_registers} registers; a FIFO read has at most"
-                f" {MAX_FIFO_REGISTERS}: use a queue for each channel, or fewer channels",
-                "addresses",
-            )
-        if self.kind is FifoKind.PER_CHANNEL and not self.has_counter:
-            raise MapError(
-                "must be true with a queue for each channel: only a counter shows which samples"
-                " belong together",
-                "has_counter",
-            )
-        if not self.removes and not self.has_counter:
-            raise MapError(
-                "must be true if reading does not remove: only a counter shows which samples are"
-                " new",
-                "has_counter",
-            )
 
     @property
     def record_registers(self) -> int:
@@ -114,14 +80,14 @@ class FifoLayout:
 
         Raises
         ------
-        FrameError
+        LinkError
             If it does not hold whole records.
         """
         words = np.frombuffer(data, ">u2").astype(np.uint16)
         if self.kind is FifoKind.PER_CHANNEL:
             return self._decode_channel(words)
         if words.size % self.record_registers:
-            raise FrameError(
+            raise LinkError(
                 f"FIFO of {words.size} registers holds no whole records of {self.record_registers}"
             )
         records = words.reshape(-1, self.record_registers)

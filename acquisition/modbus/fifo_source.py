@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival, HostStamps
-from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
-from acquisition.delivery.polling import Freshness, wrong_replies_drop_the_link
-from acquisition.errors import ConfigError, LinkError
+from acquisition.delivery.blocks import BlockAssembler, RawBlock
+from acquisition.delivery.polling import Freshness
+from acquisition.errors import LinkError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.fifo_assembly import (
     ChannelAssembly,
@@ -19,9 +18,10 @@ from acquisition.modbus.fifo_assembly import (
     place_records,
 )
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout, FifoPiece
-from acquisition.modbus.transport import LinkSettings, require_above_zero
+from acquisition.modbus.transport import LinkSettings
 from core.samples.axis import Epochs
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import UnitCalibration
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,10 +43,6 @@ class FifoSettings(LinkSettings):
     stale_after_s: float = 3.0
     loss_tolerance_s: float = 0.1
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_above_zero(self, "poll_period_s", "stale_after_s", "loss_tolerance_s")
-
 
 class FifoSource:
     """Samples of one unit from queues; a reading is never repeated, because it may remove samples.
@@ -61,10 +57,6 @@ class FifoSource:
         calibration: UnitCalibration,
         clock: Clock,
     ) -> None:
-        if layout.n_channels != len(calibration.channels):
-            raise ConfigError(
-                f"modbus: a FIFO of {layout.n_channels} channels for {len(calibration.channels)}"
-            )
         self._settings, self._layout = settings, layout
         self._calibration, self._clock = calibration, clock
         self._client = ModbusClient(settings)
@@ -82,19 +74,9 @@ class FifoSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link; leaving the context closes it.
-
-        Raises
-        ------
-        LinkError
-            If the device does not answer, answers wrongly, its data stand still, or it is faster
-            than the link.
-        ConfigError
-            If it has no such queue.
-        """
+        """Open the link, as `SampleSource`; LinkError too if the device is faster than the link."""
         async with self._client.connected():
-            with wrong_replies_drop_the_link():
-                await self._begin()
+            await self._begin()
             self._freshness.opened(self._clock.monotonic_s())
             async with aclosing(self._blocks()) as blocks:
                 yield blocks
@@ -120,10 +102,9 @@ class FifoSource:
         while True:
             begun_s = self._clock.monotonic_s()
             try:
-                with wrong_replies_drop_the_link():
-                    pieces = await self._read()
-                    arrived = Arrival.now(self._clock)
-                    waiting += self._place(pieces, arrived.steady_s)
+                pieces = await self._read()
+                arrived = Arrival.now(self._clock)
+                waiting += self._place(pieces, arrived.steady_s)
                 drained = self._is_drained(pieces)
                 reading_s = 0.0 if drained else reading_s + arrived.steady_s - begun_s
                 self._require_in_time(reading_s)

@@ -5,7 +5,7 @@ stops at the first fault, because nothing that follows it can be trusted.
 """
 
 import struct
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, TypeAlias
 
 from acquisition.errors import FrameError
 from acquisition.modbus.requests import MAX_PDU_BYTES, ReadRequest
@@ -22,12 +22,13 @@ class PendingRequest(NamedTuple):
     transaction: int = 0
 
 
-class Framing(Protocol):
-    """Form of requests and replies on a wire."""
+class TcpFraming:
+    """Modbus TCP: transaction, protocol, length and unit before the reply."""
 
     def frame(self, pending: PendingRequest) -> bytes:
         """Bytes of a request."""
-        ...
+        pdu = pending.request.pdu
+        return _MBAP.pack(pending.transaction, 0, len(pdu) + 1, pending.unit) + pdu
 
     def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
         """Judge received bytes as the reply to a request.
@@ -42,19 +43,6 @@ class Framing(Protocol):
         FrameError
             If they never can.
         """
-        ...
-
-
-class TcpFraming:
-    """Modbus TCP: transaction, protocol, length and unit before the reply."""
-
-    def frame(self, pending: PendingRequest) -> bytes:
-        """Bytes of a request."""
-        pdu = pending.request.pdu
-        return _MBAP.pack(pending.transaction, 0, len(pdu) + 1, pending.unit) + pdu
-
-    def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
-        """Judge received bytes; see `Framing`."""
         if len(data) <= _MBAP.size:
             return None
         transaction, protocol, length, unit = _MBAP.unpack_from(data)
@@ -79,7 +67,7 @@ class RtuFraming:
         return body + crc16(body).to_bytes(2, "little")
 
     def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
-        """Judge received bytes; see `Framing`."""
+        """Judge received bytes as `TcpFraming.take` does."""
         if len(data) < 2:
             return None
         if data[0] != pending.unit:
@@ -91,6 +79,9 @@ class RtuFraming:
         if found != expected:
             raise FrameError(f"CRC is {found:#06x}, expected {expected:#06x}")
         return end + 2, data[1:end]
+
+
+Framing: TypeAlias = TcpFraming | RtuFraming
 
 
 def _crc_of_byte(value: int) -> int:

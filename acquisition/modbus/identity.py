@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import TypeAlias
 
-from acquisition.errors import ConfigError
 from acquisition.modbus.requests import READ_HOLDING_REGISTERS
 
 
@@ -49,25 +48,14 @@ class ExpectedRegisters:
     address
         Of the first one, counted from 0.
     words
-        What they contain, 1 to 125.
+        What they contain, 1 to 125 words.
     function
         3 or 4.
-
-    Raises
-    ------
-    ConfigError
-        If there are no words, or some are no words.
     """
 
     address: int
     words: tuple[int, ...]
     function: int = READ_HOLDING_REGISTERS
-
-    def __post_init__(self) -> None:
-        if not self.words or not all(0 <= word <= 0xFFFF for word in self.words):
-            raise ConfigError(
-                f"modbus: signature is {self.words}, needed are words of 0 to {0xFFFF}"
-            )
 
     def misfit(self, content: bytes) -> str | None:
         """What differs from a device's registers, in words; None if nothing does."""

@@ -11,27 +11,23 @@ import numpy as np
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival, HostStamps
-from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import ChannelCalibration, RawBlock, UnitCalibration
-from acquisition.delivery.polling import Freshness, PollClock, wrong_replies_drop_the_link
+from acquisition.delivery.blocks import BlockAssembler, RawBlock
+from acquisition.delivery.polling import Freshness, PollClock
 from acquisition.errors import ConfigError
 from acquisition.modbus.cells import reads_as
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.decoding import CellDecoder, MapDecoder, MapReading, ValueState
-from acquisition.modbus.read_plan import ReadPlan, plan_signature
+from acquisition.modbus.read_plan import plan_signature
 from acquisition.modbus.register_map import RegisterMap
-from acquisition.modbus.transport import LinkSettings, require_above_zero
+from acquisition.modbus.transport import LinkSettings
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import UNLIMITED, UnitCalibration
 from core.spectra.polls import VectorPart, VectorRow
 
 _MIN_STAMP_STEPS = 2.0
 """A device's clock must tell neighbouring polls apart, or its stamps would seem to stand still."""
 
 _LARGEST = float(np.finfo(np.float32).max)
-_UNLIMITED = ChannelCalibration(
-    full_scale_v=_LARGEST, unit_per_v=1.0, ok_min_v=-float("inf"), ok_max_v=float("inf")
-)
-"""Of a vector: a rack states engineering units and judges its transducers itself."""
 
 
 class MapReader:
@@ -52,8 +48,7 @@ class MapReader:
             If it is another device, naming what was found and what was expected.
         """
         async with self._client.connected():
-            with wrong_replies_drop_the_link():
-                await self._require_signature()
+            await self._require_signature()
             yield
 
     async def read(self) -> MapReading:
@@ -74,17 +69,16 @@ class MapReader:
         LinkError, ConfigError
             As `connected`.
         """
-        with wrong_replies_drop_the_link():
-            if not self._client.is_kept:
-                await self._client.require_device()
-                await self._require_signature()
-            return await self._content(self._decoder.plan)
+        if not self._client.is_kept:
+            await self._client.require_device()
+            await self._require_signature()
+        return await self._client.read_spans(self._decoder.plan.spans)
 
     async def _require_signature(self) -> None:
         signature = self._decoder.map.signature
         plan = plan_signature(self._decoder.map)
         decoder = CellDecoder([part.cell for part in signature], plan)
-        numbers = decoder.numbers(await self._content(plan))
+        numbers = decoder.numbers(await self._client.read_spans(plan.spans))
         for part in signature:
             number = numbers[part.cell]
             if not reads_as(number, part.cell.type, part.expected):
@@ -92,11 +86,6 @@ class MapReader:
                     f"{self._client.where}: another device than configured: register"
                     f" {part.cell.address} is {number:g}, expected {part.expected:g}"
                 )
-
-    async def _content(self, plan: ReadPlan) -> bytes:
-        content = bytearray(plan.n_bytes)
-        await self._client.read_into(plan.spans, memoryview(content))
-        return bytes(content)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,32 +104,6 @@ class PolledSettings(LinkSettings):
     poll_period_s: float = 1.0
     stale_after_s: float = 60.0
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_above_zero(self, "poll_period_s")
-        if not 2.0 * self.poll_period_s <= self.stale_after_s:
-            raise ConfigError(
-                f"modbus: stale_after_s is {self.stale_after_s}, must be at least two poll periods"
-            )
-
-    def require_fit(self, registers: RegisterMap) -> None:
-        """Refuse to poll a device faster than its manual allows.
-
-        Raises
-        ------
-        ConfigError
-            With what is allowed.
-        """
-        for key in ("poll_period_s", "timeout_s"):
-            found, least = getattr(self, key), getattr(registers, f"min_{key}")
-            if found < least:
-                raise ConfigError(f"modbus: {key} is {found}, the map asks for {least} or more")
-        if self.max_registers < registers.max_registers:
-            raise ConfigError(
-                f"modbus: max_registers is {self.max_registers}, the map reads up to"
-                f" {registers.max_registers} at once"
-            )
-
 
 class PolledSource:
     """Samples, slow values and vectors of one unit from polled registers.
@@ -151,11 +114,6 @@ class PolledSource:
         Which value of the map each row of a block is, by id; as many as the calibration has
         channels. Its slow channels are found by their own ids; one that the map lacks is not
         measured here.
-
-    Raises
-    ------
-    ConfigError
-        If the map cannot be read, lacks a row, or forbids so short a poll period or time-out.
     """
 
     def __init__(
@@ -166,13 +124,10 @@ class PolledSource:
         calibration: UnitCalibration,
         clock: Clock,
     ) -> None:
-        settings.require_fit(registers)
-        if len(rows) != len(calibration.channels):
-            raise ConfigError(f"modbus: {len(rows)} rows for {len(calibration.channels)} channels")
         self._clock = clock
         self._rate_hz = 1.0 / settings.poll_period_s
-        self._rows = [position_of(row, registers) for row in rows]
         position = {id_: n for n, id_ in enumerate(registers.ids)}
+        self._rows = [position[row] for row in rows]
         self._slow = [position.get(slow.id) for slow in calibration.slow]
         self._full_scale = [
             min(abs(channel.full_scale_v * channel.unit_per_v), _LARGEST)
@@ -186,19 +141,12 @@ class PolledSource:
         self._stamped = (
             time is not None and settings.poll_period_s >= _MIN_STAMP_STEPS * time.resolution_s
         )
-        self._delivery = BlockAssembler(calibration, stamped=self._stamped, samples_when_asked=True)
+        polled = replace(calibration, rate_hz=self._rate_hz)
+        self._delivery = BlockAssembler(polled, stamped=self._stamped, samples_when_asked=True)
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link and identify the device; leaving the context closes the link.
-
-        Raises
-        ------
-        LinkError
-            If the device does not answer, answers wrongly, or its data stand still.
-        ConfigError
-            If it is not the configured device, or lacks a register.
-        """
+        """Open the link and check the device's signature, as `SampleSource`."""
         async with self._reader.connected():
             self._freshness.opened(self._clock.monotonic_s())
             async with aclosing(self._blocks()) as blocks:
@@ -257,23 +205,10 @@ def vector_calibration(
     return replace(
         calibration,
         channels=tuple(
-            by_id[row.channel] if row.part is VectorPart.GAP else _UNLIMITED for row in rows
+            by_id[row.channel] if row.part is VectorPart.GAP else UNLIMITED for row in rows
         ),
         block_samples=1,
     )
-
-
-def position_of(id_: str, registers: RegisterMap) -> int:
-    """Position of a value among those of a map.
-
-    Raises
-    ------
-    ConfigError
-        If the map has none of this id.
-    """
-    if id_ not in registers.ids:
-        raise ConfigError(f"modbus: the register map has no value for {id_!r}")
-    return registers.ids.index(id_)
 
 
 def slow_number(reading: MapReading, position: int) -> float:

@@ -4,9 +4,24 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from acquisition.modbus.cells import BITS_PER_REGISTER, Cell, MapError
+from acquisition.errors import ConfigError
+from acquisition.modbus.cells import BITS_PER_REGISTER, Cell
 from acquisition.modbus.register_map import RegisterMap, Together
 from acquisition.modbus.requests import BIT_FUNCTIONS, Span
+
+
+class MapError(ConfigError):
+    """A register map that cannot be read as it demands.
+
+    Parameters
+    ----------
+    at
+        Where in the map: field names and element numbers.
+    """
+
+    def __init__(self, message: str, *at: int | str) -> None:
+        super().__init__(message)
+        self.at = at
 
 
 @dataclass(frozen=True)
@@ -18,11 +33,6 @@ class ReadPlan:
 
     spans: tuple[Span, ...]
     base: int
-
-    @property
-    def n_bytes(self) -> int:
-        """Bytes of all contents together."""
-        return sum(span.n_bytes for span in self.spans)
 
     def span_of(self, cell: Cell) -> Span:
         """Span that holds a cell."""
@@ -56,7 +66,7 @@ def plan_reads(registers: RegisterMap) -> ReadPlan:
         If a cell lies across the edge of a block that must be read as one, or a value and its
         scale register are not read together.
     """
-    plan = _plan(registers, [cell for cell, _ in registers.cells()], registers.together)
+    plan = _plan(registers, list(registers.cells()), registers.together)
     for n, value in enumerate(registers.values):
         scale = value.scale_register
         if scale is None or plan.span_of(value.cell) == plan.span_of(scale.cell):

@@ -31,8 +31,10 @@ EXCEPTION_BIT = 0x80
 BUSY = 6
 """The device could not take the request, and asks for it again later (MODBUS V1.1b3, section 7)."""
 
-_CONFIG_EXCEPTIONS = {1: "illegal function", 2: "illegal address", 3: "illegal value"}
-_PASSING_EXCEPTIONS = {
+_EXCEPTIONS = {
+    1: "illegal function",
+    2: "illegal address",
+    3: "illegal value",
     4: "device failure",
     5: "acknowledge",
     BUSY: "busy",
@@ -40,6 +42,7 @@ _PASSING_EXCEPTIONS = {
     10: "gateway path unavailable",
     11: "gateway target does not answer",
 }
+_CONFIG_EXCEPTIONS = (1, 2, 3)
 
 _MAX_BITS_PER_READ = 2000
 _EXCEPTION_BYTES = 2
@@ -189,9 +192,9 @@ def _identification_bytes(reply: memoryview, expected: bytes) -> int:
 
 
 @lru_cache(maxsize=1024)  # the spans of a device are read again in every poll
-def span_requests(span: Span, max_registers: int) -> tuple[ReadRequest, ...]:
+def span_requests(span: Span) -> tuple[ReadRequest, ...]:
     """Requests that read a span, in the order of their addresses."""
-    step = _MAX_BITS_PER_READ if span.function in BIT_FUNCTIONS else max_registers
+    step = _MAX_BITS_PER_READ if span.function in BIT_FUNCTIONS else MAX_REGISTERS_PER_READ
     return tuple(
         ReadRequest(_SPAN_REQUEST.pack(span.function, at, min(step, span.stop - at)))
         for at in range(span.address, span.stop, step)
@@ -232,15 +235,7 @@ def identification_objects(reply: memoryview) -> tuple[dict[int, bytes], int | N
 
 
 def exception_error(where: str, code: int, request: ReadRequest) -> AcquisitionError:
-    """Error that an exception reply stands for: LinkError if asking again later can help.
-
-    Parameters
-    ----------
-    where
-        Of the device, for the message.
-    code
-        Exception code of the reply.
-    """
+    """Error that an exception code stands for: LinkError if asking again later can help."""
     kind = ConfigError if code in _CONFIG_EXCEPTIONS else LinkError
-    name = (_CONFIG_EXCEPTIONS | _PASSING_EXCEPTIONS).get(code, "unknown")
+    name = _EXCEPTIONS.get(code, "unknown")
     return kind(f"{where}: device answers exception {code} ({name}) to {request}")

@@ -4,8 +4,8 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import lru_cache
 
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
-from acquisition.errors import ConfigError, FrameError
+from acquisition.delivery.blocks import RawBlock
+from acquisition.errors import ConfigError, FrameError, LinkError
 from acquisition.modbus.client import ModbusClient
 from acquisition.modbus.requests import Span
 from acquisition.modbus.ring_profile import (
@@ -20,6 +20,7 @@ from acquisition.modbus.ring_profile import (
 from acquisition.modbus.timeline import Refusal, Timeline, ahead
 from core.samples.axis import Epochs
 from core.samples.blocks import Rejection
+from core.samples.calibration import UnitCalibration
 
 _N_TRIES = 4
 """A header is short and quickly written; still wrong after this many reads, it is wrong."""
@@ -44,20 +45,17 @@ class RingReader:
         ------
         ConfigError
             If this is no block ring.
-        FrameError
-            If its checksum is wrong, however often it is read.
         LinkError
-            As the client does.
+            As the client does, and if the checksum is wrong, however often it is read.
         """
-        n_tries = 0
-        while True:
-            content = await self._content([self._header])
-            n_tries += 1
+        for _ in range(_N_TRIES):
+            content = await self._client.read_spans([self._header])
             try:
                 return decode_header(content)
             except (ConfigError, FrameError) as error:
-                if n_tries == _N_TRIES:
-                    raise type(error)(f"{self.where}: {error}") from error
+                fault = error
+        kind = ConfigError if isinstance(fault, ConfigError) else LinkError
+        raise kind(f"{self.where}: {fault}") from fault
 
     async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> list[Slot]:
         """Read the places where these sequence numbers belong, whatever lies there.
@@ -73,12 +71,7 @@ class RingReader:
             if spans and spans[-1].stop == start:  # no padding between slots
                 start, count = spans[-1].address, spans.pop().count + count
             spans.append(Span(start, count, self._header.function))
-        return decode_slots(await self._content(spans), layout)
-
-    async def _content(self, spans: Sequence[Span]) -> memoryview:
-        content = memoryview(bytearray(sum(span.n_bytes for span in spans)))
-        await self._client.read_into(spans, content)
-        return content
+        return decode_slots(await self._client.read_spans(spans), layout)
 
 
 _N_REREADS = 3
@@ -101,10 +94,11 @@ class RingFollower:
     calibration
         Its channels, rate and slow channels are those that the device must have.
     begun_ns
-        When this life of the adapter began, UTC.
+        When this run of the adapter began, UTC.
     """
 
-    def __init__(self, calibration: UnitCalibration, begun_ns: int) -> None:
+    def __init__(self, reader: RingReader, calibration: UnitCalibration, begun_ns: int) -> None:
+        self._reader = reader
         self._expected = {
             "n_channels": len(calibration.channels),
             "rate in mHz": round(calibration.rate_hz * 1000.0),
@@ -121,23 +115,23 @@ class RingFollower:
         """Epoch and newest sequence of the header read last; None before the first."""
         return None if self._header is None else (self._header.epoch, self._header.newest)
 
-    async def header(self, reader: RingReader) -> RingHeader:
+    async def header(self) -> RingHeader:
         """Read the header of a device that delivers what is configured.
 
         Raises
         ------
         ConfigError
             If it does not, naming the field, what was found and what was expected.
-        LinkError, FrameError
+        LinkError
             As the reader does.
         """
-        header = await reader.header()
+        header = await self._reader.header()
         ring = header.layout
         found = (ring.n_channels, ring.rate_mhz, ring.n_slow)
         for (name, expected), value in zip(self._expected.items(), found, strict=True):
             if value != expected:
                 raise ConfigError(
-                    f"{reader.where}: block ring: {name} is {value}, expected {expected}"
+                    f"{self._reader.where}: block ring: {name} is {value}, expected {expected}"
                 )
         return header
 
@@ -146,24 +140,24 @@ class RingFollower:
         """Slots up to the newest of the header that were not read yet."""
         return 0 if self._header is None else max(0, ahead(self._header.newest, self._handled))
 
-    async def poll(self, reader: RingReader) -> list[RawBlock]:
+    async def poll(self) -> list[RawBlock]:
         """Read the new slots, in order; of many only the first.
 
         Raises
         ------
-        LinkError, FrameError, ConfigError
+        LinkError, ConfigError
             As the reader does; the next call then reads the same slots again.
         """
-        header = await self.header(reader)
-        await self._enter(reader, header)
+        header = await self.header()
+        await self._enter(header)
         wanted = self._unread(header)
         if not wanted:
             return []
-        found = await self._read(reader, header.layout, wanted)
+        found = await self._read(header.layout, wanted)
         self._handled = wanted[-1]
         return self._placed(list(zip(wanted, found, strict=True)), header)
 
-    async def _enter(self, reader: RingReader, header: RingHeader) -> None:
+    async def _enter(self, header: RingHeader) -> None:
         """Set the position to read from where it is not simply the slot after the last."""
         before = self._header
         if before is None:
@@ -171,30 +165,30 @@ class RingFollower:
             self._epochs.begin_first(header.epoch)
             self._handled = header.newest - 1
         elif (before.epoch, before.layout) != (header.epoch, header.layout):
-            await self._require_again(reader, header)
-            slot = await self._newest_slot(reader, header)
+            await self._require_again(header)
+            slot = await self._newest_slot(header)
             self._timeline = Timeline(header.layout, self._epochs)
             self._epochs.begin(header.epoch if before.epoch != header.epoch else None)
             if slot is not None:
                 self._timeline.anchor(slot)
             self._go_back_to_start(slot, header)
         elif ahead(header.newest, self._handled) < 0:
-            slot = await self._newest_slot(reader, header)
+            slot = await self._newest_slot(header)
             if slot is not None and not self._timeline.repeats(slot):
                 self._timeline.restart(slot)
                 self._go_back_to_start(slot, header)
         self._header = header
 
-    async def _require_again(self, reader: RingReader, header: RingHeader) -> None:
+    async def _require_again(self, header: RingHeader) -> None:
         """Accept another epoch only if a second reading of the header has it too.
 
         Otherwise one stale or changed reply would make old samples new.
         """
-        again = await self.header(reader)
+        again = await self.header()
         if (again.epoch, again.layout) != (header.epoch, header.layout):
-            raise FrameError(
-                f"{reader.where}: block ring: epoch or layout change from one reading of the header"
-                " to the next"
+            raise LinkError(
+                f"{self._reader.where}: block ring: epoch or layout change from one reading of the"
+                " header to the next"
             )
 
     def _go_back_to_start(self, newest: Slot | None, header: RingHeader) -> None:
@@ -213,21 +207,19 @@ class RingFollower:
         n_wanted = min(n_there, max(1, round(_MAX_READ_S / header.layout.slot_duration_s)))
         return [(header.newest - n_there + 1 + n) % U32 for n in range(n_wanted)]
 
-    async def _newest_slot(self, reader: RingReader, header: RingHeader) -> Slot | None:
-        [slot] = await self._read(reader, header.layout, [header.newest])
+    async def _newest_slot(self, header: RingHeader) -> Slot | None:
+        [slot] = await self._read(header.layout, [header.newest])
         known = slot.epoch == header.epoch and slot.sequence == header.newest
         return slot if known and slot.whole and not slot.blank else None
 
-    async def _read(
-        self, reader: RingReader, layout: RingLayout, wanted: Sequence[int]
-    ) -> list[Slot]:
+    async def _read(self, layout: RingLayout, wanted: Sequence[int]) -> list[Slot]:
         """Read slots, and doubtful ones again: the device may be writing them at this moment."""
-        slots = await reader.slots(layout, wanted)
+        slots = await self._reader.slots(layout, wanted)
         for i, sequence in enumerate(wanted):
             for _ in range(_N_REREADS):
                 if not _doubtful(slots[i], sequence, layout):
                     break
-                [slots[i]] = await reader.slots(layout, [sequence])
+                [slots[i]] = await self._reader.slots(layout, [sequence])
         return slots
 
     def _placed(self, found: Sequence[tuple[int, Slot]], header: RingHeader) -> list[RawBlock]:

@@ -17,7 +17,6 @@ The CRC-32 is that of IEEE 802.3, as `zlib.crc32` has it, over the registers as 
 
 import struct
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import Any
@@ -35,8 +34,9 @@ HEADER_REGISTERS = 16
 MAX_CHANNELS = 32
 U32 = 1 << 32
 
-_HEADER = struct.Struct(">5H3I3H")
-_SLOT_HEAD = struct.Struct(">6I")
+HEADER = struct.Struct(">5H3I3H")
+"""The header up to its checksum."""
+
 _HEAD_REGISTERS, _TRAILER_REGISTERS, _CRC_REGISTERS = 12, 1, 2
 
 
@@ -126,18 +126,7 @@ class RingHeader:
     newest: int
 
 
-def encode_header(header: RingHeader) -> bytes:
-    """Header registers, without the slow values."""
-    ring = header.layout
-    data = _HEADER.pack(
-        *(MAGIC, VERSION, ring.n_channels, ring.samples_per_slot, ring.n_slots),
-        *(ring.rate_mhz, header.epoch, header.newest),
-        *(ring.n_slow, ring.ring_address, ring.slot_stride),
-    )
-    return data + zlib.crc32(data).to_bytes(4, "big")
-
-
-def decode_header(data: bytes | memoryview) -> RingHeader:
+def decode_header(data: bytes) -> RingHeader:
     """Read the first 16 registers of a device.
 
     Raises
@@ -147,7 +136,7 @@ def decode_header(data: bytes | memoryview) -> RingHeader:
     FrameError
         If its checksum says that it was changed on the way or while it was written.
     """
-    magic, version, n_channels, samples_per_slot, n_slots, rate_mhz, *rest = _HEADER.unpack_from(
+    magic, version, n_channels, samples_per_slot, n_slots, rate_mhz, *rest = HEADER.unpack_from(
         data
     )
     epoch, newest, n_slow, ring_address, slot_stride = rest
@@ -155,8 +144,8 @@ def decode_header(data: bytes | memoryview) -> RingHeader:
         raise ConfigError(f"block ring: magic is {magic:#06x}, expected {MAGIC:#06x}")
     if version != VERSION:
         raise ConfigError(f"block ring: profile version is {version}, known is {VERSION}")
-    found = int.from_bytes(data[_HEADER.size : 2 * HEADER_REGISTERS], "big")
-    expected = zlib.crc32(data[: _HEADER.size])
+    found = int.from_bytes(data[HEADER.size : 2 * HEADER_REGISTERS], "big")
+    expected = zlib.crc32(data[: HEADER.size])
     if found != expected:
         raise FrameError(f"block ring: checksum of the header is {found:#x}, not {expected:#x}")
     layout = _possible_layout(
@@ -223,45 +212,28 @@ class Slot:
         return not self.torn and not self.damage
 
 
-def encode_slot(slot: Slot) -> bytes:
-    """Registers of one slot."""
-    head = _SLOT_HEAD.pack(
-        *(slot.sequence, slot.first_index, slot.seconds, slot.microseconds),
-        *(slot.ok_bits, slot.epoch),
-    )
-    samples = slot.counts.astype(">i2").tobytes() + slot.trailer.to_bytes(2, "big")
-    data = head + encode_slow(slot.slow) + samples
-    return data + (zlib.crc32(data) ^ slot.damage).to_bytes(2 * _CRC_REGISTERS, "big")
-
-
-def decode_slots(content: bytes | memoryview, layout: RingLayout) -> list[Slot]:
+def decode_slots(content: bytes, layout: RingLayout) -> list[Slot]:
     """Read slots that lie one behind the other."""
-    records = np.frombuffer(content, layout.slot_type)
-    counts = records["counts"].astype(np.int16)
-    heads, slow = records["head"].tolist(), records["slow"].tolist()
-    trailers, crcs = records["trailer"].tolist(), records["crc"].tolist()
-    n_bytes = records.itemsize
+    records, view = np.frombuffer(content, layout.slot_type), memoryview(content)
+    counts, n_bytes = records["counts"].astype(np.int16), records.itemsize
+    columns = (records[name].tolist() for name in ("head", "slow", "trailer", "crc"))
     slots = []
-    for n, (sequence, first_index, seconds, microseconds, ok_bits, epoch) in enumerate(heads):
-        data = content[n * n_bytes : (n + 1) * n_bytes]
+    for n, (head, slow, trailer, crc) in enumerate(zip(*columns, strict=True)):
+        data = view[n * n_bytes : (n + 1) * n_bytes]
+        sequence, first_index, seconds, microseconds, ok_bits, epoch = head
         slots.append(
             Slot(
-                sequence=sequence,
-                first_index=first_index,
-                seconds=seconds,
-                microseconds=microseconds,
-                ok_bits=ok_bits,
-                counts=counts[n],
-                trailer=trailers[n],
-                epoch=epoch,
-                slow=tuple(slow[n]),
-                damage=zlib.crc32(data[: -2 * _CRC_REGISTERS]) ^ crcs[n],
+                sequence,
+                first_index,
+                seconds,
+                microseconds,
+                ok_bits,
+                counts[n],
+                trailer,
+                epoch,
+                slow=tuple(slow),
+                damage=zlib.crc32(data[: -2 * _CRC_REGISTERS]) ^ crc,
                 blank=not any(data),
             )
         )
     return slots
-
-
-def encode_slow(values: Sequence[float]) -> bytes:
-    """Slow values as registers, NaN where there is none."""
-    return np.asarray(values, dtype=">f4").tobytes()

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
 from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import UnitCalibration
-from acquisition.delivery.polling import incommensurate_period_s, wrong_replies_drop_the_link
+from acquisition.delivery.polling import incommensurate_period_s
 from acquisition.errors import LinkError
 from acquisition.modbus.client import ModbusClient
-from acquisition.modbus.requests import ADDRESS_SPACE, READ_HOLDING_REGISTERS, REGISTER_FUNCTIONS
+from acquisition.modbus.requests import READ_HOLDING_REGISTERS
 from acquisition.modbus.ring_follower import RingFollower, RingReader
-from acquisition.modbus.ring_profile import HEADER_REGISTERS
-from acquisition.modbus.transport import LinkSettings, require_above_zero, require_between
+from acquisition.modbus.transport import LinkSettings
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import UnitCalibration
 
 _MIN_STALE_SLOTS = 3
 """A device with long slots may be silent for more than a slot without being stale."""
@@ -42,12 +41,6 @@ class RingSettings(LinkSettings):
     poll_period_s: float = 0.5
     stale_after_s: float = 5.0
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_between(self, "function", *REGISTER_FUNCTIONS)
-        require_between(self, "base_address", 0, ADDRESS_SPACE - HEADER_REGISTERS)
-        require_above_zero(self, "poll_period_s", "stale_after_s")
-
 
 class RingSource:
     """Samples of one unit from a block ring; a new connection continues after the last slot."""
@@ -55,33 +48,24 @@ class RingSource:
     def __init__(self, settings: RingSettings, calibration: UnitCalibration, clock: Clock) -> None:
         self._settings = settings
         self._client = ModbusClient(settings)
-        self._reader = RingReader(self._client, settings.base_address, settings.function)
         self._delivery = BlockAssembler(calibration)
         self._clock = clock
-        self._follower = RingFollower(calibration, begun_ns=clock.now_ns())
+        reader = RingReader(self._client, settings.base_address, settings.function)
+        self._follower = RingFollower(reader, calibration, begun_ns=clock.now_ns())
         self._fresh_at_s = 0.0
         self._stale_after_s = settings.stale_after_s
         self._slot_s = 0.0
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link and identify the device; leaving the context closes the link.
-
-        Raises
-        ------
-        LinkError
-            If the device does not answer, answers wrongly, or its data stand still.
-        ConfigError
-            If it is not a block ring, or not the configured one.
-        """
+        """Open the link and check that the device has the configured ring, as `SampleSource`."""
         async with self._client.connected():
-            with wrong_replies_drop_the_link():
-                await self._identify()
+            await self._identify()
             async with aclosing(self._blocks()) as blocks:
                 yield blocks
 
     async def _identify(self) -> None:
-        header = await self._follower.header(self._reader)
+        header = await self._follower.header()
         self._slot_s = header.layout.slot_duration_s
         self._stale_after_s = max(self._settings.stale_after_s, _MIN_STALE_SLOTS * self._slot_s)
         if self._follower.newest == (header.epoch, header.newest):
@@ -94,8 +78,7 @@ class RingSource:
         due_s = self._clock.monotonic_s()
         while True:
             begun_s = self._clock.monotonic_s()
-            with wrong_replies_drop_the_link():
-                raw_blocks = await self._follower.poll(self._reader)
+            raw_blocks = await self._follower.poll()
             arrived = Arrival.now(self._clock)
             n_waiting = self._follower.n_waiting
             read_for_s = arrived.steady_s - begun_s + n_waiting * self._slot_s

@@ -6,18 +6,13 @@ from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 
 from acquisition.clock import Clock
-from acquisition.delivery.calibration import SlowCalibration, slow_reading
 from acquisition.delivery.polling import Freshness
 from acquisition.errors import AcquisitionError, ConfigError
 from acquisition.modbus.decoding import MapDecoder, MapReading
-from acquisition.modbus.polled_source import (
-    MapReader,
-    PolledSettings,
-    position_of,
-    slow_number,
-)
+from acquisition.modbus.polled_source import MapReader, PolledSettings, slow_number
 from acquisition.modbus.register_map import RegisterMap
 from core.quality import Reading, Reason, missing
+from core.samples.calibration import SlowCalibration
 
 _MIN_RETRY_S = 1.0
 _CONFIG_RETRY_S = 15.0
@@ -38,11 +33,6 @@ class PolledSlowValues:
     ----------
     trouble
         Why there are no values, in words; None while there are.
-
-    Raises
-    ------
-    ConfigError
-        If the map cannot be read, lacks a channel, or forbids so short a poll period or time-out.
     """
 
     def __init__(
@@ -52,10 +42,10 @@ class PolledSlowValues:
         channels: Sequence[SlowCalibration],
         clock: Clock,
     ) -> None:
-        settings.require_fit(registers)
         self._settings, self._clock = settings, clock
         self._reader = MapReader(settings, MapDecoder(registers))
-        self._channels = {position_of(channel.id, registers): channel for channel in channels}
+        position = {id_: n for n, id_ in enumerate(registers.ids)}
+        self._channels = {position[channel.id]: channel for channel in channels}
         self._freshness = Freshness("the content of its registers", settings.stale_after_s)
         self._newest: tuple[float, Mapping[str, Reading]] | None = None
         self._task: asyncio.Task[None] | None = None
@@ -124,6 +114,6 @@ class PolledSlowValues:
 
     def _readings(self, reading: MapReading) -> Mapping[str, Reading]:
         return {
-            channel.id: slow_reading(slow_number(reading, n), channel)
+            channel.id: channel.reading(slow_number(reading, n))
             for n, channel in self._channels.items()
         }

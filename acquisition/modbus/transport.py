@@ -1,18 +1,14 @@
-"""Settings of a link: a TCP address or a serial line, and how the device wants to be asked."""
+"""Settings of a link: a TCP address or a serial line, and how the device wants to be asked.
+
+The plant file's settings refuse values out of their limits; nothing is checked here again.
+"""
 
 from dataclasses import dataclass
-from enum import StrEnum
-from typing import Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias
 
 from acquisition.errors import ConfigError
 from acquisition.modbus.identity import Identity
-from acquisition.modbus.requests import MAX_REGISTERS_PER_READ
 
-Parity: TypeAlias = Literal["none", "even", "odd"]
-
-_MAX_REQUESTS_IN_FLIGHT = 16
-_MIN_BAUDRATE, _MAX_BAUDRATE = 300, 4_000_000
-_MAX_TCP_DEVICE_ID, _MAX_SERIAL_DEVICE_ID = 255, 247
 _BITS_AROUND_A_CHARACTER = 9  # a start bit and eight of data
 _FRAME_GAP_CHARACTERS = 3.5
 _SHORTEST_FRAME_GAP_S = 0.00175
@@ -29,13 +25,19 @@ class TcpTransport:
         Name or address; example: "192.0.2.17".
     port
         1 to 65535.
+
+    Raises
+    ------
+    ConfigError
+        If the port is 0, which only a simulated device may have in a plant file.
     """
 
     host: str
     port: int = 502
 
     def __post_init__(self) -> None:
-        require_between(self, "port", 1, 65535)
+        if self.port == 0:
+            raise ConfigError("modbus: port is 0, allowed is 1 to 65535")
 
     def __str__(self) -> str:
         return f"{self.host}:{self.port}"
@@ -50,25 +52,13 @@ class SerialTransport:
     device
         Path of the port; example: "/dev/ttyUSB0".
     baudrate
-        300 to 4,000,000 bit/s.
-    parity
-        "none", "even" or "odd".
-    stop_bits
-        1 or 2.
+        Bits per second.
     """
 
     device: str
     baudrate: int = 19_200
-    parity: Parity = "even"
+    parity: Literal["none", "even", "odd"] = "even"
     stop_bits: Literal[1, 2] = 1
-
-    def __post_init__(self) -> None:
-        require_between(self, "baudrate", _MIN_BAUDRATE, _MAX_BAUDRATE)
-        require_between(self, "stop_bits", 1, 2)
-        if self.parity not in get_args(Parity):
-            raise ConfigError(
-                f"modbus: parity is {self.parity!r}, allowed are {', '.join(get_args(Parity))}"
-            )
 
     def __str__(self) -> str:
         return self.device
@@ -88,13 +78,6 @@ class SerialTransport:
 Transport: TypeAlias = TcpTransport | SerialTransport
 
 
-class ConnectionUse(StrEnum):
-    """For how long a TCP connection is kept."""
-
-    KEPT = "kept"
-    PER_REPLY = "per_reply"
-
-
 @dataclass(frozen=True, kw_only=True)
 class LinkSettings:
     """How to reach a Modbus device, and how it wants to be asked.
@@ -106,67 +89,19 @@ class LinkSettings:
     timeout_s
         For connecting and for each reply, above 0. On a serial line it must be longer than the
         slowest reply: it is also the silence that is awaited when the line is opened.
-    max_registers
-        Most registers in one read, 1 to 125.
     identity
         What the device must answer before anything else is read from it.
-    connection
-        "kept" for as long as it works, or a new one for each request: for devices that close it
+    keeps_connection
+        Whether a connection is kept for as long as it works. False is for TCP devices that close it
         after each reply or when they are not asked for a while, or that have a single one for all.
     requests_in_flight
         Most requests that are sent at once, 1 to 16; over TCP, on a connection that is kept. Most
         devices answer them one after another and save the round trips; some lose all but one.
-
-    Raises
-    ------
-    ConfigError
-        With the value that cannot be, and what is allowed.
     """
 
     transport: Transport
     device_id: int = 1
     timeout_s: float = 1.0
-    max_registers: int = MAX_REGISTERS_PER_READ
     identity: Identity | None = None
-    connection: ConnectionUse = ConnectionUse.KEPT
+    keeps_connection: bool = True
     requests_in_flight: int = 1
-
-    def __post_init__(self) -> None:
-        is_serial = isinstance(self.transport, SerialTransport)
-        is_kept = self.connection is ConnectionUse.KEPT
-        if is_serial and not is_kept:
-            raise ConfigError("modbus: a serial line is kept, there are no connections on it")
-        require_between(
-            self, "device_id", 1, _MAX_SERIAL_DEVICE_ID if is_serial else _MAX_TCP_DEVICE_ID
-        )
-        require_between(self, "max_registers", 1, MAX_REGISTERS_PER_READ)
-        is_single = is_serial or not is_kept
-        require_between(self, "requests_in_flight", 1, 1 if is_single else _MAX_REQUESTS_IN_FLIGHT)
-        require_above_zero(self, "timeout_s")
-
-
-def require_between(settings: object, name: str, lowest: int, highest: int) -> None:
-    """Refuse a setting outside its limits.
-
-    Raises
-    ------
-    ConfigError
-        With its name, its value and what is allowed.
-    """
-    value = getattr(settings, name)
-    if not lowest <= value <= highest:
-        raise ConfigError(f"modbus: {name} is {value}, allowed is {lowest} to {highest}")
-
-
-def require_above_zero(settings: object, *names: str) -> None:
-    """Refuse times that are not finite and above zero.
-
-    Raises
-    ------
-    ConfigError
-        With the name and value of the first such.
-    """
-    for name in names:
-        value = getattr(settings, name)
-        if not 0.0 < value < float("inf"):
-            raise ConfigError(f"modbus: {name} is {value}, must be above 0")

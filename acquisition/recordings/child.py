@@ -1,8 +1,7 @@
 """The confined child: ``python -m acquisition.recordings.child``, requests on standard input.
 
 Each request is a line of JSON. A fork with bounded memory and time that cannot write files answers
-it with :mod:`acquisition.recordings.messages`. A hostile file can harm
-that fork only.
+it with :mod:`acquisition.recordings.messages`. A hostile file can harm that fork only.
 """
 
 import json
@@ -22,13 +21,13 @@ from acquisition.errors import ConfigError
 from acquisition.recordings import tables  # loaded once, before the forks
 from acquisition.recordings.confined import confine, memory_in_use_bytes
 from acquisition.recordings.imports.can_log import read_frames
-from acquisition.recordings.imports.csv_file import CsvTable
-from acquisition.recordings.imports.hdf5_file import Hdf5File
+from acquisition.recordings.imports.csv_file import csv_rows
+from acquisition.recordings.imports.hdf5_file import hdf5_file
 from acquisition.recordings.imports.job import ImportJob
-from acquisition.recordings.imports.mdf_file import MdfFile
-from acquisition.recordings.imports.rows import Table, raw_blocks
-from acquisition.recordings.imports.series import SeriesTable
-from acquisition.recordings.imports.tdms_file import TdmsFile
+from acquisition.recordings.imports.mdf_file import mdf_file
+from acquisition.recordings.imports.rows import Rows, raw_blocks
+from acquisition.recordings.imports.series import series_rows
+from acquisition.recordings.imports.tdms_file import tdms_file
 from acquisition.recordings.manifest import (
     BLOCKS,
     BLOCKS_PER_GROUP,
@@ -47,14 +46,11 @@ from acquisition.recordings.messages import (
 )
 from core.arrays import RawArray
 
-CPU_S = 3600
-_LOG_BYTES = 1_000_000
-
-_TABLES: Mapping[str, Callable[[Path, ImportJob], Table]] = {
-    "csv": CsvTable,
-    "hdf5": lambda path, job: SeriesTable(Hdf5File(path), job),
-    "tdms": lambda path, job: SeriesTable(TdmsFile(path), job),
-    "mdf4": lambda path, job: SeriesTable(MdfFile(path, job), job),
+_ROWS: Mapping[str, Callable[[Path, ImportJob], Iterator[Rows]]] = {
+    "csv": csv_rows,
+    "hdf5": lambda path, job: series_rows(hdf5_file(path), job),
+    "tdms": lambda path, job: series_rows(tdms_file(path), job),
+    "mdf4": lambda path, job: series_rows(mdf_file(path, job), job),
 }
 
 
@@ -81,7 +77,7 @@ def _answer_and_exit(line: bytes) -> None:
     code = 1
     try:
         request = json.loads(line)
-        confine(memory_in_use_bytes() + _memory_bytes(request), CPU_S, _LOG_BYTES)
+        confine(memory_in_use_bytes() + _memory_bytes(request))
         code = FAILED  # from here on by the file
         answer(request, sys.stdout.buffer)
         code = 0
@@ -94,7 +90,7 @@ def _answer_and_exit(line: bytes) -> None:
 
 def _memory_bytes(request: Mapping[str, Any]) -> int:
     """Memory for reading a file; a recording has narrow bounds, foreign formats have none."""
-    return 2**31 if request["format"] in _TABLES else 2**28
+    return 2**31 if request["format"] in _ROWS else 2**28
 
 
 def answer(request: Mapping[str, Any], out: BinaryIO) -> None:
@@ -126,7 +122,7 @@ def _import(path: Path, request: Mapping[str, Any]) -> Iterator[Message]:
         for batch, done in read_frames(path, job):
             yield frames_message(batch, done)
     else:
-        for block, done in raw_blocks(_TABLES[job.format](path, job).rows(), job):
+        for block, done in raw_blocks(_ROWS[job.format](path, job), job):
             yield block_message(block, done)
 
 

@@ -3,15 +3,24 @@
 import os
 import resource
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import IO
+
+CPU_S = 3600
+LOG_BYTES = 1_000_000
+"""Largest file that a child may write: enough for its log, too small for an unpacked archive."""
 
 _LOG_BYTES_SHOWN = 4000
+
+_ENVIRONMENT = {
+    "ARROW_DEFAULT_MEMORY_POOL": "system",  # others reserve address space, which is limited
+    "HDF5_PLUGIN_PRELOAD": "::",  # no filters from libraries that a file names
+    "OPENBLAS_NUM_THREADS": "1",  # each thread takes address space
+}
 
 
 class ConfinedProcess:
@@ -19,8 +28,13 @@ class ConfinedProcess:
 
     Parameters
     ----------
-    environment
-        Added to the environment of this process.
+    silence_s
+        How long a read from ``output`` waits before it raises TimeoutError; None: for ever.
+
+    Attributes
+    ----------
+    input, output
+        Standard input and output of the child.
 
     Raises
     ------
@@ -28,31 +42,21 @@ class ConfinedProcess:
         If the system cannot start another process now.
     """
 
-    def __init__(self, module: str, *arguments: str, environment: Mapping[str, str]) -> None:
+    def __init__(self, module: str, *arguments: str, silence_s: float | None = None) -> None:
         search = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  closed with the process
-        try:
+        ours, theirs = socket.socketpair()  # unlike pipes, with a time-out
+        with ours, theirs:
             self._process = subprocess.Popen(  # noqa: S603  our own module
                 [sys.executable, "-m", module, *arguments],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
+                stdin=theirs.fileno(),
+                stdout=theirs.fileno(),
                 stderr=self._log,
-                env=os.environ | dict(environment) | search,
+                env=os.environ | _ENVIRONMENT | search,
                 process_group=0,
             )
-        except BaseException:
-            self._log.close()
-            raise
-
-    @property
-    def input(self) -> IO[bytes]:
-        """Standard input of the child."""
-        return _piped(self._process.stdin)
-
-    @property
-    def output(self) -> IO[bytes]:
-        """Standard output of the child."""
-        return _piped(self._process.stdout)
+            ours.settimeout(silence_s)
+            self.input, self.output = ours.makefile("wb"), ours.makefile("rb")
 
     def exit_code(self) -> int:
         """Wait for the end of the child; negative if a signal ended it."""
@@ -84,25 +88,18 @@ class ConfinedProcess:
             with suppress(ProcessLookupError):
                 os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
-            with suppress(BrokenPipeError):
-                _piped(pipe).close()
-        self._log.close()
+        for stream in (self.input, self.output, self._log):
+            with suppress(OSError):  # a request that was not taken any more
+                stream.close()
 
 
-def confine(memory_bytes: int, cpu_s: int, log_bytes: int) -> None:
-    """Limit what this process may use from now on.
-
-    Parameters
-    ----------
-    log_bytes
-        Largest file that it may write: enough for its log, too small for an unpacked archive.
-    """
+def confine(memory_bytes: int) -> None:
+    """Limit memory, processor time and files that this process may use from now on."""
     for kind, limit in (
         (resource.RLIMIT_AS, memory_bytes),
-        (resource.RLIMIT_CPU, cpu_s),
+        (resource.RLIMIT_CPU, CPU_S),
         (resource.RLIMIT_CORE, 0),
-        (resource.RLIMIT_FSIZE, log_bytes),
+        (resource.RLIMIT_FSIZE, LOG_BYTES),
     ):
         highest = resource.getrlimit(kind)[1]  # inherited; an unprivileged process cannot raise it
         limit = limit if highest == resource.RLIM_INFINITY else min(limit, highest)
@@ -119,9 +116,3 @@ def memory_in_use_bytes() -> int:
 def printable(text: str, max_length: int = 300) -> str:
     """Text without control characters, safe to print on a terminal."""
     return "".join(c if c.isprintable() else "�" for c in text)[:max_length]
-
-
-def _piped(pipe: IO[bytes] | None) -> IO[bytes]:
-    if pipe is None:
-        raise ValueError("the process was started without this pipe")
-    return pipe

@@ -2,10 +2,12 @@
 
 import math
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from enum import StrEnum
+from functools import partial
 from io import RawIOBase
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,7 @@ import pyarrow as pa
 import pyarrow.csv
 import pyarrow.parquet as pq
 
-from acquisition.delivery.calibration import RawBlock, calibrate, slow_reading
+from acquisition.delivery.blocks import RawBlock, sample_block
 from acquisition.delivery.units import UNIT_OF
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import Manifest
@@ -60,55 +62,44 @@ def export_recording(
     if os.path.lexists(out):
         raise ConfigError(f"{out}: is there already; nothing is overwritten")
     aside = out.with_name(out.name + ".incomplete")
-    schema, writer = _FORMATS[kind]
     try:
         with foreign_errors_of(out):
-            columns = schema(recording.manifest)
-            with writer(aside, columns) as file:
-                for table in export_tables(recording, columns):
-                    file.write_table(table)
-                    advanced(table.num_rows)
+            for n_rows in write_rows(recording, kind, aside):
+                advanced(n_rows)
             aside.rename(out)
     finally:
         with suppress(FileNotFoundError):
             aside.unlink()
 
 
-def csv_tables(recording: Recording, sink: RawIOBase) -> Iterator[None]:
-    """Write a recording as CSV, some thousands of rows at each step.
+def write_rows(recording: Recording, kind: ExportFormat, sink: Path | RawIOBase) -> Iterator[int]:
+    """Write a recording, some thousands of rows at each step; returns the number of each step.
 
     Raises
     ------
     ConfigError
-        If a file of the recording cannot be read any more.
+        If a channel has the name of a column of every export, or a file of the recording cannot be
+        read any more.
     """
-    schema = csv_schema(recording.manifest)
-    with pyarrow.csv.CSVWriter(sink, schema) as writer:
+    schema_of, open_writer = _FORMATS[kind]
+    schema = schema_of(recording.manifest)
+    with open_writer(sink, schema) as writer:
         for table in export_tables(recording, schema):
             writer.write_table(table)
-            yield
-    yield
+            yield table.num_rows
+    yield 0  # the end of the file is written, too
 
 
 def export_tables(recording: Recording, schema: Any) -> Iterator[Any]:
     """All rows of a recording, some thousands at once.
 
     Where samples are missing there are no rows: time and index jump. Times are whole microseconds;
-    samples of a bad channel, and slow values that cannot be, are NaN.
-
-    Raises
-    ------
-    ConfigError
-        If a file of the recording cannot be read any more.
+    samples of a bad channel, and slow values that cannot be, are NaN. Raises ConfigError if a file
+    of the recording cannot be read any more.
     """
-    waiting: list[RawBlock] = []
-    for raw in recording.raw_blocks():
-        waiting.append(raw)
-        if len(waiting) == _BLOCKS_AT_ONCE:
-            yield _table(waiting, recording.manifest, schema)
-            waiting = []
-    if waiting:
-        yield _table(waiting, recording.manifest, schema)
+    blocks = recording.raw_blocks()
+    while some := list(islice(blocks, _BLOCKS_AT_ONCE)):
+        yield _table(some, recording.manifest, schema)
 
 
 def csv_schema(manifest: Manifest) -> Any:
@@ -136,13 +127,9 @@ def parquet_schema(manifest: Manifest) -> Any:
     return schema.with_metadata({"unit": manifest.unit, "made_by": manifest.made_by})
 
 
-def _parquet_writer(path: Path, schema: Any) -> Any:
-    return pq.ParquetWriter(path, schema, compression="zstd")
-
-
-_FORMATS: dict[ExportFormat, tuple[Callable[[Manifest], Any], Callable[[Path, Any], Any]]] = {
+_FORMATS: Mapping[ExportFormat, tuple[Callable[[Manifest], Any], Callable[[Any, Any], Any]]] = {
     ExportFormat.CSV: (csv_schema, pyarrow.csv.CSVWriter),
-    ExportFormat.PARQUET: (parquet_schema, _parquet_writer),
+    ExportFormat.PARQUET: (parquet_schema, partial(pq.ParquetWriter, compression="zstd")),
 }
 
 
@@ -185,12 +172,12 @@ def _times_ns(block: RawBlock) -> np.ndarray:
 
 
 def _samples(block: RawBlock, manifest: Manifest) -> SampleArray:
-    calibrated = calibrate(block, manifest.calibration)
-    bad = [quality.level is Level.BAD for quality in calibrated.channel_quality]
-    return np.where(np.array(bad)[:, np.newaxis], np.float32(np.nan), calibrated.samples)
+    found = sample_block([block], manifest.calibration)
+    bad = [quality.level is Level.BAD for quality in found.channel_quality]
+    return np.where(np.array(bad)[:, np.newaxis], np.float32(np.nan), found.samples)
 
 
 def _slow(block: RawBlock, manifest: Manifest) -> list[float]:
     channels = manifest.calibration.slow
-    readings = [slow_reading(v, c) for v, c in zip(block.slow, channels, strict=True)]
+    readings = [c.reading(value) for c, value in zip(channels, block.slow, strict=True)]
     return [math.nan if reading.value is None else reading.value for reading in readings]

@@ -4,23 +4,22 @@ import hashlib
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 from pydantic import model_validator as validated
 
-from acquisition.delivery.calibration import (
+from acquisition.delivery.small_file import read_small_file
+from acquisition.errors import ConfigError
+from core.machine.channel import Measurand
+from core.samples.blocks import Rejection
+from core.samples.calibration import (
     BLOCK_SAMPLES,
     ChannelCalibration,
     SlowCalibration,
     UnitCalibration,
 )
-from acquisition.errors import ConfigError
-from core.machine.channel import Measurand
-from core.samples.blocks import Rejection
-from core.units import NS_PER_S
 
 FORMAT = "padwatch-recording"
 VERSION = 3
@@ -92,7 +91,7 @@ class RecordedUnit(ManifestPart):
         "int16": counts of the converter. "float32": engineering units from a device that has no
         counts, not a number where it has no sample.
     block_samples
-        Grid of the blocks; see :class:`acquisition.delivery.calibration.UnitCalibration`.
+        Grid of the blocks; see :class:`core.samples.calibration.UnitCalibration`.
 
     Raises
     ------
@@ -232,8 +231,12 @@ def read_manifest(folder: Path) -> Manifest:
         If there is none, or anything in it is wrong; the message names the first mistake.
     """
     path = folder / MANIFEST
-    text = _read(path)
+    if not folder.is_dir():
+        raise ConfigError(f"{folder}: no such folder")
+    if not path.is_file():
+        raise ConfigError(f"{folder}: no {MANIFEST}, so no recording or an unfinished one")
     try:
+        text = read_small_file(path, MAX_MANIFEST_BYTES)
         head = _Head.model_validate_json(text, strict=True)
         if head.format != FORMAT or head.version != VERSION:
             raise ConfigError(
@@ -246,6 +249,8 @@ def read_manifest(folder: Path) -> Manifest:
         place = "".join(f".{part}"[:60] for part in first["loc"]).lstrip(".")
         words = f"{place}: {first['msg']}" if place else first["msg"]
         raise ConfigError(f"{path}: {words}") from error
+    except OSError as error:
+        raise ConfigError(f"{path}: {error.strerror}") from error
     if found.checksum != checksum_of(json.loads(text)):
         raise ConfigError(f"{path}: damaged, or edited by hand: not what its checksum says")
     return found
@@ -254,15 +259,8 @@ def read_manifest(folder: Path) -> Manifest:
 def manifest_text(manifest: Manifest) -> str:
     """Text of the manifest file: format and version first, checksum last."""
     values = manifest.model_dump(mode="json", exclude={"checksum"})
-    first = {name: values.pop(name) for name in ("format", "version", "made_by", "start")}
-    checksum = checksum_of(first | values)
-    return json.dumps(first | values | {"checksum": checksum}, indent=1) + "\n"
-
-
-def start_text(start_ns: int) -> str:
-    """ISO 8601 time with nanoseconds."""
-    seconds, ns = divmod(start_ns, NS_PER_S)
-    return f"{datetime.fromtimestamp(seconds, UTC):%Y-%m-%dT%H:%M:%S}.{ns:09d}Z"
+    first = {name: values[name] for name in ("format", "version", "made_by", "start")}
+    return json.dumps(first | values | {"checksum": checksum_of(values)}, indent=1) + "\n"
 
 
 def checksum_of(document: dict[str, object]) -> str:
@@ -270,18 +268,3 @@ def checksum_of(document: dict[str, object]) -> str:
     rest = {name: value for name, value in document.items() if name != "checksum"}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("ascii")).hexdigest()
-
-
-def _read(path: Path) -> bytes:
-    if not path.parent.is_dir():
-        raise ConfigError(f"{path.parent}: no such folder")
-    if not path.is_file():
-        raise ConfigError(f"{path.parent}: no {MANIFEST}, so no recording or an unfinished one")
-    try:
-        with path.open("rb") as file:
-            text = file.read(MAX_MANIFEST_BYTES + 1)
-    except OSError as error:
-        raise ConfigError(f"{path}: {error.strerror}") from error
-    if len(text) > MAX_MANIFEST_BYTES:
-        raise ConfigError(f"{path}: larger than {MAX_MANIFEST_BYTES} bytes, not a manifest")
-    return text

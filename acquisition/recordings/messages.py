@@ -1,8 +1,9 @@
 """Messages of the confined child: short JSON heads and plain bytes, never pickled objects."""
 
+import itertools
 import json
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -10,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, NonNegativeInt, ValidationError
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import SampleType
 from core.arrays import RawArray
-from core.samples.blocks import Rejection
+from core.samples.blocks import Rejection, SampleBlock, SideValues
+from core.samples.calibration import UnitCalibration
 
 READY = b"\n"
 """First byte of a child that can take requests."""
@@ -44,35 +46,39 @@ def send(stream: BinaryIO, head: dict[str, Any], body: bytes = b"") -> None:
     stream.write(len(text).to_bytes(4, "little") + len(body).to_bytes(4, "little") + text + body)
 
 
-def receive(read: Callable[[int], bytes]) -> Message:
+def receive(stream: BinaryIO) -> Message:
     """Read one message.
-
-    Parameters
-    ----------
-    read
-        Returns exactly this many bytes.
 
     Raises
     ------
     ConfigError
         If it is malformed or too long.
+    EOFError
+        If the stream ends within it.
     """
-    lengths = read(8)
+    lengths = _read(stream, 8)
     n_head, n_body = (int.from_bytes(lengths[at : at + 4], "little") for at in (0, 4))
     if n_head > MAX_HEAD_BYTES or n_body > MAX_BODY_BYTES:
         raise ConfigError(f"a message of {n_head} + {n_body} bytes from the reading process")
     try:
-        head = json.loads(read(n_head))
+        head = json.loads(_read(stream, n_head))
     except (ValueError, RecursionError) as error:
         raise _malformed() from error
     if not isinstance(head, dict):
         raise _malformed()
-    return head, read(n_body)
+    return head, _read(stream, n_body)
+
+
+def _read(stream: BinaryIO, n_bytes: int) -> bytes:
+    found = stream.read(n_bytes)
+    if len(found) < n_bytes:
+        raise EOFError
+    return found
 
 
 @dataclass(frozen=True)
 class BlockHead:
-    """A recorded block without its samples; see :class:`acquisition.delivery.raw.RawBlock`."""
+    """A recorded block without its samples; see :class:`acquisition.delivery.blocks.RawBlock`."""
 
     epoch: int
     first_index: int
@@ -81,19 +87,6 @@ class BlockHead:
     ok: tuple[bool, ...]
     slow: tuple[float, ...]
     rejected: tuple[Rejection, ...]
-
-    def raw(self, rate_hz: float, counts: RawArray) -> RawBlock:
-        """The whole block."""
-        return RawBlock(
-            epoch=self.epoch,
-            first_index=self.first_index,
-            start_ns=self.start_ns,
-            rate_hz=rate_hz,
-            counts=counts,
-            ok=self.ok,
-            slow=self.slow,
-            rejected=self.rejected,
-        )
 
 
 def head_type(n_slow: int) -> np.dtype[np.void]:
@@ -136,73 +129,92 @@ def block_message(block: RawBlock, done: float) -> Message:
 class BlockLayout:
     """Shape of the blocks that a child sends, and the types that their samples may have."""
 
-    n_channels: int
-    n_slow: int
+    calibration: UnitCalibration
     sample_types: tuple[str, ...] = ("int16", "float32")
 
-    def heads(self, message: Message) -> tuple[list[BlockHead], bytes]:
-        """Heads of the blocks of a message, and the bytes behind them.
+    def heads(self, message: Message) -> list[BlockHead]:
+        """Heads of the blocks of a message.
 
         Raises
         ------
         ConfigError
             If the message is not one of blocks of this layout.
         """
-        head, body, type_ = _blocks_head(message), message[1], head_type(self.n_slow)
-        n_bytes = head.n * type_.itemsize
-        if n_bytes > len(body):
-            raise _malformed()
-        rejected = defaultdict(list)
-        for row, reason, n_rejected in head.rejected:
-            rejected[row].append(Rejection(reason, n_rejected))
-        rows = np.frombuffer(body, type_, head.n)
-        numbers = zip(rows[list(HEAD_NUMBERS)].tolist(), rows["slow"].tolist(), strict=True)
-        heads = [
+        rows, rejected, _ = self._parts(message)
+        n_channels = len(self.calibration.channels)
+        numbers, ok_bits = rows[list(HEAD_NUMBERS[:-1])].tolist(), rows["ok"].tolist()
+        return [
             BlockHead(
-                epoch,
-                first_index,
-                start_ns,
-                n_samples,
-                tuple(bool(ok >> n & 1) for n in range(max(self.n_channels, ok.bit_length()))),
+                *(epoch, first_index, start_ns, n_samples),
+                tuple(bool(ok >> n & 1) for n in range(max(n_channels, ok.bit_length()))),
                 tuple(slow),
                 tuple(rejected[row]),
             )
-            for row, ((epoch, first_index, start_ns, n_samples, ok), slow) in enumerate(numbers)
+            for row, ((epoch, first_index, start_ns, n_samples), ok, slow) in enumerate(
+                zip(numbers, ok_bits, rows["slow"].tolist(), strict=True)
+            )
         ]
-        return heads, body[n_bytes:]
 
-    def blocks(self, message: Message) -> Iterator[tuple[BlockHead, RawArray]]:
-        """Blocks of a message with their samples, (n_channels, n_samples).
+    def runs(self, message: Message) -> Iterator[SampleBlock]:
+        """Blocks of a message with their samples, those that follow each other as one.
 
         Raises
         ------
         ConfigError
             As :meth:`heads`, and if the samples are not those of the heads.
         """
-        heads, body = self.heads(message)
-        sample_type, n_samples = _blocks_head(message).sample_type, [h.n_samples for h in heads]
-        n_bytes = np.dtype(sample_type).itemsize * self.n_channels * sum(n_samples)
-        is_possible = sample_type in self.sample_types and min(n_samples, default=0) > 0
-        if not is_possible or len(body) != n_bytes:
+        rows, rejected, sample_type = self._parts(message)
+        n_channels, n_samples = len(self.calibration.channels), rows["n_samples"]
+        is_possible = ((n_samples > 0) & (n_samples <= len(message[1]))).all()
+        if sample_type not in self.sample_types or not is_possible:
             raise _malformed()
-        counts: RawArray = np.frombuffer(body, dtype=sample_type).reshape(self.n_channels, -1)
-        stop = 0
-        for head in heads:
-            start, stop = stop, stop + head.n_samples
-            yield head, counts[:, start:stop]
+        samples: RawArray = np.frombuffer(message[1], sample_type, offset=rows.nbytes)
+        if len(samples) != n_channels * int(n_samples.sum()):
+            raise _malformed()
+        samples, stops = samples.reshape(n_channels, -1), np.cumsum(n_samples)
+        begins = np.ones(len(rows), dtype=np.bool_)
+        begins[1:] = rows["epoch"][1:] != rows["epoch"][:-1]
+        begins[1:] |= rows["first_index"][1:] != (rows["first_index"] + n_samples)[:-1]
+        begins[list(rejected)] = True
+        is_ok = (rows["ok"] >> np.arange(n_channels)[:, np.newaxis] & 1).astype(np.bool_)
+        for first, stop in itertools.pairwise([*np.flatnonzero(begins).tolist(), len(rows)]):
+            start, cells = int(stops[first] - n_samples[first]), slice(first, stop)
+            yield SampleBlock(
+                calibration=self.calibration,
+                epoch=int(rows["epoch"][first]),
+                first_index=int(rows["first_index"][first]),
+                counts=samples[:, start : int(stops[stop - 1])],
+                side=SideValues(
+                    starts=stops[cells] - n_samples[cells] - start,
+                    start_ns=rows["start_ns"][cells],
+                    ok=is_ok[:, cells],
+                    slow=rows["slow"][cells].T,
+                ),
+                rejected=tuple(rejected[first]),
+            )
+
+    def _parts(
+        self, message: Message
+    ) -> tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]], SampleType | None]:
+        try:
+            head = _BlocksHead.model_validate(message[0])
+        except ValidationError as error:
+            raise _malformed() from error
+        type_ = head_type(len(self.calibration.slow))
+        if head.n * type_.itemsize > len(message[1]):
+            raise _malformed()
+        rejected = defaultdict(list)
+        for row, reason, n_rejected in head.rejected:
+            if not 0 <= row < head.n:
+                raise _malformed()
+            rejected[row].append(Rejection(reason, n_rejected))
+        return np.frombuffer(message[1], type_, head.n), rejected, head.sample_type
 
 
 class _BlocksHead(BaseModel):
     n: NonNegativeInt
     rejected: list[Rejected]
     sample_type: SampleType | None = None
-
-
-def _blocks_head(message: Message) -> _BlocksHead:
-    try:
-        return _BlocksHead.model_validate(message[0])
-    except ValidationError as error:
-        raise _malformed() from error
 
 
 FRAME = np.dtype(

@@ -4,9 +4,10 @@ import hashlib
 import stat
 from collections.abc import Generator, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock, cells_of
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import (
     BLOCKS,
@@ -17,13 +18,15 @@ from acquisition.recordings.manifest import (
 )
 from acquisition.recordings.messages import BlockHead, BlockLayout, Message
 from acquisition.recordings.reading import confined_messages
+from core.samples.blocks import SampleBlock
 
 
 @dataclass(frozen=True)
 class Recording:
     """A recording whose files are those of its manifest; see :func:`open_recording`.
 
-    The Parquet files are read in the confined child process.
+    The Parquet files are read in the confined child process. All methods raise ConfigError if a
+    file cannot be read any more.
     """
 
     folder: Path
@@ -32,64 +35,29 @@ class Recording:
     def raw_blocks(
         self, first_block: int = 0, stop_block: int | None = None
     ) -> Generator[RawBlock]:
-        """Blocks from one up to before another, as they were written; memory for one row group.
+        """Blocks from one up to before another, as they were written; memory for one row group."""
+        for run in self.runs(first_block, stop_block):
+            yield from cells_of(run)
 
-        Raises
-        ------
-        ConfigError
-            If a file cannot be read any more.
-        """
+    def runs(self, first_block: int = 0, stop_block: int | None = None) -> Generator[SampleBlock]:
+        """The same, those that follow each other as one."""
         stop_block = self.manifest.n_blocks if stop_block is None else stop_block
         for message in self._messages(first_block, stop_block, with_samples=True):
-            for head, counts in self._layout.blocks(message):
-                yield head.raw(self.manifest.rate_hz, counts)
+            yield from self._layout.runs(message)
 
     def heads(self) -> Iterator[BlockHead]:
-        """All blocks without their samples.
-
-        Raises
-        ------
-        ConfigError
-            If the file cannot be read any more.
-        """
+        """All blocks without their samples."""
         for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
-            yield from self._layout.heads(message)[0]
+            yield from self._layout.heads(message)
 
-    def require_lengths(self) -> None:
-        """Go through the blocks without their samples: each must be possible, all must add up.
-
-        Raises
-        ------
-        ConfigError
-            If not.
-        """
-        path = self.folder / BLOCKS
-        n_samples, progress = 0, Progress()
-        for number, head in enumerate(self.heads()):
-            progress = self._past(progress, head, f"{path}: block {number}")
-            n_samples += head.n_samples
-        if n_samples != self.manifest.n_samples:
-            raise ConfigError(
-                f"{path}: {n_samples} samples in all, the manifest says {self.manifest.n_samples}"
-            )
-
-    @property
+    @cached_property
     def _layout(self) -> BlockLayout:
-        found = self.manifest
-        return BlockLayout(len(found.channels), len(found.slow_channels), (found.sample_type,))
+        return BlockLayout(self.manifest.calibration, (self.manifest.sample_type,))
 
     def _messages(self, first: int, stop: int, *, with_samples: bool) -> Iterator[Message]:
         request = {"first": first, "stop": stop, "samples": with_samples}
         manifest = {"manifest": self.manifest.model_dump(mode="json")}
         return confined_messages(self.folder, "recording", "blocks", request | manifest)
-
-    def _past(self, progress: Progress, head: BlockHead, place: str) -> Progress:
-        if len(head.ok) > len(self.manifest.channels):
-            raise ConfigError(f"{place}: OK bits of more than the recorded channels")
-        try:
-            return progress.after(head.epoch, head.first_index, head.n_samples, head.rejected)
-        except ConfigError as error:
-            raise ConfigError(f"{place}: {error}") from error
 
 
 def open_recording(folder: Path) -> Recording:
@@ -104,7 +72,7 @@ def open_recording(folder: Path) -> Recording:
     for name, expected in manifest.files.items():
         _require_file(folder / name, expected)
     recording = Recording(folder, manifest)
-    recording.require_lengths()
+    _require_lengths(recording)
     return recording
 
 
@@ -122,4 +90,22 @@ def _require_file(path: Path, expected: RecordedFile) -> None:
     if found != expected.sha256:
         raise ConfigError(
             f"{path}: damaged: checksum {found[:12]}…, the manifest says {expected.sha256[:12]}…"
+        )
+
+
+def _require_lengths(recording: Recording) -> None:
+    """Go through the blocks without their samples: each must be possible, all must add up."""
+    path, manifest = recording.folder / BLOCKS, recording.manifest
+    n_samples, progress = 0, Progress()
+    for number, head in enumerate(recording.heads()):
+        try:
+            if len(head.ok) > len(manifest.channels):
+                raise ConfigError("OK bits of more than the recorded channels")
+            progress = progress.after(head.epoch, head.first_index, head.n_samples, head.rejected)
+        except ConfigError as error:
+            raise ConfigError(f"{path}: block {number}: {error}") from error
+        n_samples += head.n_samples
+    if n_samples != manifest.n_samples:
+        raise ConfigError(
+            f"{path}: {n_samples} samples in all, the manifest says {manifest.n_samples}"
         )

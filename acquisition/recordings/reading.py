@@ -1,20 +1,20 @@
-"""Foreign files read in a confined child process, as the process sees it that asks for them."""
+"""The parent's end: blocks and frames of files that the confined child reads."""
 
 import atexit
 import errno
 import json
+import math
 import os
-import select
 import signal
 import stat
 from collections import deque
 from collections.abc import Generator, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from pydantic import TypeAdapter
-
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock, cells_of
 from acquisition.errors import ConfigError
 from acquisition.recordings.confined import ConfinedProcess, printable
 from acquisition.recordings.imports.job import ImportJob
@@ -27,16 +27,11 @@ from acquisition.recordings.messages import (
     frames_of,
     receive,
 )
+from core.samples.calibration import UNLIMITED, SlowCalibration, UnitCalibration
 
 SILENCE_S = 300.0
 """Longest time without a message before the child is taken for hung."""
 
-_CHUNK_BYTES = 2**20
-_ENVIRONMENT = {
-    "ARROW_DEFAULT_MEMORY_POOL": "system",  # others reserve address space, which is limited
-    "HDF5_PLUGIN_PRELOAD": "::",  # no filters from libraries that a file names
-    "OPENBLAS_NUM_THREADS": "1",  # each thread takes address space
-}
 _SIGNALS_OF_FAULTS = {
     signal.SIGABRT,
     signal.SIGBUS,
@@ -73,27 +68,26 @@ def confined_messages(
         process = _idle_or_new()
     except OSError as error:
         raise ConfigError(f"{path}: no process to read it: {error.strerror}") from error
-    pipe, has_ended, refusal = _Pipe(process), False, None
+    has_ended, refusal = False, None
     try:
-        pipe.ask({"path": str(path.absolute()), "format": format_} | dict(request))
-        while True:
-            message = receive(pipe.read)
+        question = {"path": str(path.absolute()), "format": format_} | dict(request)
+        process.input.write(json.dumps(question).encode() + b"\n")
+        process.input.flush()
+        while not has_ended:
+            message = receive(process.output)
             found = message[0].get("kind")
-            has_ended = found == "end"
-            if has_ended and refusal is not None:
-                raise refusal
-            if has_ended:
-                return
             if found == "error":
                 refusal = _refusal(message[0])
             elif found == kind:
                 yield message
-            else:
+            elif found != "end":
                 raise ConfigError(f"{path}: an answer out of turn from the reading process")
-    except EOFError as error:
-        reason, cause = pipe.why_broken()
-        words = f"{path}: not readable as {format_}: {reason}"
-        raise ConfigError(words) from cause or error
+            has_ended = found == "end"
+        if refusal is not None:
+            raise refusal
+    except (EOFError, OSError) as error:
+        reason, cause = _why_broken(process, error)
+        raise ConfigError(f"{path}: not readable as {format_}: {reason}") from cause or EOFError()
     finally:
         if has_ended and len(_idle) < _MAX_IDLE:
             _idle.append(process)
@@ -101,52 +95,24 @@ def confined_messages(
             process.close()
 
 
-class _Pipe:
-    """The pipes to and from a child."""
-
-    def __init__(self, process: ConfinedProcess) -> None:
-        self._process, self._out = process, process.output.fileno()
-        self._readable = select.poll()  # not select(), which stops at 1024 open files
-        self._readable.register(self._out, select.POLLIN)
-        self._held = bytearray()
-        self._is_silent = False
-
-    def ask(self, request: Mapping[str, Any]) -> None:
-        """Write a request."""
-        try:
-            self._process.input.write(json.dumps(request).encode() + b"\n")
-            self._process.input.flush()
-        except BrokenPipeError:
-            return  # the log of the child has the reason
-
-    def read(self, n_bytes: int) -> bytes:
-        """Exactly this many bytes; raises EOFError if the child ends or falls silent before."""
-        while len(self._held) < n_bytes:
-            self._is_silent = not self._readable.poll(SILENCE_S * 1000)
-            more = b"" if self._is_silent else os.read(self._out, _CHUNK_BYTES)
-            if not more:
-                raise EOFError
-            self._held += more
-        found = bytes(self._held[:n_bytes])
-        del self._held[:n_bytes]
-        return found
-
-    def why_broken(self) -> tuple[str, OSError | None]:
-        """Why there is no more to read, and the cause if it is not the file."""
-        if self._is_silent:
-            words = f"no answer for {SILENCE_S:g} s"
-            return words, TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
-        words, code = self._process.last_words(), self._process.exit_code()
-        if code == FAILED or -code in _SIGNALS_OF_FAULTS:
-            return words, None
-        return words, InterruptedError(errno.EINTR, os.strerror(errno.EINTR))
+def _why_broken(process: ConfinedProcess, error: Exception) -> tuple[str, OSError | None]:
+    """Why a child answers no more, and the error of the system if it is not the file's fault."""
+    if isinstance(error, TimeoutError):
+        return f"no answer for {SILENCE_S:g} s", _system_error(errno.ETIMEDOUT)
+    words, code = process.last_words(), process.exit_code()
+    is_of_file = code == FAILED or -code in _SIGNALS_OF_FAULTS
+    return words, None if is_of_file else _system_error(errno.EINTR)
 
 
 def _refusal(head: Mapping[str, Any]) -> ConfigError:
     words, number = str(head.get("message")), head.get("errno")
     error = ConfigError(printable(" ".join(words.split()), 1000))
-    error.__cause__ = OSError(number, os.strerror(number)) if isinstance(number, int) else None
+    error.__cause__ = _system_error(number) if isinstance(number, int) else None
     return error
+
+
+def _system_error(number: int) -> OSError:
+    return OSError(number, os.strerror(number))
 
 
 def _idle_or_new() -> ConfinedProcess:
@@ -162,12 +128,14 @@ def _idle_or_new() -> ConfinedProcess:
 
 
 def _started() -> ConfinedProcess:
-    process = ConfinedProcess("acquisition.recordings.child", environment=_ENVIRONMENT)
-    if not process.output.read(len(READY)):
+    module, words = "acquisition.recordings.child", f"no answer for {SILENCE_S:g} s"
+    process = ConfinedProcess(module, silence_s=SILENCE_S)
+    with suppress(TimeoutError):
+        if process.output.read(len(READY)):
+            return process
         words = process.last_words()
-        process.close()
-        raise OSError(errno.ENOEXEC, words)
-    return process
+    process.close()
+    raise OSError(errno.ENOEXEC, words)
 
 
 def close_idle_children() -> None:
@@ -187,10 +155,13 @@ def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[RawBlock, flo
     ConfigError
         If there is no such file, or the job does not describe it; one sentence with its path.
     """
-    layout = BlockLayout(len(job.channels), len(job.slow))
+    slow = tuple(SlowCalibration(column.id, -math.inf, math.inf) for column in job.slow)
+    layout = BlockLayout(
+        UnitCalibration("", job.rate_hz, (UNLIMITED,) * len(job.channels), slow, job.block_samples)
+    )
     for message in _imported(path, job, "blocks"):
-        for head, counts in layout.blocks(message):
-            yield head.raw(job.rate_hz, counts), _done(message)
+        for run in layout.runs(message):
+            yield from ((raw, _done(message)) for raw in cells_of(run))
 
 
 def imported_frames(path: Path, job: ImportJob) -> Generator[tuple[Frames, float]]:
@@ -205,8 +176,7 @@ def _imported(path: Path, job: ImportJob, kind: str) -> Iterator[Message]:
             raise ConfigError(f"{path}: not a regular file")
     except OSError as error:
         raise ConfigError(f"{path}: {error.strerror}") from error
-    request = {"job": TypeAdapter(ImportJob).dump_python(job, mode="json")}
-    yield from confined_messages(path, job.format, kind, request)
+    yield from confined_messages(path, job.format, kind, {"job": asdict(job)})
 
 
 def _done(message: Message) -> float:

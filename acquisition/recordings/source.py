@@ -1,17 +1,20 @@
 """`RecordingSource`: a recording, or some of its channels, as a source that comes to an end."""
 
-from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Mapping
+import itertools
+from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Iterator, Mapping
 from contextlib import aclosing, asynccontextmanager, closing
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from acquisition.clock import Clock
-from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.blocks import MIN_BLOCK_S, BlockAssembler
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import Progress, RecordedUnit
 from acquisition.recordings.reader import Recording
 from core.machine.unit import Unit
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import UnitCalibration
 
 
 @dataclass(frozen=True)
@@ -28,16 +31,15 @@ class Selection:
     slow: tuple[int, ...]
     calibration: UnitCalibration
 
-    def of(self, raw: RawBlock) -> RawBlock:
-        """The selected part of a recorded block."""
-        if self.channels == tuple(range(len(raw.ok))) and self.slow == tuple(range(len(raw.slow))):
-            return raw
-        return replace(
-            raw,
-            counts=raw.counts[list(self.channels)],
-            ok=tuple(raw.ok[n] for n in self.channels),
-            slow=tuple(raw.slow[n] for n in self.slow),
-        )
+    def of(self, block: SampleBlock) -> SampleBlock:
+        """The selected part of recorded blocks that follow each other."""
+        side, rows = block.side, list(self.channels)
+        if rows == list(range(len(block.counts))):
+            counts, is_ok = block.counts, side.ok
+        else:
+            counts, is_ok = block.counts[rows], side.ok[rows]
+        selected = replace(side, ok=is_ok, slow=side.slow[list(self.slow)])
+        return replace(block, calibration=self.calibration, counts=counts, side=selected)
 
 
 def all_of(recorded: RecordedUnit) -> Selection:
@@ -117,6 +119,8 @@ class RecordingSource:
         Which channels, and how to read them; all as recorded if not given.
     speed
         Seconds of the recording in a second, or None for unpaced.
+    block_s
+        Length of the blocks, where nothing is missing in between.
 
     Raises
     ------
@@ -130,6 +134,7 @@ class RecordingSource:
         clock: Clock,
         selection: Selection | None = None,
         speed: float | None = None,
+        block_s: float = MIN_BLOCK_S,
     ) -> None:
         if speed is not None and not speed > 0.0:
             raise ValueError(f"a recording runs at a positive speed, not {speed}")
@@ -138,6 +143,7 @@ class RecordingSource:
         self._selection = selection or all_of(recording.manifest)
         self._delivery = BlockAssembler(self._selection.calibration)
         self._speed = speed
+        self._block_samples = max(1, round(block_s * recording.manifest.rate_hz))
         self._start_s: float | None = None
         self._next_block = 0
         self._progress = Progress()
@@ -157,20 +163,28 @@ class RecordingSource:
             yield blocks
 
     async def _blocks(self, missed_s: float) -> AsyncGenerator[SampleBlock]:
-        with closing(self._recording.raw_blocks(self._next_block)) as raw_blocks:
-            for raw in raw_blocks:
+        with closing(self._recording.runs(self._next_block)) as runs:
+            for piece in (piece for run in runs for piece in self._pieces(run)):
                 after = self._progress.after(
-                    raw.epoch, raw.first_index, raw.counts.shape[1], raw.rejected
+                    piece.epoch, piece.first_index, piece.n_samples, piece.rejected
                 )
-                due_s = after.n_passed / raw.rate_hz / self._speed if self._speed else 0.0
+                due_s = after.n_passed / piece.rate_hz / self._speed if self._speed else 0.0
                 missed = 0.0 < due_s <= missed_s
                 await self._clock.sleep(0.0 if missed else max(0.0, due_s - self._elapsed_s()))
-                self._progress, self._next_block = after, self._next_block + 1
+                self._progress, self._next_block = after, self._next_block + piece.side.n_cells
                 if not missed:
-                    for block in self._delivery.take(self._selection.of(raw)):
+                    for block in self._delivery.take_block(self._selection.of(piece)):
                         yield block
             for block in self._delivery.flush():
                 yield block
+
+    def _pieces(self, run: SampleBlock) -> Iterator[SampleBlock]:
+        """Whole recorded blocks of the same stretch of samples, as one."""
+        starts = run.side.starts
+        stretch = (run.first_index + starts) // self._block_samples
+        cuts = starts[1:][np.diff(stretch) > 0].tolist()
+        for start, stop in itertools.pairwise([0, *cuts, run.n_samples]):
+            yield run.from_sample(start, stop)
 
     def _elapsed_s(self) -> float:
         return self._clock.monotonic_s() - (self._start_s or 0.0)

@@ -1,7 +1,8 @@
 """Blocks as Parquet tables and back."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import MAX_REASON_LENGTH, RecordedUnit
 from acquisition.recordings.messages import HEAD_NUMBERS, Rejected, head_type
@@ -24,34 +25,27 @@ _ENCODINGS = {"int16": "DELTA_BINARY_PACKED", "float32": "BYTE_STREAM_SPLIT"}
 """Differences of counts need few bits; floats that follow each other share their high bytes."""
 
 _HEADS_AT_ONCE = 256
-_REJECTION = pa.struct(
-    [
-        pa.field("reason", pa.string(), nullable=False),
-        pa.field("n_samples", pa.int64(), nullable=False),
-    ]
-)
 _REJECTED_COUNT = "rejected.list.element.n_samples"
-_REJECTED = pa.list_(pa.field("element", _REJECTION, nullable=False))
+
+
+def _required(types: Mapping[str, Any]) -> list[Any]:
+    return [pa.field(name, type_, nullable=False) for name, type_ in types.items()]
 
 
 def samples_schema(unit: RecordedUnit) -> Any:
     """Counts or engineering units, a column for each waveform channel."""
     type_ = _SAMPLE_TYPES[unit.sample_type]
-    return pa.schema([pa.field(c.id, type_, nullable=False) for c in unit.channels])
+    return pa.schema(_required({c.id: type_ for c in unit.channels}))
 
 
 def blocks_schema(unit: RecordedUnit) -> Any:
     """All of the blocks but their counts; ``ok`` has a bit for each channel, channel 0 lowest."""
-    columns = [
-        ("epoch", pa.int64()),
-        ("first_index", pa.int64()),
-        ("start_ns", pa.int64()),
-        ("n_samples", pa.int32()),
-        ("ok", pa.uint32()),
-        *((f"slow:{c.id}", pa.float64()) for c in unit.slow_channels),
-        ("rejected", _REJECTED),
-    ]
-    return pa.schema([pa.field(name, type_, nullable=False) for name, type_ in columns])
+    rejection = pa.struct(_required({"reason": pa.string(), "n_samples": pa.int64()}))
+    types = dict.fromkeys(("epoch", "first_index", "start_ns"), pa.int64())
+    types |= {"n_samples": pa.int32(), "ok": pa.uint32()}
+    types |= {f"slow:{c.id}": pa.float64() for c in unit.slow_channels}
+    types |= {"rejected": pa.list_(*_required({"element": rejection}))}
+    return pa.schema(_required(types))
 
 
 def samples_table(counts: RawArray, unit: RecordedUnit) -> Any:
@@ -61,48 +55,40 @@ def samples_table(counts: RawArray, unit: RecordedUnit) -> Any:
 
 def blocks_table(blocks: Sequence[RawBlock], unit: RecordedUnit) -> Any:
     """Blocks without their counts as a table."""
-    slow = [pa.array([b.slow[i] for b in blocks]) for i in range(len(unit.slow_channels))]
-    rejected = [
-        [{"reason": r.reason, "n_samples": r.n_samples} for r in b.rejected] for b in blocks
-    ]
     columns = [
         [b.epoch for b in blocks],
         [b.first_index for b in blocks],
         [b.start_ns for b in blocks],
-        [b.counts.shape[1] for b in blocks],
+        [b.n_samples for b in blocks],
         [sum(ok << i for i, ok in enumerate(b.ok)) for b in blocks],
-        *slow,
-        rejected,
+        *([b.slow[i] for b in blocks] for i in range(len(unit.slow_channels))),
+        [[asdict(rejection) for rejection in b.rejected] for b in blocks],
     ]
     return pa.table(columns, schema=blocks_schema(unit))
 
 
 def samples_writer(path: Path, unit: RecordedUnit) -> Any:
     """Packed by differences, then zstd: 6 bits a count; int16 alone packs to 11."""
-    schema = samples_schema(unit)
-    return pq.ParquetWriter(
-        path,
-        schema,
-        compression="zstd",
-        compression_level=ZSTD_LEVEL,
-        use_dictionary=False,
-        write_statistics=False,
-        store_schema=False,
-        column_encoding=dict.fromkeys(schema.names, _ENCODINGS[unit.sample_type]),
-    )
+    schema, encoding = samples_schema(unit), _ENCODINGS[unit.sample_type]
+    encodings = dict.fromkeys(schema.names, encoding)
+    return _writer(path, schema, use_dictionary=False, column_encoding=encodings)
 
 
 def blocks_writer(path: Path, unit: RecordedUnit) -> Any:
     """Dictionaries and zstd, for rows that are few and repetitive; texts have no dictionary."""
     schema = blocks_schema(unit)
+    return _writer(path, schema, use_dictionary=[*schema.names, _REJECTED_COUNT])
+
+
+def _writer(path: Path, schema: Any, **options: Any) -> Any:
     return pq.ParquetWriter(
         path,
         schema,
         compression="zstd",
         compression_level=ZSTD_LEVEL,
-        use_dictionary=[*schema.names, _REJECTED_COUNT],
         write_statistics=False,
         store_schema=False,
+        **options,
     )
 
 

@@ -2,16 +2,16 @@
 
 import hashlib
 import os
+from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.blocks import RawBlock, cells_of
 from acquisition.errors import ConfigError
-from acquisition.recordings.inversion import raw_of
 from acquisition.recordings.manifest import (
     BLOCKS,
     BLOCKS_PER_GROUP,
@@ -27,7 +27,6 @@ from acquisition.recordings.manifest import (
     RecordedUnit,
     SampleType,
     manifest_text,
-    start_text,
 )
 from acquisition.recordings.tables import (
     blocks_table,
@@ -38,6 +37,7 @@ from acquisition.recordings.tables import (
 )
 from core.arrays import RawArray
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import UnitCalibration
 
 INCOMPLETE = ".incomplete"
 """Suffix of the name of a folder that is being written."""
@@ -55,8 +55,7 @@ class RecordingWriter:
     made_by
         Program and person, for the manifest.
     first_decides
-        Whether the first block decides on the sample type, instead of the unit: counts if it is
-        exactly counts, else engineering units.
+        Whether the first block decides on the sample type, instead of the unit.
 
     Raises
     ------
@@ -95,12 +94,7 @@ class RecordingWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is not None:
             self.abandon()
             return
@@ -146,18 +140,19 @@ class RecordingWriter:
             if len(self._blocks) >= BLOCKS_PER_GROUP:
                 self._write_blocks()
 
-    def write_calibrated(self, block: SampleBlock) -> None:
-        """Append a block of a source.
+    def write_block(self, block: SampleBlock) -> None:
+        """Append a block of a source, cell by cell.
+
+        A slow value that another device measures is recorded as far as there is one.
 
         Raises
         ------
         ConfigError
-            As :meth:`write`, and if the block is not exactly samples of the recorded type with this
-            calibration.
+            As :meth:`write`, and if the block is of another unit or has another calibration.
         """
-        if self._first_decides:
-            self._decide(_type_behind(block, self._calibration))
-        self.write(raw_of(block, self._calibration, np.dtype(self.unit.sample_type)))
+        _require_calibration(block, self._calibration)
+        for raw in _cells(block, self._calibration):
+            self.write(raw)
 
     def finish(self) -> Manifest:
         """Sync all files and rename the recording.
@@ -191,11 +186,8 @@ class RecordingWriter:
         ConfigError
             If the disk refuses.
         """
-        with (
-            suppress(ConfigError),
-            foreign_errors_of(self._aside),
-        ):  # a full disk may refuse the footer
-            self._close()
+        with suppress(ConfigError), foreign_errors_of(self._aside):
+            self._close()  # writes the footer, which a full disk may refuse
         with foreign_errors_of(self._aside):
             for name in (SAMPLES, BLOCKS, MANIFEST):
                 (self._aside / name).unlink(missing_ok=True)
@@ -231,13 +223,10 @@ class RecordingWriter:
             format=FORMAT,
             version=VERSION,
             made_by=self._made_by,
-            start=start_text(self._start_ns),
+            start=f"{np.datetime64(self._start_ns, 'ns')}Z",
             n_blocks=self.n_blocks,
             n_samples=self.n_samples,
-            files={
-                SAMPLES: _recorded_file(self._aside / SAMPLES),
-                BLOCKS: _recorded_file(self._aside / BLOCKS),
-            },
+            files={name: _recorded_file(self._aside / name) for name in (SAMPLES, BLOCKS)},
         )
 
 
@@ -253,23 +242,39 @@ def _type_of(raw: RawBlock) -> SampleType:
     return "int16" if raw.counts.dtype == np.int16 else "float32"
 
 
-def _type_behind(block: SampleBlock, calibration: UnitCalibration) -> SampleType:
-    try:
-        return _type_of(raw_of(block, calibration))
-    except ConfigError:
-        return "float32"
+def _require_calibration(block: SampleBlock, calibration: UnitCalibration) -> None:
+    own = block.calibration
+    known = {channel.id: channel for channel in calibration.slow}
+    if (own.unit, own.channels) != (calibration.unit, calibration.channels) or any(
+        known.get(channel.id) != channel for channel in own.slow
+    ):
+        raise ConfigError(
+            f"the samples of unit {own.unit!r} from index {block.first_index} on are not those"
+            " with the calibration they are to be recorded with"
+        )
+
+
+def _cells(block: SampleBlock, calibration: UnitCalibration) -> Iterator[RawBlock]:
+    """Parts of a block with one set of values beside the samples, slow values as recorded."""
+    side, ids = block.side, block.calibration.slow_ids
+    slow = np.full((len(calibration.slow), side.n_cells), np.nan)
+    for row, channel in enumerate(calibration.slow):
+        if channel.id in block.elsewhere:
+            value = block.elsewhere[channel.id].value
+            slow[row] = np.nan if value is None else value
+        elif channel.id in ids:
+            slow[row] = side.slow[ids.index(channel.id)]
+    for raw, recorded in zip(cells_of(block), slow.T.tolist(), strict=True):
+        yield replace(raw, slow=tuple(recorded))
 
 
 def _require_fit(raw: RawBlock, unit: RecordedUnit) -> None:
-    shape = (len(unit.channels), len(unit.channels), len(unit.slow_channels))
-    if (
-        len(raw.counts),
-        len(raw.ok),
-        len(raw.slow),
-    ) != shape or raw.counts.dtype != unit.sample_type:
+    n_channels, n_slow = len(unit.channels), len(unit.slow_channels)
+    found = (len(raw.counts), len(raw.ok), len(raw.slow), raw.counts.dtype.name)
+    if found != (n_channels, n_channels, n_slow, unit.sample_type):
         raise ConfigError(
             f"a block of {len(raw.counts)} channels and {len(raw.slow)} slow values as"
-            f" {raw.counts.dtype}, to be recorded are {shape[0]} and {shape[2]} as"
+            f" {raw.counts.dtype}, to be recorded are {n_channels} and {n_slow} as"
             f" {unit.sample_type}"
         )
     if raw.rate_hz != unit.rate_hz:

@@ -1,14 +1,15 @@
 """Samples without a wire: feeds, a feed as a source, a feed cut into slots, and the ledger."""
 
+import math
 from collections import Counter
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager
 from typing import Protocol
 
 from acquisition.clock import Clock
-from acquisition.delivery.blocks import BlockAssembler, BlockGrid
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.blocks import MIN_BLOCK_S, BlockAssembler, RawBlock
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import UnitCalibration
 
 
 class FeedEndedError(Exception):
@@ -57,7 +58,6 @@ class SlotFeed:
     def __init__(self, feed: SampleFeed, samples_per_slot: int) -> None:
         self._feed = feed
         self._samples_per_slot = samples_per_slot
-        self._grid = BlockGrid(samples_per_slot)
         self._ahead: RawBlock | None = None
 
     def peek(self) -> RawBlock | None:
@@ -80,11 +80,11 @@ class SlotFeed:
         return slot.first_index // self._samples_per_slot
 
     def _next(self) -> RawBlock:
-        """Return the next whole slot; a piece of the feed completes at most one."""
+        """Return the next whole slot; a feed ends its pieces at multiples of their length."""
         while True:
-            for block in self._grid.put(self._feed.advance(self._samples_per_slot)):
-                if block.n_samples == self._samples_per_slot:
-                    return block
+            piece = self._feed.advance(self._samples_per_slot)
+            if piece.n_samples == self._samples_per_slot:
+                return piece
 
 
 SKIP_SAMPLES = 65536
@@ -109,6 +109,7 @@ class SimulatedSource:
         self._feed = feed
         self._rate_hz = calibration.rate_hz
         self._block_samples = calibration.block_samples
+        self._n_at_once = math.ceil(MIN_BLOCK_S * calibration.rate_hz / calibration.block_samples)
         self._delivery = BlockAssembler(calibration)
         self._clock = clock
         self._paced = paced
@@ -127,11 +128,11 @@ class SimulatedSource:
 
     async def _blocks(self) -> AsyncGenerator[SampleBlock]:
         while True:
-            raw = self._feed.advance(self._block_samples)
-            self._n_taken += self._block_samples
+            raws = [self._feed.advance(self._block_samples) for _ in range(self._n_at_once)]
+            self._n_taken += self._n_at_once * self._block_samples
             due_s = self._n_taken / self._rate_hz if self._paced else 0.0
             await self._clock.sleep(max(0.0, due_s - self._elapsed_s()))
-            for block in self._delivery.take(raw):
+            for block in self._delivery.take_together(raws):
                 yield block
 
     async def _skip_to(self, index: int) -> None:

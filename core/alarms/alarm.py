@@ -216,20 +216,10 @@ class AlarmEvent:
 
 @dataclass(frozen=True)
 class AlarmNews:
-    """An alarm with its newest events.
-
-    Parameters
-    ----------
-    peer
-        Network address of the client that asked for them, if known.
-    command
-        Id of the command that asked for them; it is answered by being stored with them.
-    """
+    """An alarm with its newest events."""
 
     alarm: Alarm
     events: Sequence[AlarmEvent]
-    peer: str | None = None
-    command: str | None = None
 
 
 def changed(

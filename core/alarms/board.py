@@ -37,20 +37,6 @@ class AlarmMemory:
     is_connected: bool
     link_reason: str | None
 
-    def link_by(self, alarm: Alarm) -> tuple[bool, str | None]:
-        """Whether samples arrive, and why not.
-
-        Parameters
-        ----------
-        alarm
-            Alarm about the link after its newest event. If it was raised or returned since this
-            state was kept, it counts more: a link that was lost stays lost until samples arrive.
-        """
-        kept = next((a for a in self.alarms if a.identity == alarm.identity), Alarm(alarm.identity))
-        if is_same_occurrence(kept, alarm):
-            return self.is_connected, self.link_reason
-        return (True, None) if alarm.level is None else (False, alarm.condition.reason)
-
 
 def is_same_occurrence(one: Alarm, other: Alarm) -> bool:
     """Whether an alarm has neither been raised nor returned between two moments."""
@@ -69,7 +55,7 @@ class AlarmBoard:
         The alarms, each inactive at first.
     """
 
-    def __init__(self, watched: Iterable[Watch]) -> None:
+    def __init__(self, watched: Iterable[Watch] = ()) -> None:
         watches = list(watched)
         self._rules = {watch.id: watch.rule for watch in watches}
         self._alarms = {watch.id: Alarm(watch.identity) for watch in watches}
@@ -97,24 +83,24 @@ class AlarmBoard:
         """Update an alarm, also with the value of a condition within limits."""
         self._note(id_, *update(self._alarms[id_], condition, now_ns, self._rules[id_]))
 
-    def interrupt(self) -> None:
-        """Stop delays where samples are missing, except that of a lost link."""
+    def pause(self, spared: str | None = None) -> None:
+        """Stop all delays up to now, except those of one kind of alarm.
+
+        The clock was set and does not show how much time passed, or samples are missing.
+        """
         self._alarms = {
-            id_: alarm if alarm.identity.kind == LINK_LOST else interrupted(alarm)
+            id_: alarm if alarm.identity.kind == spared else interrupted(alarm)
             for id_, alarm in self._alarms.items()
         }
 
-    def pause(self) -> None:
-        """Stop all delays up to now: the clock was set and does not show how much time passed."""
-        self._alarms = {id_: interrupted(alarm) for id_, alarm in self._alarms.items()}
-
-    def expire(self, host_ns: int) -> None:
+    def tick(self, host_ns: int) -> list[AlarmNews]:
         """End the shelving of alarms whose time is up."""
         for id_, alarm in self._alarms.items():
             if alarm.shelf is not None:
                 self._note(id_, *expire(alarm, host_ns))
+        return self.drain_news()
 
-    def operate(self, id_: str, action: Action, host_ns: int) -> None:
+    def operate(self, id_: str, action: Action, host_ns: int) -> list[AlarmNews]:
         """Apply an action of a person.
 
         Raises
@@ -125,8 +111,11 @@ class AlarmBoard:
             If the action does not fit the state of the alarm.
         """
         self._note(id_, *operate(self._alarms[id_], action, host_ns))
+        return self.drain_news()
 
-    def restore(self, stored: Iterable[Alarm], host_ns: int, kept: Iterable[Alarm] = ()) -> None:
+    def restore(
+        self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
+    ) -> list[AlarmNews]:
         """Continue after a restart: active alarms stay active, their conditions are unknown.
 
         An alarm without a rule returns to normal, and stays on the list until acknowledged.
@@ -135,11 +124,12 @@ class AlarmBoard:
         ----------
         stored
             Alarms after their newest events.
-        kept
-            Alarms of which every sample since is known: condition and delays continue. Their
-            stored form may be newer, by actions of people or, without samples, by the link.
-            Alarms without a rule are left out.
+        memory
+            State at the last block, if no sample is missing since: condition and delays of its
+            alarms continue. Their stored form may be newer, by actions of people or, without
+            samples, by the link. Alarms without a rule are left out.
         """
+        kept = memory.alarms if memory else ()
         remembered = {a.identity.id: a for a in kept if a.identity.id in self._rules}
         newest = {alarm.identity.id: alarm for alarm in stored}
         for id_, alarm in newest.items():
@@ -155,6 +145,7 @@ class AlarmBoard:
                 self.record(id_, Judgement(reason=NO_LONGER_WATCHED), host_ns)
         for id_, alarm in remembered.items():
             self._alarms[id_] = _merged(alarm, newest.get(id_, alarm))
+        return self.drain_news()
 
     def drain_news(self) -> list[AlarmNews]:
         """Return and forget the news since the last call."""

@@ -1,21 +1,28 @@
-"""Judgements: what channels, 1× vectors, the device's clock and the link say about their alarms."""
+"""Judgements of channels, of 1× vectors, and of the device's clock."""
 
 import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from core.alarms.kinds import Watch
 from core.checks.sensor_checks import MAX_CLIPPED_SHARE
+from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
-from core.limits import WITHIN, AlarmLevel, Judgement, Limits, judge, unknown
+from core.limits import WITHIN, AlarmLevel, Judgement, unknown
 from core.quality import NOT_MEASURED, Level, Quality, Reading, Reason, missing, worst
-from core.samples.blocks import DeviceClock, StampFault
+from core.samples.blocks import DeviceClock
 
 COVERAGE = 1.96
 """Standard uncertainties on each side of a value that hold the truth with 95 %."""
 
 SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK, Reason.CLIPPED)
 """Faults of a channel that only a whole segment shows."""
+
+
+def fault_judgement(fault: str | None) -> Judgement:
+    """Alert for a fault; within limits without one."""
+    return WITHIN if fault is None else Judgement(AlarmLevel.ALERT, reason=fault)
 
 
 def channel_judgement(
@@ -33,19 +40,33 @@ def channel_judgement(
         Share of clipped samples of that segment, %.
     """
     fault = segment_fault if quality.level is Level.GOOD else quality.reason
-    if fault is None:
-        return WITHIN
-    if fault is Reason.CLIPPED and clipped_percent is not None:
-        limit = 100.0 * MAX_CLIPPED_SHARE
-        return Judgement(AlarmLevel.ALERT, value=clipped_percent, limit=limit, reason=fault)
-    return Judgement(AlarmLevel.ALERT, reason=fault)
+    found = fault_judgement(fault)
+    if fault is not Reason.CLIPPED or clipped_percent is None:
+        return found
+    return replace(found, value=clipped_percent, limit=100.0 * MAX_CLIPPED_SHARE)
 
 
-def slow_channel_judgement(reading: Reading) -> Judgement:
-    """Whether a slow channel that an alarm depends on delivers a value."""
-    if reading.value is None:
-        return Judgement(AlarmLevel.ALERT, reason=reading.quality.reason)
-    return WITHIN
+def fault_after_segment(
+    fault: Reason | None, amplitude: Reading, has_wrong_sign: bool | None
+) -> Reason | None:
+    """Fault of a channel after a segment, which may show a fault or that there is none.
+
+    Parameters
+    ----------
+    fault
+        Fault before.
+    amplitude
+        1× amplitude of the channel.
+    has_wrong_sign
+        Whether the stiffness of its direction shows a reversed transducer; None if unknown.
+    """
+    if amplitude.value is None and amplitude.quality.reason in SENSOR_FAULTS:
+        return amplitude.quality.reason
+    if amplitude.value is not None and fault in SENSOR_FAULTS:
+        fault = None
+    if has_wrong_sign is False and fault is Reason.POLARITY:
+        return None
+    return Reason.POLARITY if has_wrong_sign and fault is None else fault
 
 
 def offset_reading(clock: DeviceClock | None) -> Reading:
@@ -60,18 +81,6 @@ def drift_reading(clock: DeviceClock | None) -> Reading:
     if clock is None or clock.drift_ppm is None or clock.u_drift_ppm is None:
         return missing(Reason.WAITING_FOR_DATA)
     return Reading(max(0.0, abs(clock.drift_ppm) - COVERAGE * clock.u_drift_ppm))
-
-
-def stamp_judgement(fault: StampFault | None) -> Judgement:
-    """Whether a device's own time stamp could be used."""
-    return WITHIN if fault is None else Judgement(AlarmLevel.ALERT, reason=fault)
-
-
-def link_judgement(is_connected: bool, reason: str | None) -> Judgement:
-    """Whether samples of a unit arrive."""
-    if is_connected:
-        return WITHIN
-    return Judgement(AlarmLevel.ALERT, reason=reason or "not connected")
 
 
 CLOCK_READINGS = {"clock_offset": offset_reading, "clock_drift": drift_reading}
@@ -136,9 +145,9 @@ class VectorReference:
 
 def vector_judgement(
     readings: Mapping[str, Reading],
-    place: str,
+    watch: Watch,
     reference: VectorReference | None,
-    limits: Limits,
+    point: OperatingPoint,
     held: AlarmLevel | None,
 ) -> Judgement:
     """Judge how far a 1× vector has moved from where it was when all was well.
@@ -150,22 +159,23 @@ def vector_judgement(
 
     Parameters
     ----------
-    place
-        Whose vector: "shaft_x", "shaft_y", "bearing_x" or "bearing_y".
+    watch
+        Its source is the place: "shaft_x", "shaft_y", "bearing_x" or "bearing_y".
     held
         Level of the judgement before.
     """
+    place = watch.source
     amplitude = readings[f"order1_{place}_um_pk"]
     before = reference.vectors.get(place) if reference else None
-    if amplitude.value is None:
-        return judge(amplitude, limits, held)
-    if before is None:
-        return unknown(NO_REFERENCE)
+    if amplitude.value is None or before is None:
+        found = watch.judge(amplitude, point, held)
+        is_unknown = amplitude.value is None or found.suppressed_by is not None
+        return found if is_unknown else unknown(NO_REFERENCE)
     phase = readings[f"order1_{place}_phase_deg"]
     change = OrderVector(amplitude.value, phase.value).change_um_pk(before)
     has_phase = phase.value is not None and before.phase_deg is not None
     quality = worst((amplitude.quality, phase.quality)) if has_phase else amplitude.quality
-    found = judge(Reading(change, quality), limits, held)
+    found = watch.judge(Reading(change, quality), point, held)
     if has_phase or not found.is_known:
         return found
     if before.phase_deg is not None and (found.level or 0) < (held or 0):

@@ -1,13 +1,16 @@
 """`ALARM_KINDS`: the kinds of alarms of a unit, and the alarms that rules make of it."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
 from core.alarms.alarm import AlarmIdentity, AlarmRule
 from core.alarms.rules import BearingRules, LimitRule, UnitRules
-from core.machine.unit import Bearing, Unit
+from core.condition.cells import OperatingPoint
+from core.limits import AlarmLevel, Judgement
+from core.machine.unit import Unit
+from core.quality import Reading
 
 CHANNEL_NOT_OK, LINK_LOST = "channel_not_ok", "link_lost"
 """Kinds that are known by name beyond this table."""
@@ -34,8 +37,8 @@ class AlarmKind:
         Field of `BearingRules` or `UnitRules` that holds its rule.
     reading
         Reading of an assessment that is compared with limits; for a 1× vector, its place.
-    applies
-        Whether a bearing has what the alarm watches.
+    needs
+        Part that a bearing must have: a field of `Bearing` that is not None.
     advice
         What to do about it, for alarms about the way of samples into padwatch.
     """
@@ -46,7 +49,7 @@ class AlarmKind:
     subject: str
     rule: str
     reading: str | None = None
-    applies: Callable[[Bearing], bool] = lambda bearing: True  # noqa: ARG005
+    needs: str | None = None
     advice: str = field(default="", kw_only=True)
 
 
@@ -55,9 +58,11 @@ def kind_table(*kinds: AlarmKind) -> Mapping[str, AlarmKind]:
     return MappingProxyType({kind.name: kind for kind in kinds})
 
 
-def _on_bearing(rule: str, unit: str, *kinds: tuple[str, str, str]) -> Iterable[AlarmKind]:
-    """Kinds of one rule, by name, label and reading."""
-    return (AlarmKind(name, label, unit, BEARING, rule, found) for name, label, found in kinds)
+def _on_bearing(
+    rule: str, unit: str, *kinds: tuple[str, str] | tuple[str, str, str] | tuple[str, str, str, str]
+) -> Iterable[AlarmKind]:
+    """Kinds of one rule, by name, label, reading and what a bearing must have for it."""
+    return (AlarmKind(name, label, unit, BEARING, rule, *rest) for name, label, *rest in kinds)
 
 
 ALARM_KINDS = kind_table(
@@ -86,24 +91,8 @@ ALARM_KINDS = kind_table(
         "µm",
         ("gap_x", "Probe gap x", "gap_x_um"),
         ("gap_y", "Probe gap y", "gap_y_um"),
-    ),
-    AlarmKind(
-        "opposite_gap_x",
-        "Gap of the probe opposite x",
-        "µm",
-        BEARING,
-        "gap",
-        "opposite_gap_x_um",
-        lambda bearing: bearing.opposite_x is not None,
-    ),
-    AlarmKind(
-        "opposite_gap_y",
-        "Gap of the probe opposite y",
-        "µm",
-        BEARING,
-        "gap",
-        "opposite_gap_y_um",
-        lambda bearing: bearing.opposite_y is not None,
+        ("opposite_gap_x", "Gap of the probe opposite x", "opposite_gap_x_um", "opposite_x"),
+        ("opposite_gap_y", "Gap of the probe opposite y", "opposite_gap_y_um", "opposite_y"),
     ),
     *_on_bearing(
         "shaft_zones",
@@ -134,17 +123,17 @@ ALARM_KINDS = kind_table(
         ("order1_change_bearing_x", "Bearing 1× vector moved, x", "bearing_x"),
         ("order1_change_bearing_y", "Bearing 1× vector moved, y", "bearing_y"),
     ),
-    AlarmKind(
+    *_on_bearing(
         "oil_temperature",
-        "Oil temperature",
         "°C",
-        BEARING,
-        "oil_temperature",
-        "oil_temperature_c",
-        lambda bearing: bearing.oil_temperature is not None,
+        ("oil_temperature", "Oil temperature", "oil_temperature_c", "oil_temperature"),
     ),
-    AlarmKind("stiffness_x", "Film stiffness changed, x", "1", BEARING, "films"),
-    AlarmKind("stiffness_y", "Film stiffness changed, y", "1", BEARING, "films"),
+    *_on_bearing(
+        "films",
+        "1",
+        ("stiffness_x", "Film stiffness changed, x"),
+        ("stiffness_y", "Film stiffness changed, y"),
+    ),
     AlarmKind(
         "clock_offset",
         "Device clock off",
@@ -205,24 +194,26 @@ class Watch:
         What is judged: a channel, a reading, the place of a vector, or the subject itself.
     group
         Name of its rule, by which alarms are judged together.
+    limits
+        Limits that a value is compared with; None if it has none.
     """
 
     identity: AlarmIdentity
     rule: AlarmRule
     source: str
     group: str = ""
+    limits: LimitRule | None = None
 
     @cached_property
     def id(self) -> str:
         """Id of the alarm."""
         return self.identity.id
 
-
-@dataclass(frozen=True)
-class LimitWatch(Watch):
-    """An alarm that compares a value with limits."""
-
-    limits: LimitRule = field(kw_only=True)
+    def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
+        """Compare a reading with the limits. Raises `TypeError` if the alarm has none."""
+        if self.limits is None:
+            raise TypeError(f"{self.id} has no limits")
+        return self.limits.judge(reading, point, held)
 
 
 def watch(
@@ -230,7 +221,7 @@ def watch(
 ) -> Watch:
     """The alarm that a rule makes."""
     if isinstance(rule, LimitRule):
-        return LimitWatch(identity, rule.rule, source, group, limits=rule)
+        return Watch(identity, rule.rule, source, group, rule)
     return Watch(identity, rule, source, group)
 
 
@@ -253,7 +244,8 @@ def watches_of(unit: Unit, rules: UnitRules) -> list[Watch]:
     for bearing, own in of_bearings:
         slow = {OIL_TEMPERATURE: bearing.oil_temperature}
         for kind in ALARM_KINDS.values():
-            if kind.subject == BEARING and kind.applies(bearing):
+            is_there = kind.needs is None or getattr(bearing, kind.needs) is not None
+            if kind.subject == BEARING and is_there:
                 source = slow.get(kind.rule) or kind.reading or bearing.id
                 add(kind, bearing.id, source, kind.rule, own if hasattr(own, kind.rule) else rules)
     for kind in ALARM_KINDS.values():

@@ -1,6 +1,6 @@
 """Rules of alarms: limits by operating condition, delays, and what is watched on a unit."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 
@@ -126,19 +126,17 @@ class LimitRule:
         return (*possible, self.limits) if counts and self.limits is not None else possible
 
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
-        """Compare a reading with the limits that hold at a point."""
-        return worst_of([judge(reading, limits, held) for limits in self.at(point)], point)
+        """Worst judgement by all limits that may hold; of equal ones, by the strictest limit.
 
-
-def worst_of(found: Iterable[Judgement], point: OperatingPoint) -> Judgement:
-    """The worst judgement by all limits that may hold; of equal ones, by the strictest limit.
-
-    Where no limits hold, the alarm is suppressed and its condition unknown, so that it does not
-    return to normal by being suppressed.
-    """
-    by_limit = sorted(found, key=lambda c: float("inf") if c.limit is None else c.limit)
-    word = point.state.name.lower()
-    return max(by_limit, key=lambda c: c.level or 0, default=unknown(word, word))
+        Where no limits hold, the alarm is suppressed and its condition unknown, so that it does not
+        return to normal by being suppressed.
+        """
+        found = [judge(reading, limits, held) for limits in self.at(point)]
+        if not found:
+            word = point.state.name.lower()
+            return unknown(word, word)
+        found.sort(key=lambda judged: float("inf") if judged.limit is None else judged.limit)
+        return max(found, key=lambda judged: judged.level or 0)
 
 
 def point_of(assessment: Assessment) -> OperatingPoint:

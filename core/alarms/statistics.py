@@ -4,7 +4,11 @@ from collections import Counter, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmState
+from core.arrays import TimeArray
 from core.limits import AlarmLevel
 from core.units import NS_PER_S
 
@@ -40,13 +44,7 @@ class ChatterRule:
 
 
 class ChatterWatch:
-    """Counts the newest activations of alarms.
-
-    Parameters
-    ----------
-    rule
-        What counts.
-    """
+    """Counts the newest activations of alarms."""
 
     def __init__(self, rule: ChatterRule) -> None:
         self._rule = rule
@@ -160,19 +158,21 @@ def figures_of(
     if end_ns <= start_ns:
         raise ValueError(f"end {end_ns} must be after start {start_ns}")
     within = [event for event in events if start_ns <= event.time_ns < end_ns]
-    told = [event for event in within if is_announced(event)]
-    by_alarm = Counter(event.identity.id for event in told)
-    span_ns = end_ns - start_ns
-    times = sorted(event.time_ns for event in told)
+    announced = [event for event in within if is_announced(event)]
+    by_alarm = Counter(event.identity.id for event in announced)
+    n, span_ns = len(announced), end_ns - start_ns
+    times = np.sort(np.array([event.time_ns for event in announced], np.int64))
+    _, per_period = np.unique((times - start_ns) // TEN_MINUTES_NS, return_counts=True)
     return AlarmFigures(
-        n_alarms=len(told),
-        per_day=len(told) * DAY_NS / span_ns,
-        per_10_min=len(told) * TEN_MINUTES_NS / span_ns,
-        most_in_10_min=_most_within(times, TEN_MINUTES_NS),
-        share_in_flood=_share_in_flood(times, start_ns, end_ns),
-        n_by_level={n: sum(event.level is n for event in told) for n in AlarmLevel},
+        n_alarms=n,
+        per_day=n * DAY_NS / span_ns,
+        per_10_min=n * TEN_MINUTES_NS / span_ns,
+        most_in_10_min=int(np.max(_n_before(times, TEN_MINUTES_NS - 1), initial=0)),
+        share_in_flood=int(np.sum(per_period > N_FLOOD)) / -(-span_ns // TEN_MINUTES_NS),
+        n_by_level={level: sum(e.level is level for e in announced) for level in AlarmLevel},
         most_frequent=[
-            Frequent(alarm, n, n / len(told)) for alarm, n in by_alarm.most_common(N_MOST_FREQUENT)
+            Frequent(alarm, found, found / n)
+            for alarm, found in by_alarm.most_common(N_MOST_FREQUENT)
         ],
         chattering=_chattering(within, rule),
         n_fleeting=_n_fleeting(within, rule),
@@ -190,20 +190,9 @@ def stale_alarms(alarms: Iterable[Alarm], now_ns: int) -> list[Alarm]:
     return [alarm for _, alarm in sorted(old, key=lambda pair: pair[0])]
 
 
-def _most_within(times: Sequence[int], window_ns: int) -> int:
-    """Most of some sorted times in any window, its end not included."""
-    most, first = 0, 0
-    for n, time_ns in enumerate(times):
-        while time_ns - times[first] >= window_ns:
-            first += 1
-        most = max(most, n - first + 1)
-    return most
-
-
-def _share_in_flood(times: Iterable[int], start_ns: int, end_ns: int) -> float:
-    periods = Counter((time_ns - start_ns) // TEN_MINUTES_NS for time_ns in times)
-    n_periods = -(-(end_ns - start_ns) // TEN_MINUTES_NS)
-    return sum(n > N_FLOOD for n in periods.values()) / n_periods
+def _n_before(times: TimeArray, window_ns: int) -> npt.NDArray[np.int64]:
+    """Number of the sorted times in the window that ends with each of them, ends included."""
+    return np.arange(1, times.size + 1) - np.searchsorted(times, times - window_ns)
 
 
 def _chattering(events: Iterable[AlarmEvent], rule: ChatterRule) -> dict[str, int]:
@@ -212,18 +201,12 @@ def _chattering(events: Iterable[AlarmEvent], rule: ChatterRule) -> dict[str, in
     for event in events:
         if event.change in ANNOUNCED:
             raised.setdefault(event.identity.id, []).append(event.time_ns)
-    counts = {alarm: _n_in_bursts(sorted(times), rule) for alarm, times in raised.items()}
-    return {alarm: n for alarm, n in counts.items() if n}
-
-
-def _n_in_bursts(times: Sequence[int], rule: ChatterRule) -> int:
-    n_wanted = rule.n_activations
-    counted: set[int] = set()
-    for last in range(n_wanted - 1, len(times)):
-        first = last - n_wanted + 1
-        if times[last] - times[first] <= rule.window_ns:
-            counted.update(range(first, last + 1))
-    return len(counted)
+    counts: dict[str, int] = {}
+    for alarm, times in raised.items():
+        last = np.flatnonzero(_n_before(np.sort(times), rule.window_ns) >= rule.n_activations)
+        if last.size:
+            counts[alarm] = np.unique(last[:, np.newaxis] - np.arange(rule.n_activations)).size
+    return counts
 
 
 def _n_fleeting(events: Iterable[AlarmEvent], rule: ChatterRule) -> int:

@@ -1,36 +1,33 @@
-"""`UnitAlarms`: all alarms of one unit, and what samples, results, links and people do to them."""
+"""`UnitAlarms`: all alarms of one unit, updated by samples, results, findings and the link."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from core.alarms.alarm import Alarm, AlarmNews
-from core.alarms.board import AlarmBoard, AlarmMemory
+from core.alarms.board import AlarmBoard, AlarmMemory, is_same_occurrence
 from core.alarms.judgements import (
     CLOCK_READINGS,
-    SENSOR_FAULTS,
     VectorReference,
     channel_judgement,
-    link_judgement,
-    slow_channel_judgement,
-    stamp_judgement,
+    fault_after_segment,
+    fault_judgement,
     vector_judgement,
 )
 from core.alarms.kinds import (
     DEVICE,
     FAST,
     LINK,
+    LINK_LOST,
     OIL_TEMPERATURE,
     SLOW_CHANNEL,
     TIME_STAMPS,
     VECTORS,
     WAVEFORM_CHANNEL,
-    LimitWatch,
     Watch,
     watches_of,
 )
-from core.alarms.operation import Action
-from core.alarms.rules import UnitRules, point_of, worst_of
+from core.alarms.rules import UnitRules, point_of
 from core.condition.cells import NOWHERE_KNOWN, OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import Judgement, unknown
@@ -46,8 +43,8 @@ POINT_HOLDS_NS = 300 * NS_PER_S
 """How long the operating condition of a result is taken for that of later samples."""
 
 
-class UnitAlarms:
-    """Owns the alarms of one unit. Events come in the order in which things happened.
+class UnitAlarms(AlarmBoard):
+    """Owns the alarms of one unit.
 
     Parameters
     ----------
@@ -67,16 +64,13 @@ class UnitAlarms:
         references: Iterable[VectorReference] = (),
     ) -> None:
         watches = watches_of(unit, rules)
-        self._board = AlarmBoard(watches)
+        super().__init__(watches)
         self._of_rule: defaultdict[str, list[Watch]] = defaultdict(list)
-        self._limits_of_rule: defaultdict[str, list[LimitWatch]] = defaultdict(list)
-        self._of_results: defaultdict[str, list[LimitWatch]] = defaultdict(list)
+        self._of_results: defaultdict[str, list[Watch]] = defaultdict(list)
         for watch in watches:
             self._of_rule[watch.group].append(watch)
-            if isinstance(watch, LimitWatch):
-                self._limits_of_rule[watch.group].append(watch)
-                if watch.group not in (OIL_TEMPERATURE, *CLOCK_READINGS):
-                    self._of_results[watch.identity.subject].append(watch)
+            if watch.limits and watch.group not in (OIL_TEMPERATURE, *CLOCK_READINGS):
+                self._of_results[watch.identity.subject].append(watch)
         of_rows = [channel.id for channel in unit.channels] if rows is None else list(rows)
         self._rows_of = {
             watch.source: [row for row, channel in enumerate(of_rows) if channel == watch.source]
@@ -90,24 +84,14 @@ class UnitAlarms:
         self._segment_faults: dict[str, Reason] = {}
         self._clipped_percent: dict[str, float] = {}
         self._points: dict[str, tuple[OperatingPoint, int]] = {}
-        self._unit_point = (NOWHERE_KNOWN, 0)
         self._stop: tuple[int, int] | None = None
         self._inactive_with: tuple[Quality, ...] | None = None
         self._link: tuple[bool, str | None] = (False, None)
 
     @property
-    def alarms(self) -> Sequence[Alarm]:
-        """All of them, whatever their state."""
-        return self._board.alarms
-
-    @property
     def is_connected(self) -> bool:
         """Whether samples arrive, as last reported."""
         return self._link[0]
-
-    def alarm(self, id_: str) -> Alarm:
-        """Look one up. Raises `KeyError` if the unit has no such alarm."""
-        return self._board.alarm(id_)
 
     def reference(self, bearing: str, state: OperatingState) -> VectorReference | None:
         """Reference of the 1× vectors of a bearing in a state, if there is one."""
@@ -132,16 +116,22 @@ class UnitAlarms:
         for assessment in assessments:
             self._take_assessment(assessment)
         now_ns = block.stop_ns
-        self._take_channels(block, now_ns)
+        self._take_channels(block)
         for watch in self._of_rule[SLOW_CHANNEL]:
             reading = block.slow.get(watch.source, NOT_MEASURED)
-            self._update(watch, slow_channel_judgement(reading), now_ns)
-        for warmth in self._limits_of_rule[OIL_TEMPERATURE]:
-            reading = block.slow.get(warmth.source, NOT_MEASURED)
-            point = self._recent_point(warmth.identity.subject, now_ns)
-            self._compare(warmth, reading, now_ns, point)
-        self._take_clock(block, self._recent_point(DEVICE, now_ns), host_ns)
-        return self._board.drain_news()
+            fault = reading.quality.reason if reading.value is None else None
+            self._update(watch, fault_judgement(fault), now_ns)
+        for watch in self._of_rule[OIL_TEMPERATURE]:
+            reading = block.slow.get(watch.source, NOT_MEASURED)
+            point = self._recent_point(watch.identity.subject, now_ns)
+            self._compare(watch, reading, now_ns, point)
+        point = self._recent_point(DEVICE, now_ns)
+        for rule, reading_of in CLOCK_READINGS.items():
+            for watch in self._of_rule[rule]:
+                self._compare(watch, reading_of(block.clock), host_ns, point)
+        for watch in self._of_rule[TIME_STAMPS]:
+            self._update(watch, fault_judgement(block.stamp_fault), host_ns)
+        return self.drain_news()
 
     def films(self, conditions: Mapping[str, Judgement], now_ns: int) -> list[AlarmNews]:
         """Update the alarms about films.
@@ -161,71 +151,50 @@ class UnitAlarms:
         films = {watch.id: watch for watch in self._of_rule["films"]}
         for id_, condition in conditions.items():
             point = self._recent_point(films[id_].source, now_ns)
-            self._board.record(films[id_].id, _at(point, condition), now_ns)
-        return self._board.drain_news()
+            self.record(id_, _at(point, condition), now_ns)
+        return self.drain_news()
 
     def link(self, is_connected: bool, reason: str | None, host_ns: int) -> list[AlarmNews]:
         """Update the alarm about the link."""
         self._link = (is_connected, reason)
         self._take_link(host_ns)
-        return self._board.drain_news()
-
-    def pause(self) -> None:
-        """Stop all delays up to now."""
-        self._board.pause()
+        return self.drain_news()
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
         """Judge the link and end the shelving of alarms by host time."""
         self._take_link(host_ns)
-        self._board.expire(host_ns)
-        return self._board.drain_news()
-
-    def operate(self, id_: str, action: Action, host_ns: int) -> list[AlarmNews]:
-        """Apply an action of a person.
-
-        Raises
-        ------
-        KeyError
-            If the unit has no such alarm.
-        ActionRefusedError
-            If the action does not fit the state of the alarm.
-        """
-        self._board.operate(id_, action, host_ns)
-        return self._board.drain_news()
+        return super().tick(host_ns)
 
     def restore(
-        self, alarms: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
+        self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
     ) -> list[AlarmNews]:
         """Continue after a restart from stored alarms, as `AlarmBoard.restore` does.
 
-        Parameters
-        ----------
-        memory
-            State at the last block, if no sample is missing since: conditions and delays continue.
+        An event of the link since the last block counts more than the memory: a link that was lost
+        stays lost until samples arrive.
         """
-        self._board.restore(alarms, host_ns, memory.alarms if memory else ())
+        news = super().restore(stored, host_ns, memory)
         if memory is not None:
-            self._restore(memory)
-        return self._board.drain_news()
+            self._segment_faults, self._points = dict(memory.segment_faults), dict(memory.points)
+            self._stop, self._link = memory.stop, (memory.is_connected, memory.link_reason)
+            kept = {alarm.identity.id: alarm for alarm in memory.alarms}
+            for watch in self._of_rule[LINK]:
+                alarm = self.alarm(watch.id)
+                if not is_same_occurrence(kept.get(watch.id, Alarm(watch.identity)), alarm):
+                    is_lost = alarm.level is not None
+                    self._link = (not is_lost, alarm.condition.reason if is_lost else None)
+        return news
 
     @property
     def memory(self) -> AlarmMemory:
         """State to continue from in another process, beside the events of alarms."""
         return AlarmMemory(
-            tuple(self._board.alarms),
+            tuple(self.alarms),
             dict(self._segment_faults),
             dict(self._points),
             self._stop,
             *self._link,
         )
-
-    def _restore(self, memory: AlarmMemory) -> None:
-        self._segment_faults = dict(memory.segment_faults)
-        self._points = dict(memory.points)
-        self._note_unit_point()
-        self._stop, self._link = memory.stop, (memory.is_connected, memory.link_reason)
-        for watch in self._of_rule[LINK]:
-            self._link = memory.link_by(self._board.alarm(watch.id))
 
     def _is_repeated(self, block: SampleBlock) -> bool:
         """Whether a block has no new samples; where samples are missing, delays stop."""
@@ -236,52 +205,42 @@ class UnitAlarms:
             self._stop = before
             return True
         if block.epoch != before[0] or block.first_index > before[1]:
-            self._board.interrupt()
+            self.pause(spared=LINK_LOST)
         return False
 
     def _take_assessment(self, assessment: Assessment) -> None:
         bearing, readings, now_ns = assessment.bearing, assessment.readings, assessment.time_ns
+        wrong_signs = {axes: is_reversed(readings, axes) for axes in DIRECTIONS}
         for channel, place in zip(self._channels_of[bearing], AMPLITUDES, strict=True):
-            self._note_segment(channel, readings[f"order1_{place}_um_pk"])
+            amplitude, wrong_sign = readings[f"order1_{place}_um_pk"], wrong_signs[2 * place[-1]]
+            before = self._segment_faults.pop(channel, None)
+            fault = fault_after_segment(before, amplitude, wrong_sign)
+            if fault is not None:
+                self._segment_faults[channel] = fault
+                self._inactive_with = None
             self._clipped_percent[channel] = 100.0 * assessment.clipped_share.get(place, 0.0)
-        for axes, places in DIRECTIONS.items():
-            for row in places:
-                self._note_sign(self._channels_of[bearing][row], is_reversed(readings, axes))
         point = point_of(assessment)
         self._points[bearing] = (point, now_ns)
-        self._note_unit_point()
+        reference = self.reference(bearing, point.state)
         for watch in self._of_results[bearing]:
-            alarm = self._board.alarm(watch.id)
             if watch.group in VECTORS:
-                condition = self._vector_condition(watch, assessment, point, alarm)
-                self._board.record(watch.id, _at(point, condition), now_ns)
+                held = self.alarm(watch.id).condition.level
+                condition = vector_judgement(readings, watch, reference, point, held)
+                self.record(watch.id, _at(point, condition), now_ns)
                 continue
             for then_ns, reading in _judged(watch, assessment):
-                held = self._board.alarm(watch.id).condition.level
-                condition = watch.limits.judge(reading, point, held)
-                self._board.record(watch.id, _at(point, condition), then_ns)
-
-    def _vector_condition(
-        self, watch: LimitWatch, assessment: Assessment, point: OperatingPoint, alarm: Alarm
-    ) -> Judgement:
-        """Compare a 1× vector with the reference of the present state."""
-        reference = self.reference(assessment.bearing, point.state)
-        held, readings = alarm.condition.level, assessment.readings
-        found = (
-            vector_judgement(readings, watch.source, reference, limits, held)
-            for limits in watch.limits.at(point)
-        )
-        return worst_of(found, point)
-
-    def _note_unit_point(self) -> None:
-        """Keep the newest operating state of any bearing as that of the unit."""
-        if self._points:
-            newest, seen_ns = max(self._points.values(), key=lambda found: found[1])
-            self._unit_point = (OperatingPoint(newest.state), seen_ns)
+                condition = watch.judge(reading, point, self.alarm(watch.id).condition.level)
+                self.record(watch.id, _at(point, condition), then_ns)
 
     def _recent_point(self, subject: str, now_ns: int) -> OperatingPoint:
         """Condition of a bearing by its newest result; of anything else, the unit's state."""
-        point, seen_ns = self._points.get(subject, self._unit_point)
+        if subject in self._points:
+            point, seen_ns = self._points[subject]
+        elif self._points:
+            newest, seen_ns = max(self._points.values(), key=lambda found: found[1])
+            point = OperatingPoint(newest.state)
+        else:
+            return NOWHERE_KNOWN
         return point if abs(now_ns - seen_ns) <= POINT_HOLDS_NS else NOWHERE_KNOWN
 
     def _update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
@@ -289,67 +248,42 @@ class UnitAlarms:
         if condition.level is not None:
             subject = self._bearing_of.get(watch.source, watch.source)
             condition = _at(self._recent_point(subject, now_ns), condition)
-        self._board.update(watch, condition, now_ns)
+        self.update(watch, condition, now_ns)
 
-    def _note_segment(self, channel: str, reading: Reading) -> None:
-        """Remember a fault that only a segment shows, until a segment shows the channel OK."""
-        if reading.value is None and reading.quality.reason in SENSOR_FAULTS:
-            self._inactive_with = None
-            self._segment_faults[channel] = reading.quality.reason
-        elif reading.value is not None and self._segment_faults.get(channel) in SENSOR_FAULTS:
-            del self._segment_faults[channel]
+    def _compare(self, watch: Watch, reading: Reading, now_ns: int, point: OperatingPoint) -> None:
+        alarm, value = self.alarm(watch.id), reading.value
+        limits = watch.limits.at(point) if watch.limits and alarm.is_settled_inactive else ()
+        if value is not None and limits and all(each.is_within(value) for each in limits):
+            return  # the usual case, and the cheapest
+        condition = watch.judge(reading, point, alarm.condition.level)
+        self.update(watch, _at(point, condition), now_ns)
 
-    def _note_sign(self, channel: str, wrong_sign: bool | None) -> None:
-        """Remember that the sign of a film's stiffness shows a reversed transducer."""
-        fault = self._segment_faults.get(channel)
-        if wrong_sign and fault is None:
-            self._inactive_with = None
-            self._segment_faults[channel] = Reason.POLARITY
-        elif wrong_sign is False and fault is Reason.POLARITY:
-            del self._segment_faults[channel]
-
-    def _take_channels(self, block: SampleBlock, now_ns: int) -> None:
-        """Judge every channel; one comparison while all are OK and their quality is the same."""
+    def _take_channels(self, block: SampleBlock) -> None:
+        """Judge every channel in every cell; compare once while all are OK as they were before."""
         if block.channel_quality == self._inactive_with:
             return
         watches = self._of_rule[WAVEFORM_CHANNEL]
-        for watch in watches:
-            self._update(watch, self._channel_condition(watch.source, block), now_ns)
-        are_inactive = all(self._board.alarm(watch.id).is_settled_inactive for watch in watches)
-        self._inactive_with = block.channel_quality if are_inactive else None
-
-    def _channel_condition(self, channel: str, block: SampleBlock) -> Judgement:
-        rows = self._rows_of[channel]
-        if not rows:
-            return unknown(Reason.NOT_MEASURED)
-        quality = worst(block.channel_quality[row] for row in rows)
-        clipped_percent = self._clipped_percent.get(channel) or None
-        return channel_judgement(quality, self._segment_faults.get(channel), clipped_percent)
-
-    def _take_clock(self, block: SampleBlock, point: OperatingPoint, host_ns: int) -> None:
-        for rule, reading_of in CLOCK_READINGS.items():
-            for watch in self._limits_of_rule[rule]:
-                self._compare(watch, reading_of(block.clock), host_ns, point)
-        for stamps in self._of_rule[TIME_STAMPS]:
-            self._update(stamps, stamp_judgement(block.stamp_fault), host_ns)
+        for qualities, stop_ns in block.cell_qualities():
+            if qualities == self._inactive_with:
+                continue
+            for watch in watches:
+                channel, rows = watch.source, self._rows_of[watch.source]
+                clipped_percent = self._clipped_percent.get(channel) or None
+                quality = worst(qualities[row] for row in rows)
+                fault = self._segment_faults.get(channel)
+                found = channel_judgement(quality, fault, clipped_percent)
+                self._update(watch, found if rows else unknown(Reason.NOT_MEASURED), stop_ns)
+            are_inactive = all(self.alarm(watch.id).is_settled_inactive for watch in watches)
+            self._inactive_with = qualities if are_inactive else None
 
     def _take_link(self, host_ns: int) -> None:
+        is_connected, reason = self._link
         for watch in self._of_rule[LINK]:
-            self._update(watch, link_judgement(*self._link), host_ns)
-
-    def _compare(
-        self, watch: LimitWatch, reading: Reading, now_ns: int, point: OperatingPoint
-    ) -> None:
-        alarm, value = self._board.alarm(watch.id), reading.value
-        limits = watch.limits.at(point)
-        is_within = value is not None and bool(limits) and all(x.is_within(value) for x in limits)
-        if is_within and alarm.is_settled_inactive:
-            return  # the usual case, and the cheapest
-        condition = watch.limits.judge(reading, point, alarm.condition.level)
-        self._board.update(watch, _at(point, condition), now_ns)
+            fault = None if is_connected else reason or "not connected"
+            self._update(watch, fault_judgement(fault), host_ns)
 
 
-def _judged(watch: LimitWatch, assessment: Assessment) -> list[tuple[int, Reading]]:
+def _judged(watch: Watch, assessment: Assessment) -> list[tuple[int, Reading]]:
     """The readings that an alarm is judged by, with times: the newest segment's, or an average."""
     source = watch.source
     recent = assessment.recent if watch.group in FAST else ()

@@ -10,21 +10,19 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import Support
 from core.baseline.grouping import group_readings, robust_std
-from core.baseline.history import StiffnessHistory, watched_values
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 
 
-def mean_difference(
-    first: BearingBaseline, second: BearingBaseline
-) -> dict[tuple[str, str], float]:
+def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[str, float]:
     """Mean difference of ln, second less first, in the cells that both support by themselves.
 
     Returns
     -------
-    By quantity and direction, weighted by readings of the first; only those with common cells.
+    By direction, weighted by readings of the first; only those with common cells.
     """
-    found: dict[tuple[str, str], float] = {}
+    found: dict[str, float] = {}
     for one in first.quantities:
-        other = second.of(one.quantity, one.direction)
+        other = second.of(one.direction)
         if other is None or other.grid != one.grid:
             continue
         known = {cell.cell for cell in other.table.cells if cell.support is Support.OWN}
@@ -37,7 +35,7 @@ def mean_difference(
             conditions = one.table.middle.rows(np.array(rows))
             weight = np.array([one.table.cells[row].n_readings for row in rows], np.float64)
             difference = other.surface.at(conditions) - one.surface.at(conditions)
-            found[one.quantity, one.direction] = float(np.average(difference, weights=weight))
+            found[one.direction] = float(np.average(difference, weights=weight))
     return found
 
 
@@ -67,8 +65,7 @@ def learning_drift(
     -------
     None if too few conditions recur in other spells.
     """
-    conditions = history.conditions
-    value, _ = watched_values(history, baseline.quantity, baseline.direction)
+    conditions, value = history.conditions, history.ln_k[DIRECTIONS.index(baseline.direction)]
     usable = is_settled & baseline.is_known(conditions) & np.isfinite(value)
     if not usable.any():
         return None
@@ -126,10 +123,9 @@ def far_readings(
     is_settled : (n,)
         Whether the unit had settled in a steady state.
     """
-    conditions, counts = history.conditions, []
+    counts = []
     for learned in baseline.quantities:
-        values = watched_values(history, learned.quantity, learned.direction)
-        found = learned.compare(conditions, *values)
+        found = learned.compare_history(history)
         deviation = found.deviation[is_settled & (found.place >= 0)]
         if n := int(np.sum(np.abs(deviation) >= FAR_DEVIATION)):
             counts.append(f"{n} of {deviation.size} readings in {learned.direction}")

@@ -1,13 +1,14 @@
 """`BearingBaseline`: the learned stiffness of a bearing, with author, time and event."""
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.cell_table import NODES, CellTable
-from core.baseline.history import DIRECTIONS, Watched
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.baseline.surface import ATTITUDE_TERMS, Surface, attitude_terms
 from core.condition.cells import CellGrid, FilmConditions
 
@@ -91,10 +92,12 @@ class Deviations:
 
 @dataclass(frozen=True)
 class QuantityBaseline:
-    """Learned values of one quantity in one direction.
+    """Learned stiffness in one direction.
 
     Parameters
     ----------
+    quantity
+        Name of the quantity in stored documents.
     direction
         "x" or "y".
     attitude_covariance
@@ -113,7 +116,7 @@ class QuantityBaseline:
         Fraction of the learning groups that the robust fit rejected.
     """
 
-    quantity: Watched
+    quantity: Literal["stiffness"]
     direction: str
     grid: CellGrid
     surface: Surface
@@ -149,7 +152,7 @@ class QuantityBaseline:
         Parameters
         ----------
         value, u_random : (n,)
-            ln of the quantity and its random standard uncertainty.
+            ln of the stiffness and its random standard uncertainty.
         """
         is_known = self.is_known(conditions)
         place = self.table.find(self.grid.cells(conditions))
@@ -169,12 +172,17 @@ class QuantityBaseline:
             place[rows[found.surface_std[rows] > self.max_surface_std]] = -1
         return found
 
+    def compare_history(self, history: StiffnessHistory) -> Deviations:
+        """Compare the readings of a history in the direction of the baseline."""
+        row = DIRECTIONS.index(self.direction)
+        return self.compare(history.conditions, history.ln_k[row], history.u_random[row])
+
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
         """(n,) whether readings have everything that the baseline depends on."""
         return conditions.is_known(self.grid.has_attitude or self.surface.shape.has_attitude)
 
     def eccentricity_rise(self, conditions: FilmConditions) -> FloatArray:
-        """(n,) rise of ln of the quantity with ln of the eccentricity ratio; NaN if unknown."""
+        """(n,) rise of ln of the stiffness with ln of the eccentricity ratio; NaN if unknown."""
         known = self.is_known(conditions)
         rise = np.full(known.size, np.nan)
         here = conditions.rows(known)
@@ -212,14 +220,14 @@ def _steps(x: FloatArray, width: float) -> tuple[npt.NDArray[np.int64], FloatArr
 
 @dataclass(frozen=True)
 class BearingBaseline:
-    """Learned baselines of one bearing.
+    """Learned baselines of the film of one bearing.
 
     Parameters
     ----------
     learned_from_ns, learned_until_ns
         First and last reading of the learning period.
     quantities
-        At most one for each quantity and direction; those with too few readings are missing.
+        At most one for each direction; those with too few readings are missing.
     """
 
     origin: Origin
@@ -227,7 +235,6 @@ class BearingBaseline:
     learned_until_ns: int
     quantities: tuple[QuantityBaseline, ...]
 
-    def of(self, quantity: Watched, direction: str) -> QuantityBaseline | None:
-        """Baseline of a quantity in a direction, if it was learned."""
-        found = [q for q in self.quantities if (q.quantity, q.direction) == (quantity, direction)]
-        return found[0] if found else None
+    def of(self, direction: str) -> QuantityBaseline | None:
+        """Baseline in a direction, if it was learned."""
+        return next((each for each in self.quantities if each.direction == direction), None)

@@ -1,7 +1,7 @@
 """Readings of one bearing over time as columns: what baselines learn from and back-tests run on."""
 
 from dataclasses import dataclass, field, fields
-from enum import IntEnum, StrEnum
+from enum import IntEnum
 from typing import TypeAlias
 
 import numpy as np
@@ -15,14 +15,6 @@ CodeArray: TypeAlias = npt.NDArray[np.int8]
 
 DIRECTIONS = ("x", "y")
 """Rows of every column of shape (2, n)."""
-
-
-class Watched(StrEnum):
-    """Quantity that has a baseline: stiffness, and the two 1× amplitudes that show its cause."""
-
-    STIFFNESS = "stiffness"
-    SHAFT = "shaft"
-    BEARING = "bearing"
 
 
 class ReadingOutcome(IntEnum):
@@ -129,24 +121,3 @@ def _refuse(column: str, why: str, is_wrong: npt.NDArray[np.bool_]) -> None:
     wrong = np.argwhere(is_wrong)
     if wrong.size:
         raise ValueError(f"{column}: row {wrong[0][-1]} {why}")
-
-
-def watched_values(
-    history: StiffnessHistory, quantity: Watched, direction: str
-) -> tuple[FloatArray, FloatArray]:
-    """Logarithm of a quantity and its random uncertainty.
-
-    Returns
-    -------
-    (n,), (n,)
-        NaN where there is no number. The uncertainty of amplitudes is unknown and given as zero: it
-        is part of the learned scatter.
-    """
-    row = DIRECTIONS.index(direction)
-    if quantity is Watched.STIFFNESS:
-        return history.ln_k[row], np.nan_to_num(history.u_random[row])
-    amplitude = history.shaft_um_pk if quantity is Watched.SHAFT else history.bearing_um_pk
-    is_there = amplitude[row] > 0.0
-    value = np.full(len(history), np.nan)
-    value[is_there] = np.log(amplitude[row][is_there])
-    return value, np.zeros(len(history))

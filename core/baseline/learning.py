@@ -7,7 +7,7 @@ from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.cell_table import CellTable
 from core.baseline.grouping import DAY_NS, Groups, group_readings
-from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched, watched_values
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.baseline.scatter import time_scatter, with_scatter
 from core.baseline.settings import BaselineSettings
 from core.baseline.surface_fit import MIN_SCATTER, Fit, fit_surface, refit, surface_shape
@@ -75,7 +75,6 @@ def learn(
     is_settled: npt.NDArray[np.bool_],
     origin: Origin,
     settings: BaselineSettings,
-    watched: tuple[Watched, ...] = (Watched.STIFFNESS,),
 ) -> BearingBaseline:
     """Learn the baseline of a bearing.
 
@@ -85,8 +84,6 @@ def learn(
         Readings of the learning period, for the most part of a healthy machine.
     is_settled : (n,)
         Whether the unit had settled in a steady state.
-    watched
-        Quantities to be learned.
 
     Raises
     ------
@@ -95,11 +92,7 @@ def learn(
     """
     if not len(history):
         raise ValueError("there are no readings to learn from")
-    found = [
-        _learn_quantity(history, is_settled, quantity, direction, settings)
-        for quantity in watched
-        for direction in DIRECTIONS
-    ]
+    found = [_learn_direction(history, is_settled, each, settings) for each in DIRECTIONS]
     return BearingBaseline(
         origin,
         int(history.time_ns[0]),
@@ -108,15 +101,14 @@ def learn(
     )
 
 
-def _learn_quantity(
+def _learn_direction(
     history: StiffnessHistory,
     is_settled: npt.NDArray[np.bool_],
-    quantity: Watched,
     direction: str,
     settings: BaselineSettings,
 ) -> QuantityBaseline | None:
-    conditions = history.conditions
-    value, u_random = watched_values(history, quantity, direction)
+    conditions, row = history.conditions, DIRECTIONS.index(direction)
+    value, u_random = history.ln_k[row], history.u_random[row]
     usable = is_settled & settings.is_known(conditions) & np.isfinite(value)
     time_ns, conditions, value = history.time_ns[usable], conditions.rows(usable), value[usable]
     if value.size == 0:
@@ -124,23 +116,14 @@ def _learn_quantity(
     groups = group_readings(time_ns, conditions, value, settings.grid)
     if np.unique(groups.day).size < settings.min_learning_days:
         return None
-    return _fitted(
-        quantity, direction, settings, time_ns, conditions, value, u_random[usable], groups
+    grid, knots = settings.grid, settings.knot_cells
+    shape = surface_shape(
+        groups,
+        knots * grid.eccentricity_width,
+        knots * grid.temperature_width_c,
+        settings.has_attitude,
     )
-
-
-def _fitted(
-    quantity: Watched,
-    direction: str,
-    settings: BaselineSettings,
-    time_ns: TimeArray,
-    conditions: FilmConditions,
-    value: FloatArray,
-    u_random: FloatArray,
-    groups: Groups,
-) -> QuantityBaseline:
-    grid = settings.grid
-    fit = _fit(groups, settings)
+    fit = fit_surface(groups, shape, settings.bend_std)
     table = tabulate(conditions, value, groups, fit, settings)
     deviation = held_out_deviations(time_ns, conditions, value, groups, fit, table, settings)
     counted = np.isfinite(deviation)
@@ -149,7 +132,7 @@ def _fitted(
     table = with_scatter(table, slope, place, day, deviation)
     scatter = table.scatter[place]
     return QuantityBaseline(
-        quantity=quantity,
+        quantity="stiffness",
         direction=direction,
         grid=grid,
         surface=fit.surface,
@@ -157,19 +140,8 @@ def _fitted(
         table=table,
         max_surface_std=settings.max_surface_std,
         scatter=float(np.median(scatter)) if scatter.size else MIN_SCATTER,
-        u_random=float(np.median(u_random)),
+        u_random=float(np.median(u_random[usable])),
         reading_h=settings.reading_h,
         time_scatter=time_scatter(deviation, place, table, settings),
         rejected_share=float(np.mean(fit.robust_weight < REJECTED)),
     )
-
-
-def _fit(groups: Groups, settings: BaselineSettings) -> Fit:
-    grid, knots = settings.grid, settings.knot_cells
-    shape = surface_shape(
-        groups,
-        knots * grid.eccentricity_width,
-        knots * grid.temperature_width_c,
-        settings.has_attitude,
-    )
-    return fit_surface(groups, shape, settings.bend_std)

@@ -1,10 +1,10 @@
 """Operation and decisions over stored readings: the steps of a running unit, folded."""
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import repeat
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,6 @@ from core.condition.operating_state import (
     OperatingLimits,
     OperatingState,
     Operation,
-    step_given_state,
     step_operation,
 )
 
@@ -47,8 +46,9 @@ def operation_history(
     power_mw: FloatArray,
     limits: OperatingLimits,
     oil_temperature_c: FloatArray | None = None,
+    state: CodeArray | None = None,
 ) -> OperationHistory:
-    """Operating states from speed and power.
+    """Operating states from speed and power, or those that a file gives, and their settling.
 
     Parameters
     ----------
@@ -56,28 +56,16 @@ def operation_history(
         Strictly increasing; NaN where there is no number.
     oil_temperature_c : (n,), optional
         Of the bearing; without it a film warms up for the longest time.
+    state : (n,), optional
+        Given members of `OperatingState`.
     """
-    rows = zip(time_ns.tolist(), speed_rpm.tolist(), power_mw.tolist(), strict=True)
-    return _history(_folded(step_operation, rows, oil_temperature_c, limits), limits)
-
-
-def operation_of_states(
-    time_ns: TimeArray,
-    state: CodeArray,
-    limits: OperatingLimits,
-    oil_temperature_c: FloatArray | None = None,
-) -> OperationHistory:
-    """Settling where a file of readings gives the operating states.
-
-    Parameters
-    ----------
-    state : (n,)
-        Members of `OperatingState`.
-    oil_temperature_c : (n,), optional
-        Of the bearing; without it a film warms up for the longest time.
-    """
-    rows = zip(time_ns.tolist(), map(OperatingState, state.tolist()), strict=True)
-    return _history(_folded(step_given_state, rows, oil_temperature_c, limits), limits)
+    columns = (speed_rpm, power_mw, oil_temperature_c, state)
+    rows = [
+        (int(operation.state), operation.is_settled(limits, oil.has_settled))
+        for operation, oil in _operations(time_ns.tolist(), *columns, limits)
+    ]
+    states, is_settled = np.array(rows, np.int8).reshape(-1, 2).T
+    return OperationHistory(states, is_settled.astype(np.bool_))
 
 
 def last_operation(history: StiffnessHistory, rules: FilmRules) -> tuple[Operation, OilSettling]:
@@ -87,33 +75,28 @@ def last_operation(history: StiffnessHistory, rules: FilmRules) -> tuple[Operati
         # readings keep their distances, though time may be made to pass faster from now on
         shift_ns = rules.lapsed_ns(time_ns[-1]) - time_ns[-1]
         time_ns = [reading_ns + shift_ns for reading_ns in time_ns]
-    rows = zip(time_ns, history.speed_rpm.tolist(), history.power_mw.tolist(), strict=True)
-    steps = _folded(step_operation, rows, history.oil_temperature_c, rules.operating)
-    found = deque(steps, maxlen=1)
+    columns = (history.speed_rpm, history.power_mw, history.oil_temperature_c, None)
+    found = deque(_operations(time_ns, *columns, rules.operating), maxlen=1)
     return found[0] if found else (UNKNOWN_OPERATION, NOT_AT_SPEED)
 
 
-def _folded(
-    step: Callable[..., Operation],
-    rows: Iterable[tuple[Any, ...]],
+def _operations(
+    time_ns: Iterable[int],
+    speed_rpm: FloatArray,
+    power_mw: FloatArray,
     oil_temperature_c: FloatArray | None,
+    state: CodeArray | None,
     limits: OperatingLimits,
 ) -> Iterator[tuple[Operation, OilSettling]]:
-    """Operation and oil after each row; `step` takes the operation, the row and the limits."""
-    temperatures = repeat(np.nan) if oil_temperature_c is None else oil_temperature_c.tolist()
+    """Operation and oil after each reading."""
     operation, oil = UNKNOWN_OPERATION, NOT_AT_SPEED
-    for row, oil_c in zip(rows, temperatures, strict=False):
-        operation = step(operation, *row, limits)
+    oils_c = repeat(math.nan) if oil_temperature_c is None else oil_temperature_c.tolist()
+    states = repeat(None) if state is None else map(OperatingState, state.tolist())
+    rows = zip(time_ns, speed_rpm.tolist(), power_mw.tolist(), states, oils_c, strict=False)
+    for now_ns, rpm, mw, given, oil_c in rows:
+        operation = step_operation(operation, now_ns, rpm, mw, limits, given)
         oil = oil.step(operation, oil_c, limits)
         yield operation, oil
-
-
-def _history(
-    found: Iterator[tuple[Operation, OilSettling]], limits: OperatingLimits
-) -> OperationHistory:
-    rows = [(int(o.state), o.is_settled(limits, oil.has_settled)) for o, oil in found]
-    state, is_settled = np.array(rows, np.int8).reshape(-1, 2).T
-    return OperationHistory(state, is_settled.astype(np.bool_))
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,8 +153,7 @@ def last_decision(
     is_settled : (n,)
     """
     readings = WatchedReadings.of(history, is_settled, baseline.direction)
-    decisions = _decisions(readings, baseline, rules.change, rules.lapsed_ns)
-    found = deque(decisions, maxlen=1)
+    found = deque(_decisions(readings, baseline, rules.change, rules.lapsed_ns), maxlen=1)
     return found[0] if found else INITIAL_DECISION
 
 

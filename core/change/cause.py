@@ -182,14 +182,6 @@ class _Residuals:
         """Residual if neither a film nor a shaft probe has changed."""
         return self._residual(self.readings.ln_k - self.change)
 
-    def film_misfit(self) -> float:
-        """Misfit if films have the measured stiffness."""
-        return self._scaled_misfit(self.if_film)
-
-    def transducer_misfit(self) -> float:
-        """Misfit if no film has changed."""
-        return self._misfit(self.if_unchanged)
-
     def probe_misfit(self) -> float:
         """Misfit if the bearing's shaft probes read wrong; NaN if that is unknown."""
         gain, ln_k = self._probe_gain(), self.readings.ln_k
@@ -197,7 +189,7 @@ class _Residuals:
             return float("nan")
         own = np.mean(gain - np.mean(gain, axis=0), axis=1) / self.std
         residual = (self._residual(ln_k + a * gain, a * gain) for a in SCALES)
-        return min(self._misfit(x, a * own) for a, x in zip(SCALES, residual, strict=True))
+        return min(self.misfit(x, a * own) for a, x in zip(SCALES, residual, strict=True))
 
     def bracket_misfit(self, bracket_n_per_m: FloatArray | None) -> float:
         """Misfit if brackets have changed as stiffness seems to have; NaN if that is unknown.
@@ -212,7 +204,7 @@ class _Residuals:
         true = stated * np.exp(-self.change)
         alike = 1.0 / (1.0 / k + 1.0 / true - 1.0 / stated)
         own = np.log((1.0 + alike / stated) / (1.0 + k / true))
-        return self._scaled_misfit(self._residual(np.log(alike), own))
+        return self.scaled_misfit(self._residual(np.log(alike), own))
 
     def film_share(self) -> tuple[float, float] | tuple[None, None]:
         """Share of the film in a mixture with a bearing transducer, with its uncertainty."""
@@ -223,7 +215,7 @@ class _Residuals:
         share = float(np.sum(self.if_unchanged * step)) / size
         std = float(np.hypot(size**-0.5, SHARE_SPREAD * share))
         is_possible = -COVERAGE * std <= share <= 1.0 + COVERAGE * std
-        is_possible &= self._misfit(self.if_unchanged - share * step, share * step) <= MAX_MISFIT
+        is_possible &= self.misfit(self.if_unchanged - share * step, share * step) <= MAX_MISFIT
         return (share, std) if is_possible else (None, None)
 
     def bearings(self, rows: npt.NDArray[np.bool_]) -> frozenset[str]:
@@ -253,25 +245,28 @@ class _Residuals:
         left = motion - np.mean(motion, axis=0) - self.response.expected(ln_k)
         return np.asarray(np.mean(left, axis=1) / self.std)
 
-    def _scaled_misfit(self, residual: FloatArray) -> float:
+    def scaled_misfit(self, residual: FloatArray) -> float:
         """Smallest misfit over the multiples of a predicted motion."""
         step = self.if_unchanged - residual
-        return min(self._misfit(self.if_unchanged - a * step, a * step) for a in SCALES)
+        return min(self.misfit(self.if_unchanged - a * step, a * step) for a in SCALES)
 
-    def _misfit(self, residual: FloatArray, predicted: FloatArray | float = 0.0) -> float:
+    def misfit(self, residual: FloatArray, predicted: FloatArray | float = 0.0) -> float:
         """Sum of squares, with the uncertainty of the prediction."""
         spread = SPREAD**2 * np.mean((predicted * self.std) ** 2) / self.std**2
         return float(np.sum(residual**2 / (1.0 + spread)))
 
 
 def _cause(seen: _Residuals, bracket_n_per_m: FloatArray | None) -> tuple[Cause, str]:
-    misfits = {TRANSDUCER_REASON: seen.transducer_misfit(), PROBE_REASON: seen.probe_misfit()}
+    misfits = {
+        TRANSDUCER_REASON: seen.misfit(seen.if_unchanged),
+        PROBE_REASON: seen.probe_misfit(),
+    }
     # brackets come loose, which looks like stiffer films; they do not stiffen
     if np.mean(seen.change[seen.row]) > 0.0:
         misfits[BRACKET_REASON] = seen.bracket_misfit(bracket_n_per_m)
     known = seen.bearings(np.asarray(np.any(np.isfinite(seen.readings.deviation), axis=1)))
     changed = seen.bearings(np.asarray(np.any(seen.change != 0.0, axis=1)))
-    is_film = seen.film_misfit() <= MAX_MISFIT
+    is_film = seen.scaled_misfit(seen.if_film) <= MAX_MISFIT
     agreeing = [reason for reason, misfit in misfits.items() if misfit <= MAX_MISFIT]
     only_film = is_film and all(misfit > MAX_MISFIT for misfit in misfits.values())
     if changed == known and len(known) > 1:

@@ -9,13 +9,12 @@ import numpy as np
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
-from core.baseline.history import DIRECTIONS, Watched
+from core.baseline.history import DIRECTIONS
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
 from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, WatchedReadings, step
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
-from core.condition.cells import FilmConditions
 from core.condition.operating_state import OilSettling, Operation
 from core.limits import AlarmLevel, Judgement, unknown
 
@@ -57,21 +56,6 @@ ALARM_REASONS = {
     Cause.UNKNOWN: "changed_cause_unknown",
 }
 """Reason of an alarm by cause."""
-
-
-def film_finding(decision: Decision, is_compared: bool, version: int | None) -> FilmFinding:
-    """Finding of a decision; `is_compared` if its newest reading was compared."""
-    finding = decision.finding
-    return FilmFinding(
-        verdict=decision.verdict,
-        level=decision.level,
-        change=finding.change if finding else None,
-        change_std=finding.std if finding else None,
-        time_scale_h=finding.time_scale_h if finding else None,
-        deviation=decision.deviation if is_compared else None,
-        deviation_std=decision.deviation_std if is_compared else None,
-        baseline_version=version,
-    )
 
 
 def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
@@ -133,13 +117,18 @@ class FilmJudge:
     ----------
     brackets_n_per_m
         Stiffness of the bracket of every bearing.
+
+    Attributes
+    ----------
+    response
+        Shaft response that causes are found with; None if it has not been learned.
     """
 
     def __init__(self, rules: FilmRules, brackets_n_per_m: Mapping[str, float]) -> None:
+        self.response: ShaftResponse | None = None
         self._rules = rules
         self._baselines: dict[str, BearingBaseline] = {}
         self._decisions: dict[FilmDirection, Decision] = {}
-        self._response: ShaftResponse | None = None
         self._films = [(bearing, d) for bearing in rules.estimators for d in DIRECTIONS]
         self._brackets = np.array([brackets_n_per_m[bearing] for bearing, _ in self._films])
         self._recent: deque[FloatArray] = deque(maxlen=MAX_RECENT)
@@ -162,12 +151,9 @@ class FilmJudge:
             self._baselines.pop(bearing, None)
         else:
             self._baselines[bearing] = baseline
-        for direction, decision in zip(
-            DIRECTIONS, decisions or (INITIAL_DECISION,) * 2, strict=True
-        ):
-            # they may come from another clock
-            timeless = replace(decision, last_ns=None, last_counted_ns=None)
-            self._decisions[bearing, direction] = timeless
+        begun = decisions or (INITIAL_DECISION,) * len(DIRECTIONS)
+        for direction, decision in zip(DIRECTIONS, begun, strict=True):
+            self._decisions[bearing, direction] = _timeless(decision)  # of another clock, perhaps
 
     @property
     def decided(self) -> tuple[FilmDecision, ...]:
@@ -183,18 +169,9 @@ class FilmJudge:
             if found.version == self._version(found.bearing):
                 self._decisions[found.bearing, found.direction] = found.decision
 
-    def _version(self, bearing: str) -> int | None:
-        baseline = self._baselines.get(bearing)
-        return baseline.origin.version if baseline else None
-
-    def set_response(self, response: ShaftResponse | None) -> None:
-        """Set the shaft response that causes are found with."""
-        self._response = response
-
     def forget_times(self) -> None:
         """Keep the decisions, and accept readings of any later time."""
-        for film, decision in self._decisions.items():
-            self._decisions[film] = replace(decision, last_ns=None, last_counted_ns=None)
+        self._decisions = {film: _timeless(each) for film, each in self._decisions.items()}
 
     def add_recent(self, columns: Iterable[FloatArray]) -> None:
         """Add settled readings of earlier moments, (5, n_films) each, the fields of `UnitReadings`.
@@ -211,37 +188,65 @@ class FilmJudge:
             for direction in DIRECTIONS
         }
         self._remember(readings, found)
-        return [self._news(reading, found) for reading in readings]
+        for film, finding in found.items():
+            if finding.level is not None:
+                found[film] = replace(finding, attribution=self._attribution(film))
+        news = []
+        for reading in readings:
+            x, y = ((reading.bearing, direction) for direction in DIRECTIONS)
+            decisions = (self._decisions[x], self._decisions[y])
+            news.append(FilmNews(reading, (found[x], found[y]), decisions))
+        return news
+
+    def _decide(self, reading: FilmReading, direction: str) -> FilmFinding:
+        film, value = (reading.bearing, direction), reading.values[DIRECTIONS.index(direction)]
+        watched = WatchedReadings(
+            np.array([reading.time_ns]),
+            np.array([reading.condition.is_settled]),
+            reading.conditions,
+            np.array([value.ln_k]),
+            np.array([value.u_random]),
+            np.array([value.outcome]),
+        )
+        learned = self._learned(*film)
+        [(time_ns, outcome)] = watched.compared(learned)
+        before, now_ns = self._decisions.get(film, INITIAL_DECISION), self._rules.lapsed_ns(time_ns)
+        decision = step(before, now_ns, outcome, learned, self._rules.change)
+        self._decisions[film] = decision
+        finding, is_compared = decision.finding, decision.last_counted_ns == decision.last_ns
+        return FilmFinding(
+            verdict=decision.verdict,
+            level=decision.level,
+            change=finding.change if finding else None,
+            change_std=finding.std if finding else None,
+            time_scale_h=finding.time_scale_h if finding else None,
+            deviation=decision.deviation if is_compared else None,
+            deviation_std=decision.deviation_std if is_compared else None,
+            baseline_version=self._version(reading.bearing),
+        )
 
     def _remember(
         self, readings: Sequence[FilmReading], found: Mapping[FilmDirection, FilmFinding]
     ) -> None:
-        """Keep the readings of one moment if they are of every bearing and settled."""
-        rows: dict[FilmDirection, tuple[float, ...]] = {}
-        for reading in readings if all(r.condition.is_settled for r in readings) else ():
-            for direction, value in zip(DIRECTIONS, reading.values, strict=True):
-                film = (reading.bearing, direction)
-                learned, deviation = self._learned(*film), found[film].deviation
-                rows[film] = (
+        """Keep the readings of one moment if they are settled and of every bearing."""
+        settled = {each.bearing: each for each in readings if each.condition.is_settled}
+        if settled.keys() != self._rules.estimators.keys():
+            return
+        rows = []
+        for bearing, direction in self._films:
+            reading, learned = settled[bearing], self._learned(bearing, direction)
+            value = reading.values[DIRECTIONS.index(direction)]
+            deviation = found[bearing, direction].deviation
+            rows.append(
+                (
                     value.ln_k,
                     math.log(value.shaft_um_pk) if value.shaft_um_pk > 0.0 else np.nan,
                     np.nan if deviation is None else deviation,
-                    learned.eccentricity_rise(_conditions(reading))[0] if learned else np.nan,
+                    learned.eccentricity_rise(reading.conditions)[0] if learned else np.nan,
                     reading.attitude_deg,
                 )
-        if set(rows) == set(self._films):
-            self._recent.append(np.array([rows[film] for film in self._films]).T)
-
-    def _news(self, reading: FilmReading, found: Mapping[FilmDirection, FilmFinding]) -> FilmNews:
-        films = [(reading.bearing, direction) for direction in DIRECTIONS]
-        x, y = (
-            replace(found[film], attribution=self._attribution(film))
-            if found[film].level is not None
-            else found[film]
-            for film in films
-        )
-        decision_x, decision_y = (self._decisions[film] for film in films)
-        return FilmNews(reading, (x, y), (decision_x, decision_y))
+            )
+        self._recent.append(np.array(rows).T)
 
     def _attribution(self, film: FilmDirection) -> Attribution:
         """Cause of a change of a film, from the newest readings that have its deviation."""
@@ -249,33 +254,16 @@ class FilmJudge:
         newest = [column for column in self._recent if np.isfinite(column[2, row])]
         columns = newest[-MEAN_READINGS:] or [np.full((5, len(self._films)), np.nan)]
         readings = UnitReadings(*np.stack(columns, axis=-1))
-        return attribute(film, self._response, readings, self._brackets)
+        return attribute(film, self.response, readings, self._brackets)
 
     def _learned(self, bearing: str, direction: str) -> QuantityBaseline | None:
         baseline = self._baselines.get(bearing)
-        return baseline.of(Watched.STIFFNESS, direction) if baseline else None
+        return baseline.of(direction) if baseline else None
 
-    def _decide(self, reading: FilmReading, direction: str) -> FilmFinding:
-        film, value = (reading.bearing, direction), reading.values[DIRECTIONS.index(direction)]
-        watched = WatchedReadings(
-            np.array([reading.time_ns]),
-            np.array([reading.condition.is_settled]),
-            _conditions(reading),
-            np.array([value.ln_k]),
-            np.array([value.u_random]),
-            np.array([value.outcome]),
-        )
-        learned = self._learned(*film)
-        decision = self._decisions.get(film, INITIAL_DECISION)
-        for time_ns, outcome in watched.compared(learned):
-            now_ns = self._rules.lapsed_ns(time_ns)
-            decision = step(decision, now_ns, outcome, learned, self._rules.change)
-        self._decisions[film] = decision
-        is_compared = decision.last_counted_ns == decision.last_ns
-        return film_finding(decision, is_compared, self._version(reading.bearing))
+    def _version(self, bearing: str) -> int | None:
+        baseline = self._baselines.get(bearing)
+        return baseline.origin.version if baseline else None
 
 
-def _conditions(reading: FilmReading) -> FilmConditions:
-    return FilmConditions.one(
-        reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
-    )
+def _timeless(decision: Decision) -> Decision:
+    return replace(decision, last_ns=None, last_counted_ns=None)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from core.baseline.history import DIRECTIONS, ReadingOutcome
-from core.condition.cells import BearingCondition
+from core.condition.cells import BearingCondition, FilmConditions
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Level, Quality, Reading, Reason, worst
@@ -58,6 +58,12 @@ class FilmReading:
     attitude_deg: float
     oil_temperature_c: float
     values: tuple[FilmValue, FilmValue]
+
+    @property
+    def conditions(self) -> FilmConditions:
+        """Conditions of the one reading as columns."""
+        axes = (self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg)
+        return FilmConditions.one(*axes)
 
 
 def film_reading(

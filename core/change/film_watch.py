@@ -16,6 +16,7 @@ from core.condition.operating_state import (
     step_operation,
 )
 from core.monitor.assessment import Assessment
+from core.units import ns_from_s
 
 
 class FilmWatch:
@@ -69,7 +70,7 @@ class FilmWatch:
         readings = assessment.readings
         now_ns, last_ns = self._rules.lapsed_ns(assessment.time_ns), self._operation.last_ns
         if last_ns is not None and now_ns <= last_ns:
-            if last_ns - now_ns <= self._rules.operating.longest_gap_ns:
+            if last_ns - now_ns <= ns_from_s(self._rules.operating.longest_gap_s):
                 return  # the same assessment again, or a clock put back a little
             self._restart()
         speed_rpm, power_mw = (value_or_nan(readings[key]) for key in ("speed_rpm", "power_mw"))

@@ -243,24 +243,18 @@ def stationarity(
     Uncertain where something moved, and where the newest power is not known: an unknown load is
     not steady.
     """
-    speed, power = _spread(speed_rpm), _spread(power_mw)
-    if speed.change > limits.max_speed_change * speed.mean:
+    mean_rpm, spread_rpm = _mean_and_spread(speed_rpm)
+    if spread_rpm > limits.max_speed_change * mean_rpm:
         return uncertain(Reason.NON_STATIONARY)
-    if power.change > limits.max_power_change * (rated_power_mw or power.mean):
+    mean_mw, spread_mw = _mean_and_spread(power_mw)
+    if spread_mw > limits.max_power_change * (rated_power_mw or mean_mw):
         return uncertain(Reason.NON_STATIONARY)
     if power_mw.size and not math.isfinite(power_mw[-1]):
         return uncertain(Reason.POWER_UNKNOWN)
     return GOOD
 
 
-@dataclass(frozen=True)
-class _Spread:
-    mean: float = 0.0
-    change: float = 0.0
-
-
-def _spread(values: FloatArray) -> _Spread:
+def _mean_and_spread(values: FloatArray) -> tuple[float, float]:
+    """Mean size of the known values, and greatest minus least; zeros without any."""
     known = [value for value in values.tolist() if math.isfinite(value)]
-    if not known:
-        return _Spread()
-    return _Spread(abs(sum(known) / len(known)), max(known) - min(known))
+    return (abs(sum(known) / len(known)), max(known) - min(known)) if known else (0.0, 0.0)

@@ -9,14 +9,8 @@ temperature is part of the condition that films are compared under.
 import math
 from dataclasses import dataclass, fields
 from enum import IntEnum
-from functools import cached_property
-from typing import TypeAlias
 
 from core.units import ns_from_s
-
-Band: TypeAlias = tuple[float, float, float]
-"""A limit with its hysteresis: no longer passed below the first value, passed from the third on;
-the second decides where the state before is unknown."""
 
 
 @dataclass(frozen=True)
@@ -82,48 +76,6 @@ class OperatingLimits:
                 f" other by more than their hysteresis of {hysteresis:g}"
             )
 
-    @cached_property
-    def settling_ns(self) -> int:
-        """Settling time."""
-        return ns_from_s(self.settling_s)
-
-    @cached_property
-    def oil_settling_ns(self) -> int:
-        """Time that the oil must stay within its band."""
-        return ns_from_s(self.oil_settling_s)
-
-    @cached_property
-    def warm_up_ns(self) -> int:
-        """Longest time at speed until readings count."""
-        return ns_from_s(self.warm_up_s)
-
-    @cached_property
-    def longest_gap_ns(self) -> int:
-        """Longest gap that is bridged."""
-        return ns_from_s(self.longest_gap_s)
-
-    @cached_property
-    def speed_bands_rpm(self) -> tuple[Band, Band]:
-        """Limits of standing still and of being at speed."""
-        h = self.speed_hysteresis
-        return (
-            _band(self.standing_below, h, self.rated_speed_rpm),
-            _band(self.at_speed_above, h, self.rated_speed_rpm),
-        )
-
-    @cached_property
-    def power_bands_mw(self) -> tuple[Band, Band]:
-        """Limits of part load and full load."""
-        h = self.power_hysteresis
-        return (
-            _band(self.loaded_above, h, self.rated_power_mw),
-            _band(self.full_load_above, h, self.rated_power_mw),
-        )
-
-
-def _band(share: float, hysteresis: float, rated: float) -> Band:
-    return (share - hysteresis) * rated, share * rated, (share + hysteresis) * rated
-
 
 class OperatingState(IntEnum):
     """Operating state of a unit, stored in one byte."""
@@ -137,13 +89,11 @@ class OperatingState(IntEnum):
     RUN_DOWN = 6
 
 
-STEADY = frozenset(
-    {OperatingState.SPEED_NO_LOAD, OperatingState.PART_LOAD, OperatingState.FULL_LOAD}
-)
-"""States in which films are compared: the shaft turns at its rated speed."""
-
 UNDER_LOAD = (OperatingState.SPEED_NO_LOAD, OperatingState.PART_LOAD, OperatingState.FULL_LOAD)
 """State at rated speed by the number of power limits that are passed."""
+
+STEADY = frozenset(UNDER_LOAD)
+"""States in which films are compared: the shaft turns at its rated speed."""
 
 
 @dataclass(frozen=True)
@@ -174,88 +124,77 @@ class Operation:
     power_passed: tuple[bool, bool] | None = None
     was_at_speed: bool | None = None
 
-    def is_steady(self, limits: OperatingLimits) -> bool:
-        """Whether a steady state has lasted for the settling time."""
-        if self.state not in STEADY or self.since_ns is None or self.last_ns is None:
-            return False
-        return self.last_ns - self.since_ns >= limits.settling_ns
-
     def is_settled(self, limits: OperatingLimits, has_oil_settled: bool = False) -> bool:
         """Whether a steady state has lasted for the settling time, after the warm-up."""
-        if not self.is_steady(limits) or self.last_ns is None or self.at_speed_from_ns is None:
+        now_ns, since_ns, from_ns = self.last_ns, self.since_ns, self.at_speed_from_ns
+        if self.state not in STEADY or now_ns is None or since_ns is None or from_ns is None:
             return False
-        return has_oil_settled or self.last_ns - self.at_speed_from_ns >= limits.warm_up_ns
+        is_warm = has_oil_settled or now_ns - from_ns >= ns_from_s(limits.warm_up_s)
+        return is_warm and now_ns - since_ns >= ns_from_s(limits.settling_s)
 
 
 UNKNOWN_OPERATION = Operation()
 
 
 def step_operation(
-    operation: Operation, time_ns: int, speed_rpm: float, power_mw: float, limits: OperatingLimits
+    operation: Operation,
+    time_ns: int,
+    speed_rpm: float,
+    power_mw: float,
+    limits: OperatingLimits,
+    state: OperatingState | None = None,
 ) -> Operation:
-    """Update the operation with one reading of speed and power, NaN where there is no number.
+    """Update the operation with one reading.
 
     A gap longer than `limits.longest_gap_s` resets the operation: what the machine did meanwhile is
-    not known.
+    not known. A few readings without a speed do not end the stretch at rated speed.
+
+    Parameters
+    ----------
+    speed_rpm, power_mw
+        NaN where there is no number.
+    state
+        State that a file of readings gives; speed and power are not looked at then.
 
     Raises
     ------
     ValueError
         If the reading is not later than the one before.
     """
-    operation = _bridged(operation, time_ns, limits)
-    speed = _passed(speed_rpm, operation.speed_passed, limits.speed_bands_rpm)
-    power = _passed(power_mw, operation.power_passed, limits.power_bands_mw)
-    was_at_speed = operation.was_at_speed if speed == BETWEEN else _is_at_speed(speed)
-    state = _state(speed, power, was_at_speed)
+    longest_ns = ns_from_s(limits.longest_gap_s)
+    if operation.last_ns is not None:
+        if time_ns <= operation.last_ns:
+            raise ValueError(f"reading at {time_ns} ns is not after {operation.last_ns} ns")
+        if time_ns - operation.last_ns > longest_ns:
+            operation = UNKNOWN_OPERATION
+    speed, power, was_at_speed = None, None, None
+    if state is None:
+        shares, rated = (limits.standing_below, limits.at_speed_above), limits.rated_speed_rpm
+        speed = _passed(speed_rpm, operation.speed_passed, shares, limits.speed_hysteresis, rated)
+        shares, rated = (limits.loaded_above, limits.full_load_above), limits.rated_power_mw
+        power = _passed(power_mw, operation.power_passed, shares, limits.power_hysteresis, rated)
+        is_at_speed = None if speed is None else speed[1]
+        was_at_speed = operation.was_at_speed if speed == BETWEEN else is_at_speed
+        state = _state(speed, power, was_at_speed)
+    else:
+        is_at_speed = None if state is OperatingState.UNKNOWN else state in STEADY
+    since_ns = operation.since_ns if state == operation.state else None
+    from_ns, to_ns = operation.at_speed_from_ns, operation.at_speed_to_ns
+    if is_at_speed:
+        lasts = to_ns is not None and time_ns - to_ns <= longest_ns
+        from_ns, to_ns = (from_ns if lasts else time_ns), time_ns
+    elif is_at_speed is not None:
+        from_ns, to_ns = None, None
     return Operation(
         state,
-        *_times(operation, time_ns, state, _is_at_speed(speed), limits),
+        since_ns=time_ns if since_ns is None else since_ns,
+        last_ns=time_ns,
+        at_speed_from_ns=from_ns,
+        at_speed_to_ns=to_ns,
         speed_passed=speed,
         power_passed=power,
         was_at_speed=was_at_speed,
     )
-
-
-def step_given_state(
-    operation: Operation, time_ns: int, state: OperatingState, limits: OperatingLimits
-) -> Operation:
-    """Update the operation with a state that a file of readings gives; raises as above."""
-    operation = _bridged(operation, time_ns, limits)
-    is_at_speed = None if state is OperatingState.UNKNOWN else state in STEADY
-    return Operation(state, *_times(operation, time_ns, state, is_at_speed, limits))
-
-
-def _bridged(operation: Operation, time_ns: int, limits: OperatingLimits) -> Operation:
-    """The operation before a reading; the initial one after a gap."""
-    last_ns = operation.last_ns
-    if last_ns is None:
-        return operation
-    if time_ns <= last_ns:
-        raise ValueError(f"reading at {time_ns} ns is not after {last_ns} ns")
-    return UNKNOWN_OPERATION if time_ns - last_ns > limits.longest_gap_ns else operation
-
-
-def _times(
-    operation: Operation,
-    now_ns: int,
-    state: OperatingState,
-    is_at_speed: bool | None,
-    limits: OperatingLimits,
-) -> tuple[int, int, int | None, int | None]:
-    """`since_ns`, `last_ns`, `at_speed_from_ns`, `at_speed_to_ns` after a reading.
-
-    A few readings without a speed do not end the stretch at rated speed.
-    """
-    lasts = state == operation.state and operation.since_ns is not None
-    since_ns = operation.since_ns if lasts and operation.since_ns is not None else now_ns
-    from_ns, to_ns = operation.at_speed_from_ns, operation.at_speed_to_ns
-    if is_at_speed is None:
-        return since_ns, now_ns, from_ns, to_ns
-    if not is_at_speed:
-        return since_ns, now_ns, None, None
-    lasts = to_ns is not None and now_ns - to_ns <= limits.longest_gap_ns
-    return since_ns, now_ns, (from_ns if lasts else now_ns), now_ns
 
 
 BETWEEN = (True, False)
@@ -265,20 +204,19 @@ BETWEEN = (True, False)
 def _passed(
     value: float,
     before: tuple[bool, bool] | None,
-    bands: tuple[Band, Band],
+    shares: tuple[float, float],
+    hysteresis: float,
+    rated: float,
 ) -> tuple[bool, bool] | None:
-    """Which of two limits are passed, each with its hysteresis."""
+    """Which of two limits are passed, each with its hysteresis; none where `before` is unknown."""
     if math.isnan(value):
         return None
     lower, upper = (
-        value >= (middle if before is None else low if before[index] else high)
-        for index, (low, middle, high) in enumerate(bands)
+        value
+        >= (share if was is None else share - hysteresis if was else share + hysteresis) * rated
+        for share, was in zip(shares, before or (None, None), strict=True)
     )
     return lower, upper
-
-
-def _is_at_speed(speed: tuple[bool, bool] | None) -> bool | None:
-    return None if speed is None else speed[1]
 
 
 def _state(
@@ -315,24 +253,18 @@ class OilSettling:
     levels: tuple[tuple[int, float], ...] = ()
     has_settled: bool = False
 
-    def step(
-        self, operation: Operation, oil_temperature_c: float, limits: OperatingLimits
-    ) -> "OilSettling":
+    def step(self, operation: Operation, oil_c: float, limits: OperatingLimits) -> "OilSettling":
         """Update with one temperature (NaN if missing), after that reading's operation step."""
         now_ns = operation.last_ns
         if now_ns is None or operation.at_speed_from_ns is None:
             return NOT_AT_SPEED
         if operation.at_speed_to_ns != now_ns:
             return self  # the speed is not known now
-        settling = self
-        if operation.at_speed_from_ns != self.stretch_ns:
-            settling = OilSettling(operation.at_speed_from_ns)
-        return settling._add(now_ns, oil_temperature_c, limits)
-
-    def _add(self, now_ns: int, oil_c: float, limits: OperatingLimits) -> "OilSettling":
-        if self.has_settled or math.isnan(oil_c):
-            return self
-        levels, span_ns = self.levels, limits.oil_settling_ns
+        is_new = operation.at_speed_from_ns != self.stretch_ns
+        settling = OilSettling(operation.at_speed_from_ns) if is_new else self
+        if settling.has_settled or math.isnan(oil_c):
+            return settling
+        levels, span_ns = settling.levels, ns_from_s(limits.oil_settling_s)
         if not levels or now_ns - levels[-1][0] >= span_ns // OIL_LEVELS:
             levels = (*levels, (now_ns, oil_c))
         while len(levels) > 1 and now_ns - levels[1][0] >= span_ns:
@@ -340,7 +272,7 @@ class OilSettling:
         seen_c = (oil_c, *(level_c for _, level_c in levels))
         is_near = max(seen_c) - min(seen_c) <= limits.oil_band_c
         has_settled = is_near and now_ns - levels[0][0] >= span_ns
-        return OilSettling(self.stretch_ns, levels, has_settled)
+        return OilSettling(settling.stretch_ns, levels, has_settled)
 
 
 NOT_AT_SPEED = OilSettling()

@@ -49,19 +49,10 @@ def position_results(
     )
     near, far = tuple(gaps.values())[:2], tuple(gaps.values())[2:]
     x, y = (probe_axis(bearing, near, far, axis) for axis in (0, 1))
-    centre = locate_shaft(x, y, bearing.clearance_um, bearing.gap_accuracy, last_growth)
-    readings = {
-        **gaps,
-        "gap_growth_um": centre.gap_growth_um,
-        "shaft_centre_x_um": centre.x_um,
-        "shaft_centre_y_um": centre.y_um,
-        "eccentricity_ratio": centre.eccentricity_ratio,
-        "attitude_angle_deg": centre.attitude_angle_deg,
-    }
-    names = {"x_um": "shaft_centre_x_um", "y_um": "shaft_centre_y_um"}
-    budgets = {names.get(key, key): budget for key, budget in centre.budgets.items()}
-    known = {name: b for name, b in budgets.items() if readings[name].value is not None}
-    return readings, {**gap_budgets, **known}
+    centre, centre_budgets = locate_shaft(
+        x, y, bearing.clearance_um, bearing.gap_accuracy, last_growth
+    )
+    return gaps | centre, gap_budgets | centre_budgets
 
 
 def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:

@@ -104,11 +104,6 @@ class GapAccuracy:
     growth_asymmetry_um: float = 10.0
     clearance: float = 0.05
 
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0.0 <= value < math.inf:
-                raise ValueError(f"{name} must be a half-width of zero or more, got {value}")
-
 
 @dataclass(frozen=True)
 class BearingAccuracy:
@@ -145,11 +140,6 @@ class BearingAccuracy:
     delay_s: float = 2e-4
     cross_coupling: float = 0.3
     probe_noise: float = 0.2
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not 0.0 <= value < 1.0:
-                raise ValueError(f"{name} must be a half-width from 0 to below 1, got {value}")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from core.monitor.overall_readings import polled_readings, recent_readings
 from core.quality import worst
 from core.samples.blocks import BlockMisfitError, SampleBlock
 from core.samples.gaps import Gap, Reach, SampleAccount, outage, restart
-from core.samples.ring import Ring
+from core.samples.ring import Ring, Window
 from core.spectra.polls import PollTransform
 from core.spectra.segments import Segment, SegmentTransform
 from core.stiffness.order_line import AMPLITUDES
@@ -216,20 +216,14 @@ class UnitMonitor:
             self._next_start = self._ring.contiguous_from
 
     def _write_to_ring(self, block: SampleBlock) -> None:
-        """Take a block in; all that is missing before it is a gap, lost or refused."""
-        epoch, n_missing = self._ring.epoch, self._ring.n_missing_before(block)
-        self._ring.write(block)
+        epoch, gap = self._ring.epoch, self._ring.write(block)
         if epoch is None:
             self._gaps += outage(self._reach, block) if self._reach else []
         elif epoch != block.epoch:
             lost = restart(self._reach, block) if self._reach else None
             self._gaps += [lost] if lost else []
-        if n_missing:
-            first_index = block.first_index - n_missing
-            estimated = any(rejection.is_estimated for rejection in block.rejected)
-            self._gaps.append(
-                Gap(block.epoch, first_index, n_missing, block.start_ns, is_estimated=estimated)
-            )
+        if gap is not None:
+            self._gaps.append(gap)
         if block.stop_index == self._ring.stop_index:
             self._reach = Reach(block.epoch, block.stop_index, block.stop_ns)
 
@@ -252,7 +246,7 @@ class UnitMonitor:
         while self._starts[0] <= start - n_samples:
             self._starts.popleft()
 
-    def _assess(self, bearing: Bearing, newest: Segment, window: SampleBlock) -> Assessment:
+    def _assess(self, bearing: Bearing, newest: Segment, window: Window) -> Assessment:
         transform, first_index = self._transform, self._transform.segments[0].first_index
         polled = transform.frequency_hz is None
         n_possible = 1 + (newest.first_index - self._first_start) // transform.hop_samples
@@ -307,7 +301,7 @@ class UnitMonitor:
         by_id = {c.id: n for n, c in enumerate(self.unit.channels)}
         return [by_id[id_] for id_ in bearing.channels]
 
-    def _orbit(self, bearing: Bearing, newest: Segment, window: SampleBlock) -> OrbitTrace | None:
+    def _orbit(self, bearing: Bearing, newest: Segment, window: Window) -> OrbitTrace | None:
         rows = self._rows(bearing)[:2]
         if newest.speed.rpm.value is None or not newest.usable[rows].all():
             return None

@@ -1,12 +1,24 @@
 """`SampleBlock`: what every adapter delivers and everything downstream consumes."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
+from functools import cached_property
 
-from core.arrays import SampleArray
+import numpy as np
+import numpy.typing as npt
+
+from core.arrays import FloatArray, RawArray, SampleArray
+from core.checks.channels import (
+    NOT_FINITE,
+    VERDICTS,
+    VerdictArray,
+    channel_verdicts,
+    worst_qualities,
+)
 from core.quality import Quality, Reading
-from core.units import ns_from_s
+from core.samples.calibration import UnitCalibration
+from core.units import NS_PER_S, ns_from_s
 
 UNCOUNTED_LOSS = "uncounted_loss"
 """Reason of the loss of samples that were not counted: their number follows from the time."""
@@ -69,65 +81,138 @@ class BlockMisfitError(ValueError):
     """A block does not fit the unit: it has another rate or other channels, or is another's."""
 
 
-@dataclass(frozen=True)
-class SampleBlock:
-    """Consecutive samples of all waveform channels of one unit.
+@dataclass(frozen=True, eq=False)
+class SideValues:
+    """What a device delivers beside its samples, for each cell of a block.
+
+    A cell is a run of samples with one verdict of the device on each channel, one time stamp and
+    one set of slow values.
 
     Parameters
     ----------
-    unit
-        Identifier of the generating unit.
+    starts : (n_cells,)
+        First sample of each cell, counted from that of the block: rising from 0.
+    start_ns : (n_cells,)
+        Time of that sample, UTC nanoseconds since 1970.
+    ok : (n_channels, n_cells)
+        The device's own verdict.
+    slow : (n_slow, n_cells)
+        Values of the slow channels; NaN where the device has none.
+    """
+
+    starts: npt.NDArray[np.int64]
+    start_ns: npt.NDArray[np.int64]
+    ok: npt.NDArray[np.bool_]
+    slow: FloatArray
+
+    @classmethod
+    def of(cls, start_ns: int, ok: Sequence[bool], slow: Sequence[float]) -> "SideValues":
+        """Values of a single cell."""
+        return cls(
+            starts=np.zeros(1, dtype=np.int64),
+            start_ns=np.array([start_ns], dtype=np.int64),
+            ok=np.array(ok, dtype=np.bool_)[:, np.newaxis],
+            slow=np.array(slow, dtype=np.float64)[:, np.newaxis],
+        )
+
+    @property
+    def n_cells(self) -> int:
+        """Cells of the block."""
+        return len(self.starts)
+
+    def within(self, start: int, stop: int, rate_hz: float) -> "SideValues":
+        """Values of the samples from one up to before another, with their own first cell."""
+        first = int(np.searchsorted(self.starts, start, side="right")) - 1
+        cells = slice(first, max(first + 1, int(np.searchsorted(self.starts, stop))))
+        starts, start_ns = self.starts[cells] - start, self.start_ns[cells].copy()
+        start_ns[0] += ns_from_s(-int(starts[0]) / rate_hz)
+        starts[0] = 0
+        return SideValues(starts, start_ns, self.ok[:, cells], self.slow[:, cells])
+
+
+@dataclass(frozen=True, eq=False)
+class SampleBlock:
+    """Consecutive samples of all waveform channels of one unit, as its device delivers them.
+
+    Parameters
+    ----------
+    calibration
+        Unit, rate, and how counts become engineering units; shared by all blocks of a source.
     epoch
         Changes when the device restarts its sample count.
     first_index
         Index of the first sample in this epoch, never wrapping.
-    start_ns
-        Time of the first sample, UTC nanoseconds since 1970.
-    rate_hz
-        Samples per second and channel.
-    samples
-        (n_channels, n_samples) in the engineering unit of each channel.
-    channel_quality
-        One for each channel, valid for the whole block.
-    slow
-        Slowly changing readings that belong to the time of the block, by slow channel.
+    counts
+        (n_channels, n_samples) int16 counts of the converter; or, from a device that has none,
+        float32 engineering units, not a number where the device has no sample.
+    side
+        Time stamps, the device's verdicts and slow values.
     rejected
         What was refused between the previous block and this one; the rest of a jump in
         ``first_index`` is a gap.
     clock
         How the device's clock stands against the host's; None if there is no such clock.
     stamp_fault
-        Why the device's own time stamp was not used: ``start_ns`` then follows from the index.
+        Why one of the device's own time stamps was not used: it then follows from the index.
     sampled_s
         When the device had its last sample, by the steady clock of the host that has read it, as
         far as that is known; None if it comes from no device. Ages are counted from here: what
         a device, a link or a queue has held back is not new when it comes.
+    elsewhere
+        Readings of slow channels that another device measures.
     """
 
-    unit: str
+    calibration: UnitCalibration
     epoch: int
     first_index: int
-    start_ns: int
-    rate_hz: float
-    samples: SampleArray
-    channel_quality: tuple[Quality, ...]
-    slow: Mapping[str, Reading] = field(default_factory=dict)
+    counts: RawArray
+    side: SideValues
     rejected: tuple[Rejection, ...] = ()
     clock: DeviceClock | None = None
     stamp_fault: StampFault | None = None
     sampled_s: float | None = None
+    elsewhere: Mapping[str, Reading] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.samples.ndim != 2 or len(self.channel_quality) != self.samples.shape[0]:
+        n_channels, n_slow = len(self.calibration.channels), len(self.calibration.slow)
+        side, n_cells = self.side, self.side.n_cells
+        expected = (n_channels, n_channels, n_cells, n_slow, n_cells)
+        if self.counts.ndim != 2 or expected != (
+            len(self.counts),
+            *side.ok.shape,
+            *side.slow.shape,
+        ):
             raise ValueError(
-                f"samples of shape {self.samples.shape} need a quality per channel,"
-                f" got {len(self.channel_quality)}"
+                f"samples of shape {self.counts.shape} with verdicts of {side.ok.shape} and slow"
+                f" values of {side.slow.shape}, calibrated are {n_channels} channels and {n_slow}"
             )
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both hold the same, bit for bit."""
+        if not isinstance(other, SampleBlock):
+            return NotImplemented
+        return self._content == other._content
+
+    @property
+    def _content(self) -> tuple[object, ...]:
+        arrays = (self.counts, *(getattr(self.side, each.name) for each in fields(self.side)))
+        rest = [getattr(self, f.name) for f in fields(self) if f.name not in ("counts", "side")]
+        return (*rest, *((a.dtype, a.shape, a.tobytes()) for a in arrays))
+
+    @property
+    def unit(self) -> str:
+        """Identifier of the generating unit."""
+        return self.calibration.unit
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples per second and channel."""
+        return self.calibration.rate_hz
 
     @property
     def n_samples(self) -> int:
         """Samples per channel."""
-        return int(self.samples.shape[1])
+        return int(self.counts.shape[1])
 
     @property
     def stop_index(self) -> int:
@@ -135,9 +220,55 @@ class SampleBlock:
         return self.first_index + self.n_samples
 
     @property
+    def start_ns(self) -> int:
+        """Time of the first sample, UTC nanoseconds since 1970."""
+        return int(self.side.start_ns[0])
+
+    @property
     def stop_ns(self) -> int:
         """Time of the first sample after the block."""
-        return self.start_ns + ns_from_s(self.n_samples / self.rate_hz)
+        n_last = self.n_samples - int(self.side.starts[-1])
+        return int(self.side.start_ns[-1]) + ns_from_s(n_last / self.rate_hz)
+
+    @cached_property
+    def verdicts(self) -> VerdictArray:
+        """(n_channels, n_cells) quality of each channel in each cell."""
+        if not self.n_samples:
+            return np.zeros(self.side.ok.shape, dtype=np.uint8)
+        limits = self.calibration.limits
+        return channel_verdicts(self.counts, self.side.starts, self.side.ok, limits)
+
+    @cached_property
+    def channel_quality(self) -> tuple[Quality, ...]:
+        """Quality of each channel throughout the block."""
+        return worst_qualities(self.verdicts)
+
+    def cell_qualities(self) -> Iterator[tuple[tuple[Quality, ...], int]]:
+        """Quality of each channel in each cell, and the time of the first sample after the cell."""
+        lengths = np.diff(self.side.starts, append=self.n_samples)
+        stops_ns = self.side.start_ns + np.rint(lengths / self.rate_hz * NS_PER_S).astype(np.int64)
+        for verdicts, stop_ns in zip(self.verdicts.T.tolist(), stops_ns.tolist(), strict=True):
+            yield tuple(VERDICTS[verdict] for verdict in verdicts), stop_ns
+
+    @cached_property
+    def samples(self) -> SampleArray:
+        """(n_channels, n_samples) in the engineering unit of each channel.
+
+        A channel with a sample that is not finite is zero in that cell: one NaN would blind a whole
+        spectrum, and the channel is bad there.
+        """
+        found = self.calibration.to_units(self.counts)
+        is_blank = self.verdicts == NOT_FINITE
+        if found is not self.counts or not is_blank.any():
+            return found
+        lengths = np.diff(self.side.starts, append=self.n_samples)
+        return np.where(np.repeat(is_blank, lengths, axis=1), np.float32(0.0), found)
+
+    @cached_property
+    def slow(self) -> Mapping[str, Reading]:
+        """Newest reading of each slow channel."""
+        newest = zip(self.calibration.slow, self.side.slow[:, -1].tolist(), strict=True)
+        return {c.id: c.reading(value) for c, value in newest} | dict(self.elsewhere)
 
     def from_sample(self, start: int, stop: int | None = None) -> "SampleBlock":
         """Return a part of the block, counted from its own start; what was rejected stays in front.
@@ -147,12 +278,36 @@ class SampleBlock:
         ValueError
             If the part begins outside the block.
         """
+        stop = self.n_samples if stop is None else min(stop, self.n_samples)
         if not 0 <= start <= self.n_samples:
             raise ValueError(f"part from sample {start} of a block of {self.n_samples}")
+        if (start, stop) == (0, self.n_samples):
+            return self
         return replace(
             self,
             first_index=self.first_index + start,
-            start_ns=self.start_ns + ns_from_s(start / self.rate_hz),
-            samples=self.samples[:, start:stop],
+            counts=self.counts[:, start:stop],
+            side=self.side.within(start, stop, self.rate_hz),
             rejected=() if start else self.rejected,
         )
+
+
+def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:
+    """Consecutive blocks as one, with the clock of the last and the first fault of a stamp."""
+    first, last = blocks[0], blocks[-1]
+    if first is last:
+        return first
+    sides = [block.side for block in blocks]
+    return replace(
+        last,
+        first_index=first.first_index,
+        counts=np.concatenate([block.counts for block in blocks], axis=1),
+        side=SideValues(
+            np.concatenate([b.side.starts + (b.first_index - first.first_index) for b in blocks]),
+            np.concatenate([side.start_ns for side in sides]),
+            np.concatenate([side.ok for side in sides], axis=1),
+            np.concatenate([side.slow for side in sides], axis=1),
+        ),
+        rejected=first.rejected,
+        stamp_fault=next((b.stamp_fault for b in blocks if b.stamp_fault), None),
+    )

@@ -4,7 +4,7 @@ Where a device goes on counting, what is missing is counted by its index and exa
 anew, only times are left: the number of missing samples is estimated from them and marked so.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from core.samples.axis import RECOUNTED_EPOCHS, ClockTolerance
@@ -45,7 +45,7 @@ class SampleAccount:
     Parameters
     ----------
     n_flagged
-        Held like the stored ones, but at least one channel of their block was not good.
+        Held like the stored ones, but at least one channel was not good with them.
     n_repeated
         Offered a second time and dropped; not part of the balance.
     n_restarts
@@ -65,22 +65,26 @@ class SampleAccount:
         """What the device has counted."""
         return self.n_stored + self.n_flagged + self.n_gap + sum(self.rejected.values())
 
-    def with_taken(self, n_samples: int, n_repeated: int, *, good: bool) -> "SampleAccount":
-        """Add the samples of one block."""
+    def with_taken(self, n_samples: int, n_flagged: int, n_repeated: int) -> "SampleAccount":
+        """Add the samples of one block; so many of them have a channel that is not good."""
         return replace(
             self,
-            n_stored=self.n_stored + (n_samples if good else 0),
-            n_flagged=self.n_flagged + (0 if good else n_samples),
+            n_stored=self.n_stored + n_samples - n_flagged,
+            n_flagged=self.n_flagged + n_flagged,
             n_repeated=self.n_repeated + n_repeated,
         )
 
-    def with_lost(self, gap: Gap | None, rejections: tuple[Rejection, ...]) -> "SampleAccount":
-        """Add what is missing before a block."""
+    def with_missing(self, n_missing: int, rejections: Iterable[Rejection]) -> "SampleAccount":
+        """Add what is missing before a block; what was rejected beyond that was offered before."""
+        if not n_missing:
+            return self
         rejected = dict(self.rejected)
         for rejection in rejections:
-            rejected[rejection.reason] = rejected.get(rejection.reason, 0) + rejection.n_samples
-        n_gap = self.n_gap + (gap.n_samples if gap else 0)
-        return replace(self, n_gap=n_gap, rejected=rejected)
+            n_rejected = max(0, min(rejection.n_samples, n_missing))
+            n_missing -= n_rejected
+            if n_rejected:
+                rejected[rejection.reason] = rejected.get(rejection.reason, 0) + n_rejected
+        return replace(self, n_gap=self.n_gap + n_missing, rejected=rejected)
 
 
 @dataclass(frozen=True)

@@ -1,57 +1,119 @@
 """Ring of the newest samples of one unit, with an account of those that it does not hold."""
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 
-from core.quality import NOT_MEASURED, Level, Quality, Reading, mean_reading, worst
-from core.samples.blocks import BlockMisfitError, Rejection, SampleBlock
+from core.arrays import SampleArray
+from core.checks.channels import worst_qualities
+from core.quality import NOT_MEASURED, Quality, Reading, mean_reading
+from core.samples.blocks import BlockMisfitError, SampleBlock
 from core.samples.gaps import Gap, SampleAccount, n_missed
 from core.units import ns_from_s
 
 
 @dataclass(frozen=True)
-class _Stretch:
-    """All of a block but its samples, which lie in the ring."""
+class Window:
+    """Consecutive samples of one epoch in engineering units.
 
+    Parameters
+    ----------
+    start_ns
+        Time of the first sample.
+    samples
+        (n_channels, n_samples) in the engineering unit of each channel.
+    channel_quality
+        Of each channel, the worst within the window.
+    slow
+        Mean of each slow channel.
+    """
+
+    unit: str
+    epoch: int
     first_index: int
-    stop_index: int
     start_ns: int
     rate_hz: float
+    samples: SampleArray
     channel_quality: tuple[Quality, ...]
-    slow: Mapping[str, Reading]
+    slow: Mapping[str, Reading] = field(default_factory=dict)
 
-    def overlaps(self, first_index: int, stop_index: int) -> bool:
-        return self.n_within(first_index, stop_index) > 0
+    @property
+    def n_samples(self) -> int:
+        """Samples per channel."""
+        return int(self.samples.shape[1])
 
-    def n_within(self, first_index: int, stop_index: int) -> int:
-        return min(self.stop_index, stop_index) - max(self.first_index, first_index)
+    @property
+    def stop_index(self) -> int:
+        """Index of the first sample after the window."""
+        return self.first_index + self.n_samples
+
+    @property
+    def stop_ns(self) -> int:
+        """Time of the first sample after the window."""
+        return self.start_ns + ns_from_s(self.n_samples / self.rate_hz)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Cells of a block that lie within a window, if only in part.
+
+    Parameters
+    ----------
+    weights : (n_cells,)
+        Samples of each cell within the window.
+    """
+
+    block: SampleBlock
+    cells: slice
+    samples: slice
+    weights: npt.NDArray[np.int64]
+
+    @classmethod
+    def of(cls, block: SampleBlock, first_index: int, stop_index: int) -> "_Part":
+        start = max(0, first_index - block.first_index)
+        stop = min(block.n_samples, stop_index - block.first_index)
+        starts = block.side.starts
+        first = int(np.searchsorted(starts, start, side="right")) - 1
+        cells = slice(first, int(np.searchsorted(starts, stop)))
+        edges = np.append(starts[cells], stop)
+        edges[0] = start
+        return cls(block, cells, slice(start, stop), np.diff(edges))
+
+    def readings(self, slow_channel: str) -> list[Reading]:
+        """Of a slow channel, one for each cell."""
+        block, n_cells = self.block, len(self.weights)
+        if slow_channel in block.elsewhere:
+            return [block.elsewhere[slow_channel]] * n_cells
+        if slow_channel not in block.calibration.slow_ids:
+            return [NOT_MEASURED] * n_cells
+        row = block.calibration.slow_ids.index(slow_channel)
+        channel = block.calibration.slow[row]
+        return [channel.reading(value) for value in block.side.slow[row, self.cells].tolist()]
 
 
 class Ring:
-    """Samples addressed by their index; the newest ``capacity`` of one epoch.
+    """The newest blocks of one epoch; samples are addressed by their index.
 
     Parameters
     ----------
     capacity
-        Samples per channel.
+        Samples per channel that are held.
     """
 
     def __init__(self, n_channels: int, capacity: int) -> None:
-        self._samples = np.full((n_channels, capacity), np.nan, dtype=np.float32)
-        self._capacity = capacity
-        self._stretches: deque[_Stretch] = deque()
+        self._n_channels, self._capacity = n_channels, capacity
+        self._blocks: deque[SampleBlock] = deque()
         self.contiguous_from = 0
-        self._unit = ""
         self.epoch: int | None = None
         self.stop_index = 0
         self._stop_ns = 0
         self.account = SampleAccount()
 
     def write(self, block: SampleBlock) -> Gap | None:
-        """Take a block in; return the gap before it, if there is one.
+        """Take a block in; return the gap before it, lost or rejected, if there is one.
 
         Samples that were already taken are dropped and counted, never joined on again; so are
         rejected ones, as far as they are more than the jump in the index.
@@ -62,33 +124,30 @@ class Ring:
             As `require` does.
         """
         self.require(block)
-        self._unit = block.unit
         if self.epoch is None:  # what came before padwatch looked was not offered to it
             self.epoch, self.stop_index = block.epoch, block.first_index
             self.contiguous_from = block.first_index
-        n_missing = self.n_missing_before(block)
-        rejected = tuple(_within(block.rejected, n_missing))
-        n_gap = n_missing - sum(rejection.n_samples for rejection in rejected)
-        gap = _gap(block, n_missing, n_gap) if n_gap else None
-        self.account = self.account.with_lost(gap, rejected)
+        n_missing = self._n_missing_before(block)
+        self.account = self.account.with_missing(n_missing, block.rejected)
         if block.epoch != self.epoch:
             self._start_epoch(block.epoch)
         if block.first_index > self.stop_index:
             self.contiguous_from = self.stop_index = block.first_index
         self._take(block)
-        return gap
+        if not n_missing:
+            return None
+        first_index = block.first_index - n_missing
+        is_estimated = any(rejection.is_estimated for rejection in block.rejected)
+        return Gap(block.epoch, first_index, n_missing, block.start_ns, is_estimated=is_estimated)
 
     def require(self, block: SampleBlock) -> None:
         """Refuse a block of another number of channels, with a `BlockMisfitError`."""
-        if block.samples.shape[0] != self._samples.shape[0]:
+        if len(block.counts) != self._n_channels:
             raise BlockMisfitError(
-                f"{block.samples.shape[0]} channels offered to a ring of {self._samples.shape[0]}"
+                f"{len(block.counts)} channels offered to a ring of {self._n_channels}"
             )
 
-    def n_missing_before(self, block: SampleBlock) -> int:
-        """Number of samples missing before this block, lost or rejected."""
-        if self.epoch is None:
-            return 0
+    def _n_missing_before(self, block: SampleBlock) -> int:
         if block.epoch != self.epoch:
             return n_missed(self._stop_ns, block)
         return max(block.first_index - self.stop_index, 0)
@@ -98,8 +157,8 @@ class Ring:
         oldest = max(self.contiguous_from, self.stop_index - self._capacity)
         return oldest <= first_index <= stop_index <= self.stop_index
 
-    def read(self, first_index: int, stop_index: int) -> SampleBlock:
-        """Copy a stretch of consecutive samples.
+    def read(self, first_index: int, stop_index: int) -> Window:
+        """Calibrate a stretch of consecutive samples.
 
         Each channel has its worst quality within the stretch, each slow channel its mean.
 
@@ -110,66 +169,66 @@ class Ring:
         """
         if first_index == stop_index or not self.holds(first_index, stop_index):
             raise LookupError(f"samples {first_index} to {stop_index} are not in the ring")
-        where = np.arange(first_index, stop_index) % self._capacity
-        stretches = [s for s in self._stretches if s.overlaps(first_index, stop_index)]
-        n_samples = [s.n_within(first_index, stop_index) for s in stretches]
-        reference = stretches[0]
-        offset_s = (first_index - reference.first_index) / reference.rate_hz
-        return SampleBlock(
-            unit=self._unit,
-            epoch=self.epoch or 0,
+        parts = [
+            _Part.of(block, first_index, stop_index)
+            for block in self._blocks
+            if block.first_index < stop_index and block.stop_index > first_index
+        ]
+        block, cell = parts[0].block, parts[0].cells.start
+        n_before = first_index - block.first_index - int(block.side.starts[cell])
+        verdicts = np.concatenate([p.block.verdicts[:, p.cells] for p in parts], axis=1)
+        return Window(
+            unit=block.unit,
+            epoch=block.epoch,
             first_index=first_index,
-            start_ns=reference.start_ns + ns_from_s(offset_s),
-            rate_hz=reference.rate_hz,
-            samples=self._samples[:, where],
-            channel_quality=tuple(
-                worst(qualities)
-                for qualities in zip(*(s.channel_quality for s in stretches), strict=True)
-            ),
-            slow={
-                id_: mean_reading([s.slow.get(id_, NOT_MEASURED) for s in stretches], n_samples)
-                for id_ in reference.slow
-            },
+            start_ns=int(block.side.start_ns[cell]) + ns_from_s(n_before / block.rate_hz),
+            rate_hz=block.rate_hz,
+            samples=_units(parts),
+            channel_quality=worst_qualities(verdicts),
+            slow=_slow_means(parts),
         )
 
     def _start_epoch(self, epoch: int) -> None:
-        self._stretches.clear()
+        self._blocks.clear()
         self.epoch, self.stop_index, self.contiguous_from = epoch, 0, 0
         self.account = replace(self.account, n_restarts=self.account.n_restarts + 1)
 
     def _take(self, block: SampleBlock) -> None:
         n_repeated = min(self.stop_index - block.first_index, block.n_samples)
         fresh = block.from_sample(n_repeated)
-        good = all(quality.level is Level.GOOD for quality in block.channel_quality)
-        self.account = self.account.with_taken(fresh.n_samples, n_repeated, good=good)
+        lengths = np.diff(fresh.side.starts, append=fresh.n_samples)
+        n_flagged = int(lengths[fresh.verdicts.any(axis=0)].sum())
+        self.account = self.account.with_taken(fresh.n_samples, n_flagged, n_repeated)
         if fresh.n_samples == 0:
             return
-        newest = fresh.samples[:, -self._capacity :]
-        where = np.arange(fresh.stop_index - newest.shape[1], fresh.stop_index) % self._capacity
-        self._samples[:, where] = newest
-        self._stretches.append(
-            _Stretch(
-                first_index=fresh.first_index,
-                stop_index=fresh.stop_index,
-                start_ns=fresh.start_ns,
-                rate_hz=fresh.rate_hz,
-                channel_quality=fresh.channel_quality,
-                slow=fresh.slow,
-            )
-        )
+        self._blocks.append(fresh)
         self.stop_index, self._stop_ns = fresh.stop_index, fresh.stop_ns
-        while self._stretches[0].stop_index <= self.stop_index - self._capacity:
-            self._stretches.popleft()
+        while self._blocks[0].stop_index <= self.stop_index - self._capacity:
+            self._blocks.popleft()
 
 
-def _within(rejected: Iterable[Rejection], n_most: int) -> Iterator[Rejection]:
-    """What of these samples can have been offered in a jump; the rest was offered before."""
-    for rejection in rejected:
-        n_samples = max(0, min(rejection.n_samples, n_most))
-        n_most -= n_samples
-        if n_samples:
-            yield replace(rejection, n_samples=n_samples)
+def _units(parts: Sequence[_Part]) -> SampleArray:
+    """(n_channels, n_samples) in engineering units, of consecutive parts."""
+    calibration = parts[0].block.calibration
+    if all(
+        part.block.calibration is calibration and part.block.counts.dtype == np.int16
+        for part in parts
+    ):
+        counts = np.concatenate([part.block.counts[:, part.samples] for part in parts], axis=1)
+        return calibration.to_units(counts)
+    return np.concatenate([part.block.samples[:, part.samples] for part in parts], axis=1)
 
 
-def _gap(block: SampleBlock, n_missing: int, n_samples: int) -> Gap:
-    return Gap(block.epoch, block.first_index - n_missing, n_samples, block.start_ns)
+def _slow_means(parts: Sequence[_Part]) -> dict[str, Reading]:
+    """Mean of each slow channel, each value for the samples of its cell."""
+    first = parts[0].block
+    weights = np.concatenate([part.weights for part in parts])
+    are_alike = all(part.block.calibration is first.calibration for part in parts)
+    found = {}
+    for row, channel in enumerate(first.calibration.slow if are_alike else ()):
+        values = np.concatenate([part.block.side.slow[row, part.cells] for part in parts])
+        found[channel.id] = channel.mean(values, weights)
+    for id_ in first.elsewhere if are_alike else first.slow:
+        readings = [reading for part in parts for reading in part.readings(id_)]
+        found[id_] = mean_reading(readings, weights.tolist())
+    return found

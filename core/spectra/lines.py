@@ -75,6 +75,14 @@ def hann(n_samples: int) -> FloatArray:
     return taper
 
 
+@lru_cache(maxsize=8)
+def taper_weights(n_samples: int) -> FloatArray:
+    """The same, scaled so that a line reads 0-to-peak."""
+    weights: FloatArray = 2.0 * hann(n_samples) / hann(n_samples).sum()
+    weights.setflags(write=False)
+    return weights
+
+
 def tapered(samples: SampleArray | FloatArray) -> FloatArray:
     """Remove each channel's mean and apply the taper, scaled so that a line reads 0-to-peak.
 
@@ -88,8 +96,7 @@ def tapered(samples: SampleArray | FloatArray) -> FloatArray:
     """
     centred = np.asarray(samples, dtype=np.float64)
     centred = centred - centred.mean(axis=1, keepdims=True)
-    taper = hann(centred.shape[1])
-    weighted: FloatArray = centred * (2.0 * taper / taper.sum())
+    weighted: FloatArray = centred * taper_weights(centred.shape[1])
     return weighted
 
 
@@ -151,8 +158,7 @@ def line_phasors(tapered_samples: FloatArray, factors: ComplexArray) -> ComplexA
 
 def part_phasors(samples: FloatArray, factors: ComplexArray) -> ComplexArray:
     """The same of samples that are not tapered, (n_channels, n_lines), without a copy of them."""
-    taper = hann(samples.shape[1])
-    weighted = factors * (2.0 * taper / taper.sum())[:, np.newaxis]
+    weighted = factors * taper_weights(samples.shape[1])[:, np.newaxis]
     of_mean = samples.mean(axis=1, keepdims=True) * weighted.sum(axis=0)
     phasors: ComplexArray = line_phasors(samples, weighted) - of_mean
     return phasors

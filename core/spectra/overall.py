@@ -80,13 +80,15 @@ class OverallTransform:
         # of real and imaginary parts in turn
         self._power_factor = np.repeat(factor, 2, axis=1)
 
-    def of(self, samples: FloatArray, phasors: ComplexArray) -> Overall:
+    def of(self, samples: FloatArray, centred: FloatArray, phasors: ComplexArray) -> Overall:
         """Broad-band vibration of a segment.
 
         Parameters
         ----------
         samples : (n_channels, n_samples)
             As measured, finite.
+        centred : (n_channels, n_samples)
+            The same without the mean of each channel.
         phasors : (n_channels, n_lines)
             At all bins above zero, in the channels' own units.
         """
@@ -94,15 +96,15 @@ class OverallTransform:
         parts = phasors[:, self._band].view(np.float64)
         power = np.einsum("ij,ij->i", parts * parts, self._power_factor)
         power /= 2.0 * NOISE_BANDWIDTH_BINS
-        return Overall(span, self._orbits(samples), np.sqrt(power))
+        return Overall(span, self._orbits(centred), np.sqrt(power))
 
-    def _orbits(self, samples: FloatArray) -> FloatArray:
-        return np.array([self._orbit(samples, rows) for rows in self._shafts])
+    def _orbits(self, centred: FloatArray) -> FloatArray:
+        return np.array([self._orbit(centred, rows) for rows in self._shafts])
 
-    def _orbit(self, samples: FloatArray, rows: Sequence[int]) -> float:
+    def _orbit(self, centred: FloatArray, rows: Sequence[int]) -> float:
         if not self._is_displacement[rows].all():
             return float("nan")
-        x, y = (samples[row] - samples[row].mean() for row in rows)
+        x, y = centred[rows]
         return math.sqrt(float((x * x + y * y).max()))
 
 

@@ -6,6 +6,7 @@ where the reading leads the key-phase, gaps in micrometres. Each row has its own
 temperatures are slow channels, as ever.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -13,11 +14,11 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import ComplexArray, FloatArray, SampleArray
+from core.arrays import ComplexArray, FloatArray
 from core.machine.channel import displacement_factor
 from core.machine.unit import Unit
 from core.quality import Level, Quality, Reason, bad
-from core.samples.blocks import SampleBlock
+from core.samples.ring import Window
 from core.spectra.lines import SegmentSettings
 from core.spectra.runout import runout_verdict
 from core.spectra.segments import ORDER1, VORTEX, KeptSegments, Segment
@@ -69,24 +70,15 @@ class PollSettings:
     n_polls
         Polls in the averaging window; 60 of 5 s are five minutes.
     hop_polls
-        Polls from one result to the next, after which limits of vibration are judged.
+        Polls from one result to the next, up to `n_polls`, after which limits of vibration are
+        judged.
     min_polls
-        Polls with a changed vector below which a result is uncertain; at least 2.
+        Polls with a changed vector below which a result is uncertain; at least 2, up to `n_polls`.
     """
 
     n_polls: int = 60
     hop_polls: int = 4
     min_polls: int = 4
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.hop_polls <= self.n_polls:
-            raise ValueError(
-                f"a result comes every 1 to {self.n_polls} polls, got {self.hop_polls}"
-            )
-        if not 2 <= self.min_polls <= self.n_polls:
-            raise ValueError(
-                f"a window of {self.n_polls} has 2 polls or more, got {self.min_polls}"
-            )
 
 
 class PollTransform(KeptSegments):
@@ -133,21 +125,25 @@ class PollTransform(KeptSegments):
             for c in unit.channels
         }
 
-    def add(self, window: SampleBlock) -> Segment:
+    def add(self, window: Window) -> Segment:
         """Read the one sample of a window, and keep it as a segment."""
-        sample, qualities = window.samples[:, 0], window.channel_quality
         speed = running_speed(self._unit, window.slow, _NO_LINES, _NO_LINES, self._settings)
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
         order_hz = turn_hz * np.array([1.0, self._settings.vortex_order])
-        amplitude, quality = self._amplitudes(sample, qualities)
-        angle_rad, has_phase = self._phases(sample, qualities)
+        of_line = [
+            self._of_channels(part, window, least=0.0)
+            for part in (VectorPart.ORDER1_AMPLITUDE, VectorPart.VORTEX_AMPLITUDE)
+        ]
+        amplitude = np.stack([values for values, _ in of_line], axis=1)
+        quality = of_line[ORDER1][1], of_line[VORTEX][1]
+        angle_deg, angle_quality = self._of_channels(VectorPart.ORDER1_PHASE, window)
+        has_phase = _usable(angle_quality)
         factor = np.array([displacement_factor(c, order_hz) for c in self._unit.channels])
         # without a phase the factor's own angle would pass for one
         turned: ComplexArray = np.where(has_phase[:, np.newaxis], factor, np.abs(factor))
         phasors: ComplexArray = amplitude * turned
-        phasors[:, ORDER1] *= np.exp(1j * angle_rad)
-        gaps = [self._row_of(c.id, VectorPart.GAP, sample, qualities) for c in self._unit.channels]
-        gap_quality = tuple(quality for _, quality in gaps)
+        phasors[:, ORDER1] *= np.exp(1j * np.deg2rad(angle_deg))
+        gap_um, gap_quality = self._of_channels(VectorPart.GAP, window)
         return self.keep(
             Segment(
                 epoch=window.epoch,
@@ -157,7 +153,7 @@ class PollTransform(KeptSegments):
                 channel_quality=gap_quality,
                 usable=_usable(gap_quality),
                 slow=window.slow,
-                mean=np.array([gap_um for gap_um, _ in gaps]),
+                mean=gap_um,
                 speed=speed,
                 bin_phasors_um_pk=None,
                 order_frequency_hz=order_hz,
@@ -169,51 +165,31 @@ class PollTransform(KeptSegments):
                 at_mark_um_pk=phasors[:, ORDER1],
                 runout=self._runout,
                 overall=None,
-                clipped_share=np.zeros(len(gaps)),
+                clipped_share=np.zeros(gap_um.size),
                 recent=None,
             )
         )
 
+    def _of_channels(
+        self, part: VectorPart, window: Window, least: float = -math.inf
+    ) -> tuple[FloatArray, tuple[Quality, ...]]:
+        """Values of a part, (n_channels,), zero where not usable, and their qualities."""
+        found = [self._row_of(channel.id, part, window, least) for channel in self._unit.channels]
+        return np.array([value for value, _ in found]), tuple(quality for _, quality in found)
+
     def _row_of(
-        self, channel: str, part: VectorPart, sample: SampleArray, qualities: Sequence[Quality]
+        self, channel: str, part: VectorPart, window: Window, least: float
     ) -> tuple[float, Quality]:
         row = self._row.get((channel, part))
         if row is None:
             return 0.0, NOT_GIVEN
-        value, quality = float(sample[row]), qualities[row]
+        value, quality = float(window.samples[row, 0]), window.channel_quality[row]
         if quality.level is not Level.GOOD:
             return 0.0, bad(quality.reason)  # a rack's gap is a mean already
-        return (value, quality) if np.isfinite(value) else (0.0, bad(Reason.NOT_FINITE))
-
-    def _amplitudes(
-        self, sample: SampleArray, qualities: Sequence[Quality]
-    ) -> tuple[FloatArray, tuple[tuple[Quality, ...], tuple[Quality, ...]]]:
-        """(n_channels, 2) amplitudes in the channels' units, and their qualities by line."""
-        found = [
-            tuple(
-                _not_below_zero(*self._row_of(channel.id, part, sample, qualities))
-                for part in (VectorPart.ORDER1_AMPLITUDE, VectorPart.VORTEX_AMPLITUDE)
-            )
-            for channel in self._unit.channels
-        ]
-        amplitude = np.array([[value for value, _ in pair] for pair in found])
-        order1, vortex = (tuple(pair[n][1] for pair in found) for n in (ORDER1, VORTEX))
-        return amplitude, (order1, vortex)
-
-    def _phases(
-        self, sample: SampleArray, qualities: Sequence[Quality]
-    ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        found = [
-            self._row_of(channel.id, VectorPart.ORDER1_PHASE, sample, qualities)
-            for channel in self._unit.channels
-        ]
-        known = np.array([quality.level is not Level.BAD for _, quality in found])
-        return np.deg2rad([angle for angle, _ in found]), known
+        if not math.isfinite(value):
+            return 0.0, bad(Reason.NOT_FINITE)
+        return (value, quality) if value >= least else (0.0, bad(Reason.OUT_OF_RANGE))
 
 
 def _usable(qualities: Sequence[Quality]) -> npt.NDArray[np.bool_]:
     return np.array([quality.level is not Level.BAD for quality in qualities])
-
-
-def _not_below_zero(amplitude: float, quality: Quality) -> tuple[float, Quality]:
-    return (amplitude, quality) if amplitude >= 0.0 else (0.0, bad(Reason.OUT_OF_RANGE))

@@ -6,7 +6,6 @@ taken off at speed only by a phase that both have in common: that of a mark on t
 
 import cmath
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 
 from core.arrays import ComplexArray
@@ -26,21 +25,13 @@ class RunoutVerdict(StrEnum):
     NO_PHASE_REFERENCE = "no_phase_reference"
 
 
-@dataclass(frozen=True)
-class CompensatedLine:
-    """A 1× phasor with or without runout, and which of the two it is."""
-
-    phasor_um_pk: complex
-    verdict: RunoutVerdict
-
-
 def take_off_runout(
     phasor_um_pk: complex,
     vector: SlowRollVector | None,
     probe: str,
     rated_speed_rpm: float,
     shaft_angle_rad: float | None,
-) -> CompensatedLine:
+) -> tuple[complex, RunoutVerdict]:
     """Take the slow-roll vector off a probe's 1× phasor; leave it as it is where that is no use.
 
     Only for 1×: nothing is known of the surface at other orders, and the vortex has no runout.
@@ -57,9 +48,9 @@ def take_off_runout(
     """
     verdict = runout_verdict(vector, probe, rated_speed_rpm, shaft_angle_rad is not None)
     if vector is None or shaft_angle_rad is None or verdict is not RunoutVerdict.APPLIED:
-        return CompensatedLine(phasor_um_pk, verdict)
+        return phasor_um_pk, verdict
     surface = vector.phasor_um_pk * cmath.exp(1j * shaft_angle_rad)
-    return CompensatedLine(phasor_um_pk - surface, verdict)
+    return phasor_um_pk - surface, verdict
 
 
 def runout_verdict(
@@ -101,14 +92,13 @@ def without_runout(
     cleaned, verdicts = order1_um_pk.copy(), {}
     for row in rows:
         channel = unit.channels[row]
-        line = take_off_runout(
+        cleaned[row], verdicts[channel.id] = take_off_runout(
             complex(order1_um_pk[row]),
             channel.slow_roll,
             channel.probe,
             unit.rated_speed_rpm,
             angle_rad,
         )
-        cleaned[row], verdicts[channel.id] = line.phasor_um_pk, line.verdict
     return cleaned, verdicts
 
 

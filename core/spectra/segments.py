@@ -22,14 +22,14 @@ from core.checks.sensor_checks import (
 from core.machine.channel import Channel, displacement_factor
 from core.machine.unit import Unit
 from core.quality import GOOD, Level, Quality, Reading, Reason, bad, missing, uncertain, worst
-from core.samples.blocks import SampleBlock
+from core.samples.ring import Window
 from core.spectra.cross_spectrum import average
 from core.spectra.lines import (
     SegmentSettings,
     bin_phasors,
     line_phasors,
     part_phasors,
-    tapered,
+    taper_weights,
     turning_factors,
 )
 from core.spectra.overall import Overall, OverallTransform, RecentVibration, parts_of
@@ -231,24 +231,26 @@ class SegmentTransform(KeptSegments):
         self._key_phase_row = ids.index(unit.key_phase) if unit.key_phase else None
         self._bearing_rows = [[ids.index(i) for i in b.channels] for b in unit.bearings]
 
-    def add(self, window: SampleBlock) -> Segment:
+    def add(self, window: Window) -> Segment:
         """Transform a window, keep it, and drop what has left the averaging time.
 
         Nothing older than the averaging time counts, also not for where its vortex is looked for:
         behind a gap it may be of any time.
         """
         self.drop_before(window.first_index - self.n_segments * self.hop_samples)
-        finite: npt.NDArray[np.bool_] = np.all(np.isfinite(window.samples), axis=1)
+        samples: FloatArray = window.samples.astype(np.float64)
+        with np.errstate(invalid="ignore"):  # infinities of both signs
+            mean: FloatArray = samples.mean(axis=1)
+        finite = np.isfinite(mean)  # no sum of single precision overflows
+        samples[~finite], mean[~finite] = 0.0, 0.0
         quality = tuple(
             q if good or q.level is Level.BAD else bad(Reason.NOT_FINITE)
-            for q, good in zip(window.channel_quality, finite, strict=True)
+            for q, good in zip(window.channel_quality, finite.tolist(), strict=True)
         )
-        samples = window.samples.astype(np.float64)
-        samples[~finite] = 0.0
-        prepared = tapered(samples)
+        centred = samples - mean[:, np.newaxis]
+        prepared = centred * taper_weights(samples.shape[1])
         lines = bin_phasors(prepared, prepared.shape[1] // 2 - 1)
         bins = lines[:, : self.frequency_hz.size] * self._bin_factor
-        mean = samples.mean(axis=1)
         key_phase = self._key_phase(samples, window.rate_hz, _usable(quality))
         speed = self._speed(window, bins, _usable(quality), key_phase)
         clipped = self._clipped(quality, samples)
@@ -284,7 +286,7 @@ class SegmentTransform(KeptSegments):
             has_phase=np.ones((2, usable.size), dtype=np.bool_),
             at_mark_um_pk=None if angle_rad is None else _turned(orders[:, ORDER1], -angle_rad),
             runout=runout,
-            overall=self._overall.of(samples, lines),
+            overall=self._overall.of(samples, centred, lines),
             clipped_share=clipped,
             recent=self._recent(samples, turn_samples, turning, factors, speed, key_phase),
         )
@@ -332,7 +334,7 @@ class SegmentTransform(KeptSegments):
 
     def _speed(
         self,
-        window: SampleBlock,
+        window: Window,
         bins: ComplexArray,
         usable: npt.NDArray[np.bool_],
         key_phase: KeyPhase | None,

@@ -48,15 +48,6 @@ LINE_SPREAD = 0.35
 with the root of their powers' ratio. Found on simulated machines: 0.28 to 0.38."""
 
 
-class KeyPhaseFault(StrEnum):
-    """Why there is no shaft angle."""
-
-    TOO_FEW_PULSES = "too_few_pulses"
-    MISSING_PULSE = "missing_pulse"
-    EXTRA_PULSE = "extra_pulse"
-    IRREGULAR = "irregular"
-
-
 @dataclass(frozen=True)
 class KeyPhase:
     """How the shaft turned during a segment.
@@ -215,7 +206,7 @@ def _line(
     return _Line(rpm_from_hz(line_hz), spread_hz / line_hz)
 
 
-def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | KeyPhaseFault:
+def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | None:
     """Fit an even turning to the pulses of a segment.
 
     Parameters
@@ -225,21 +216,18 @@ def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | KeyPhaseFau
 
     Returns
     -------
-    The first thing that is wrong, if anything is.
+    None with too few pulses, or with one that is missing, too many or out of its place.
     """
     edges = rising_edges(signal)
-    if edges.size < MIN_PULSES:
-        return KeyPhaseFault.TOO_FEW_PULSES
-    fault = _odd_turn(edges, signal.size)
-    if fault is not None:
-        return fault
+    if edges.size < MIN_PULSES or _has_odd_turn(edges, signal.size):
+        return None
     # The error lies in where a pulse is found, so that positions are fitted over turns.
     turns = np.arange(edges.size) - (edges.size - 1) / 2.0
     samples_per_turn = float(turns @ edges / (turns @ turns))
     middle = float(edges.mean())
     departure = (edges - middle - samples_per_turn * turns) / samples_per_turn
     if np.abs(departure).max() > MAX_DEPARTURE_TURNS:
-        return KeyPhaseFault.IRREGULAR
+        return None
     # slope of a line (Bevington and Robinson 2003, equation 6.23); an edge is known to a sample
     resolution = samples_per_turn**-2 / 12.0
     variance = float(departure @ departure) / (edges.size - 2) + resolution
@@ -276,14 +264,10 @@ def rising_edges(signal: FloatArray) -> FloatArray:
     return edges
 
 
-def _odd_turn(edges: FloatArray, n_samples: int) -> KeyPhaseFault | None:
+def _has_odd_turn(edges: FloatArray, n_samples: int) -> bool:
+    """Whether a pulse is missing or one too many; a train that begins late lacks pulses as well."""
     intervals = np.diff(edges)
     usual = float(np.median(intervals))
-    shortest, longest = ODD_TURN[0] * usual, ODD_TURN[1] * usual
-    if intervals.min() < shortest:
-        return KeyPhaseFault.EXTRA_PULSE
-    # a train that begins late or breaks off lacks pulses as well
     outer = max(edges[0], n_samples - 1 - edges[-1])
-    if intervals.max() > longest or outer > OUTER_TURN * usual:
-        return KeyPhaseFault.MISSING_PULSE
-    return None
+    is_even = ODD_TURN[0] * usual <= intervals.min() and intervals.max() <= ODD_TURN[1] * usual
+    return not (is_even and outer <= OUTER_TURN * usual)

@@ -12,12 +12,16 @@ from dataclasses import replace
 import numpy as np
 
 from core.arrays import FloatArray
-from core.machine.unit import Estimator
 from core.spectra.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.stiffness.dynamic import DynamicStiffness
-from core.stiffness.estimators import ESTIMATORS, TRANSFERS
-from core.stiffness.stiffness_budget import BEARING_GAIN, BRACKET, CROSS_COUPLING, STATISTICS
-from core.stiffness.transfer import motion_across
+from core.stiffness.estimators import DYNAMIC_COEFFICIENTS, ESTIMATORS, TRANSFERS
+from core.stiffness.stiffness_budget import (
+    BEARING_GAIN,
+    BRACKET,
+    CROSS_COUPLING,
+    STATISTICS,
+    motion_across,
+)
 from core.uncertainty import SHAFT_GAIN, Budget, Kind, coverage_factor, random_line
 
 FALSE_ALARM = 1e-6
@@ -76,18 +80,20 @@ def contradicting(
             ):
                 doubted = doubted.union(*of_line.values())
             continue
-        dynamic = ESTIMATORS[Estimator.DYNAMIC]
-        stiffness_x, damping_x, stiffness_y, damping_y = (
-            name for column in "xy" for name in dynamic.names("xy"[row] + column)
-        )
-        of_row = [stiffness_x, stiffness_y, damping_x, damping_y]
+        of_row = DYNAMIC_COEFFICIENTS[row]
         if not all(name in budgets for name in of_row):
             continue
+        film, covariance = [budgets[name] for name in of_row], found.covariance[row]
         for prefix, measured in at_lines.items():
+            # what `transfer` finds at the line if the film is that of `dynamic`
             across = motion_across(orders, lines[prefix], along)
-            frequency_hz = float(orders.frequency_hz[lines[prefix]])
-            film = [budgets[name] for name in of_row]
-            expected = expected_transfer(found, film, row, frequency_hz, across)
+            omega = 2.0 * math.pi * float(orders.frequency_hz[lines[prefix]])
+            motion = [1.0 + 0.0j, across] if row == 0 else [across, 1.0 + 0.0j]
+            factors = np.array([*motion, *(1j * omega * each for each in motion)])
+            expected = (
+                _combined(film, factors.real, covariance),
+                _combined(film, factors.imag / omega, covariance),
+            )
             if any(map(disagree, expected, map(_without_cross_coupling, measured))):
                 doubted |= of_line[prefix] | set(of_row)
     return doubted
@@ -96,33 +102,6 @@ def contradicting(
 def _without_cross_coupling(budget: Budget) -> Budget:
     known = (line for line in budget.lines if line.name != CROSS_COUPLING)
     return replace(budget, lines=tuple(known))
-
-
-def expected_transfer(
-    found: DynamicStiffness,
-    budgets: Sequence[Budget],
-    row: int,
-    frequency_hz: float,
-    across: complex,
-) -> tuple[Budget, Budget]:
-    """Stiffness and damping that `transfer` finds at a line if the film is that of `dynamic`.
-
-    Parameters
-    ----------
-    budgets
-        Of k_i1, k_i2, c_i1 and c_i2 of the row.
-    row
-        Direction of the force, 0 is x.
-    across
-        Shaft motion across this direction per motion along it.
-    """
-    omega = 2.0 * math.pi * frequency_hz
-    along = [1.0 + 0.0j, across] if row == 0 else [across, 1.0 + 0.0j]
-    film = np.array([*along, *(1j * omega * motion for motion in along)])
-    return (
-        _combined(budgets, film.real, found.covariance[row]),
-        _combined(budgets, film.imag / omega, found.covariance[row]),
-    )
 
 
 def _combined(budgets: Sequence[Budget], factors: FloatArray, covariance: FloatArray) -> Budget:

@@ -36,12 +36,17 @@ def amplitude_budget(
 
 
 def phase_budget(
-    phase_deg: float, vectors: ComplexArray, systematic: tuple[BudgetLine, ...] = ()
+    phase_deg: float, vectors: ComplexArray, runout_um_pk: float = 0.0
 ) -> Budget | None:
-    """Uncertainty of the phase, deg, of the mean of vectors (n,); beyond 0 or 360° it goes on."""
+    """Uncertainty of the phase, deg, of the mean of vectors (n,); beyond 0 or 360° it goes on.
+
+    Runout turns the mean by so much at most.
+    """
     mean = complex(vectors.mean())
     across = (vectors * np.conj(mean)).imag / abs(mean) ** 2
-    return mean_budget(phase_deg, across, systematic, math.degrees(1.0))
+    turned = math.asin(min(1.0, runout_um_pk / abs(mean)))
+    lines = (systematic_line(RUNOUT, math.degrees(turned), 1.0),)
+    return mean_budget(phase_deg, across, lines, math.degrees(1.0))
 
 
 def amplitude_lines(
@@ -62,12 +67,6 @@ def amplitude_lines(
         systematic_line(SHAFT_GAIN, bearing.accuracy.shaft_gain, value),
         systematic_line(RUNOUT, runout_um_pk, 1.0),
     )
-
-
-def phase_lines(runout_um_pk: float, amplitude_um_pk: float) -> tuple[BudgetLine, ...]:
-    """What stays the same in a phase, deg: runout turns a vector by so much at most."""
-    turned = math.asin(min(1.0, runout_um_pk / amplitude_um_pk))
-    return (systematic_line(RUNOUT, math.degrees(turned), 1.0),)
 
 
 def coherence_budget(coherence: float, n_segments: float) -> Budget | None:

@@ -9,34 +9,22 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.machine.unit import BracketDynamics
 from core.quality import Reason
 from core.spectra.cross_spectrum import (
-    BEARING_X,
     SMEAR_BINS_SQUARED,
     CrossSpectrum,
     independent_segments,
     phasor_power_per_density,
 )
-from core.stiffness.dynamic_lines import (
-    DynamicSettings,
-    between_harmonics,
-    little_leakage,
-    probe_noise_power,
-)
-from core.stiffness.film_covariance import BracketChanges, FilmFit
-from core.stiffness.film_fit import (
-    coherence_segments,
-    explained_share,
-    lack_of_fit,
-    line_weights,
-    normal_equations,
-    signal_share,
-    smoother,
-)
+from core.stiffness.dynamic_lines import DynamicSettings, probe_noise_power, used_lines
+from core.stiffness.film_covariance import EACH_ROW, BracketChanges, FilmFit
+from core.stiffness.film_fit import N_ITERATIONS, NormalEquations, line_weights, smoother
+
+MIN_LINES = 12
+"""Usable lines below which there is no result."""
 
 MAX_INERTIA_SHARE = 0.8
 """Largest mass that is sought takes so much of the bracket's stiffness away at the highest line."""
@@ -45,18 +33,9 @@ MAX_MASS_STD = 0.5
 """A mass that is not given must be found to that share of what a bracket may be thought to have;
 else the lines do not determine it, and a film with it would be a guess."""
 
-
-@dataclass(frozen=True)
-class FilmChange:
-    """Change of a film's coefficients per unit of something else.
-
-    Parameters
-    ----------
-    k_n_per_m, c_n_s_per_m : (2, 2)
-    """
-
-    k_n_per_m: FloatArray
-    c_n_s_per_m: FloatArray
+STIFFNESS, MASS, DAMPING, DELAY = range(4)
+"""Changes of the bracket's dynamic stiffness: relative, per kg, per N·s/m, per s by which the
+bearing channels are late."""
 
 
 @dataclass(frozen=True)
@@ -65,19 +44,18 @@ class DynamicStiffness:
 
     Parameters
     ----------
-    k_n_per_m, c_n_s_per_m : (2, 2)
-        Rows are force directions, columns motion directions.
+    coefficients : (2, 4)
+        Of the rows x and y, the directions of the force: (k_i1, k_i2, c_i1, c_i2), N/m and N·s/m.
     covariance : (2, 4, 4)
-        Random covariance of (k_i1, k_i2, c_i1, c_i2) for each row i.
+        Random covariance of the coefficients of each row.
+    changes : (4, 2, 4)
+        Of the coefficients, per unit of `STIFFNESS`, `MASS`, `DAMPING` and `DELAY`.
     bracket_mass_kg, bracket_mass_std_kg
         Mass of the bracket that was used; its random standard uncertainty if it was fitted with the
         film, else 0.
     delay_s, delay_std_s
-        What the bearing channels seem to be late by, whatever the bracket's mass, and its random
-        standard uncertainty.
-    per_stiffness, per_mass, per_damping, per_delay
-        Changes per relative change of the bracket's stiffness, per kg of its mass, per N·s/m of its
-        damping, and per second that the bearing channels are late.
+        Apparent delay of the bearing channels, whatever the bracket's mass, and its random standard
+        uncertainty.
     delay_per_damping
         Change of that delay per N·s/m of the bracket's damping.
     coherence : (2,)
@@ -95,17 +73,13 @@ class DynamicStiffness:
         Largest share of the shaft's weighted motion, over its directions, that it amounts to.
     """
 
-    k_n_per_m: FloatArray
-    c_n_s_per_m: FloatArray
+    coefficients: FloatArray
     covariance: FloatArray
+    changes: FloatArray
     bracket_mass_kg: float
     bracket_mass_std_kg: float
     delay_s: float
     delay_std_s: float
-    per_stiffness: FilmChange
-    per_mass: FilmChange
-    per_damping: FilmChange
-    per_delay: FilmChange
     delay_per_damping: float
     coherence: FloatArray
     coherence_segments: FloatArray
@@ -113,19 +87,21 @@ class DynamicStiffness:
     frequency_hz: FloatArray
     probe_noise_um2_per_hz: FloatArray
     noise_share: float
-    n_segments: int
 
     @property
-    def k_std_n_per_m(self) -> FloatArray:
-        """Random standard uncertainty of the stiffnesses, (2, 2)."""
-        std: FloatArray = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2)[:, :2])
-        return std
+    def k_n_per_m(self) -> FloatArray:
+        """Stiffnesses, (2, 2); rows are force directions, columns motion directions."""
+        return self.coefficients[:, :2]
 
     @property
-    def c_std_n_s_per_m(self) -> FloatArray:
-        """Random standard uncertainty of the damping coefficients, (2, 2)."""
-        std: FloatArray = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2)[:, 2:])
-        return std
+    def c_n_s_per_m(self) -> FloatArray:
+        """Damping coefficients, (2, 2)."""
+        return self.coefficients[:, 2:]
+
+    @property
+    def std(self) -> FloatArray:
+        """Random standard uncertainties of the coefficients, (2, 4)."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
 
 
 def dynamic_stiffness(
@@ -160,42 +136,39 @@ def dynamic_stiffness(
         raise ValueError(f"channels averaged over different segments: {spectrum.n_segments}")
     if n_averaged < settings.min_segments:
         return Reason.FEW_SEGMENTS
-    lines = _used_lines(spectrum, turn_hz, settings)
-    if np.count_nonzero(lines) < settings.min_lines:
+    lines = used_lines(spectrum, turn_hz, settings)
+    if lines.size < MIN_LINES:
         return Reason.INSUFFICIENT_EXCITATION
     n_segments = independent_segments(n_averaged, settings.overlap)
-    noise_power, floor_std = _noise_power(spectrum, turn_hz, settings, n_segments)
-    index = np.flatnonzero(lines)
-    smoothing = smoother(tuple(index.tolist()), settings.smoothing_reach_bins)
-    smear_share = _smear_share(spectrum, lines, n_integrations)
+    noise_power, floor_std = probe_noise_power(spectrum, turn_hz, settings, n_segments)
+    frequency_hz, matrix = spectrum.frequency_hz[lines], spectrum.matrix[lines]
+    smoothing = smoother(tuple(lines.tolist()))
+    bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
+    # what integration with a wrong frequency leaves of each bearing's line
+    slope = np.array(n_integrations) * bin_hz / frequency_hz[:, np.newaxis]
+    smear_share = SMEAR_BINS_SQUARED * slope**2
 
     def fitted(bracket: BracketDynamics) -> FilmFit | None:
-        stiffness = bracket.dynamic_stiffness_n_per_m(spectrum.frequency_hz[index])
-        equations = normal_equations(spectrum, index, stiffness, noise_power)
-        weight = line_weights(equations, spectrum.matrix[index], smoothing, settings.n_iterations)
+        stiffness = bracket.dynamic_stiffness_n_per_m(frequency_hz)
+        equations = NormalEquations(matrix, 2.0 * np.pi * frequency_hz, stiffness, noise_power)
+        weight = line_weights(equations, smoothing)
         if weight is None:
             return None
-        unknowns = equations.solve(weight, equations.force)
-        return FilmFit(
-            equations, weight, unknowns, index, smoothing, smear_share, n_segments, floor_std
-        )
+        return FilmFit(equations, weight, lines, smoothing, smear_share, n_segments, floor_std)
 
     fit = fitted(bracket)
     seeks_mass, max_mass_std_kg = bracket.mass_kg is None, MAX_MASS_STD * bracket.max_mass_kg
-    for _ in range(settings.n_iterations if seeks_mass else 0):
+    for _ in range(N_ITERATIONS if seeks_mass else 0):
         heavier = None if fit is None else _with_mass(bracket, fit)
         if heavier is None:
             return Reason.INSUFFICIENT_EXCITATION
         bracket, fit = heavier, fitted(heavier)
     if fit is None:
         return Reason.INSUFFICIENT_EXCITATION
-    found = _result(spectrum, bracket, fit, n_averaged, seeks_mass=seeks_mass)
+    noise_um2_per_hz = noise_power / phasor_power_per_density(bin_hz)
+    found = _result(bracket, fit, frequency_hz, noise_um2_per_hz, seeks_mass=seeks_mass)
     convinces = _convinces(found, settings) and not found.bracket_mass_std_kg > max_mass_std_kg
     return found if convinces else Reason.INSUFFICIENT_EXCITATION
-
-
-STIFFNESS, MASS, DAMPING, DELAY = range(4)
-"""Changes of the bracket's dynamic stiffness: relative, per kg, per N·s/m, per s of delay."""
 
 
 def _bracket_changes(bracket: BracketDynamics, fit: FilmFit) -> BracketChanges:
@@ -220,109 +193,49 @@ def _with_mass(bracket: BracketDynamics, fit: FilmFit) -> BracketDynamics | None
     return replace(bracket, mass_kg=min(max(mass_kg, -limit_kg), limit_kg))
 
 
-def _used_lines(
-    spectrum: CrossSpectrum, turn_hz: tuple[float, float], settings: DynamicSettings
-) -> npt.NDArray[np.bool_]:
-    """Lines of the band that carry the shaft's own broadband motion and some bearing motion."""
-    power = np.diagonal(spectrum.matrix, axis1=1, axis2=2).real
-    selection = settings.selection
-    used: npt.NDArray[np.bool_] = (
-        _inside(spectrum.frequency_hz, settings.band_hz)
-        & between_harmonics(spectrum.frequency_hz, turn_hz, selection.guard_bins)
-        & np.all(power > 0.0, axis=1)
-    )
-    inside = np.flatnonzero(used)
-    if inside.size:
-        band = slice(int(inside[0]), int(inside[-1]) + 1)
-        used[band] &= little_leakage(power[:, :BEARING_X], selection.max_leakage, band)
-    return used
-
-
-def _noise_power(
-    spectrum: CrossSpectrum,
-    turn_hz: tuple[float, float],
-    settings: DynamicSettings,
-    n_segments: float,
-) -> tuple[FloatArray, FloatArray]:
-    """Mean squared phasor of each probe's noise, and their relative standard uncertainties."""
-    bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
-    if settings.probe_noise_um2_per_hz is not None:
-        known = phasor_power_per_density(bin_hz) * np.array(settings.probe_noise_um2_per_hz)
-        return known, np.zeros(2)
-    quiet = _inside(spectrum.frequency_hz, settings.quiet_band_hz)
-    guard_bins = settings.selection.guard_bins
-    quiet &= between_harmonics(spectrum.frequency_hz, turn_hz, guard_bins)
-    return probe_noise_power(spectrum, quiet, n_segments)
-
-
-def _inside(frequency_hz: FloatArray, band_hz: tuple[float, float]) -> npt.NDArray[np.bool_]:
-    return (frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1])
-
-
 def _result(
-    spectrum: CrossSpectrum,
     bracket: BracketDynamics,
     fit: FilmFit,
-    n_averaged: int,
+    frequency_hz: FloatArray,
+    noise_um2_per_hz: FloatArray,
     *,
     seeks_mass: bool,
 ) -> DynamicStiffness:
-    equations, weight, unknowns = fit.equations, fit.weight, fit.unknowns
     changes = _bracket_changes(bracket, fit)
     mass = changes.estimate([MASS]) if seeks_mass else None
-    with_delay = [DELAY, MASS]
-    delay = changes.estimate(with_delay)
-    scale = np.array([1.0, 1.0, 1.0 / equations.omega_unit, 1.0 / equations.omega_unit])
-    covariance = fit.covariance() if mass is None else mass.with_film(fit)
-
-    def per(change: int) -> FilmChange:
-        """Change of the film, with that of the mass if it is fitted."""
-        found = changes.per[change]
-        if mass is not None and change != MASS:
-            found = found + float(changes.follow(change, [MASS])[0]) * changes.per[MASS]
-        return FilmChange(found[:, :2], found[:, 2:] / equations.omega_unit)
-
-    bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
+    delay = changes.estimate([DELAY, MASS])
+    per = changes.per.copy()
+    if mass is None:
+        covariance = fit.spread(fit.own_influences[:, np.newaxis], EACH_ROW)
+    else:
+        covariance = changes.film_covariance([MASS], mass.influences)
+        for change in (STIFFNESS, DAMPING, DELAY):  # with that of the mass, which is fitted
+            per[change] += float(changes.follow(change, [MASS])[0]) * changes.per[MASS]
+    omega_unit = fit.equations.omega_unit
+    scale = np.array([1.0, 1.0, omega_unit, omega_unit])
     return DynamicStiffness(
-        k_n_per_m=unknowns[:, :2],
-        c_n_s_per_m=unknowns[:, 2:] / equations.omega_unit,
-        covariance=covariance * np.outer(scale, scale),
+        coefficients=fit.unknowns / scale,
+        covariance=covariance * np.outer(1.0 / scale, 1.0 / scale),
+        changes=per / scale,
         bracket_mass_kg=bracket.mass_kg or 0.0,
         bracket_mass_std_kg=0.0 if mass is None else float(mass.std[0]),
         delay_s=0.0 if delay is None else float(delay.value[0]),
         delay_std_s=math.inf if delay is None else float(delay.std[0]),
-        per_stiffness=per(STIFFNESS),
-        per_mass=per(MASS),
-        per_damping=per(DAMPING),
-        per_delay=per(DELAY),
-        delay_per_damping=0.0 if delay is None else float(changes.follow(DAMPING, with_delay)[0]),
-        coherence=explained_share(weight, fit.residual, equations.force_power),
-        coherence_segments=coherence_segments(
-            weight, fit.residual, equations.force_power, fit.smoothing, fit.n_segments
+        delay_per_damping=(
+            0.0 if delay is None else float(changes.follow(DAMPING, [DELAY, MASS])[0])
         ),
-        lack_of_fit=lack_of_fit(equations, unknowns, weight, fit.n_segments),
-        frequency_hz=spectrum.frequency_hz[fit.lines],
-        probe_noise_um2_per_hz=equations.noise_power / phasor_power_per_density(bin_hz),
-        noise_share=1.0 - signal_share(equations, weight),
-        n_segments=n_averaged,
+        coherence=fit.coherence,
+        coherence_segments=fit.coherence_segments,
+        lack_of_fit=fit.lack_of_fit,
+        frequency_hz=frequency_hz,
+        probe_noise_um2_per_hz=noise_um2_per_hz,
+        noise_share=1.0 - fit.equations.signal_share(fit.weight),
     )
-
-
-def _smear_share(
-    spectrum: CrossSpectrum, lines: npt.NDArray[np.bool_], n_integrations: tuple[int, int]
-) -> FloatArray:
-    """Share of each bearing's line that is integrated with a wrong frequency, (n_used, 2)."""
-    bin_hz = spectrum.frequency_hz[1] - spectrum.frequency_hz[0]
-    slope = np.array(n_integrations) * bin_hz / spectrum.frequency_hz[lines, np.newaxis]
-    share: FloatArray = SMEAR_BINS_SQUARED * slope**2
-    return share
 
 
 def _convinces(found: DynamicStiffness, settings: DynamicSettings) -> bool:
     if 1.0 - found.noise_share < settings.min_signal_share:
         return False
     largest = float(np.abs(np.diag(found.k_n_per_m)).max())
-    uncertain = bool(
-        np.any(np.diag(found.k_std_n_per_m) > settings.max_relative_uncertainty * largest)
-    )
+    uncertain = bool(np.any(np.diag(found.std) > settings.max_relative_uncertainty * largest))
     return not uncertain and bool(np.all(found.coherence >= settings.min_coherence))

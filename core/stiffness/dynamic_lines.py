@@ -1,7 +1,7 @@
 """Settings of `dynamic`, the lines that it uses, and the noise floor of the shaft probes."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -12,38 +12,18 @@ from core.spectra.cross_spectrum import (
     CORRELATED_LINES,
     CrossSpectrum,
     leakage_kernel,
+    phasor_power_per_density,
 )
+
+MAX_LEAKAGE = 0.005
+"""Largest share of a line's shaft power that may have come through side lobes of stronger lines.
+Leakage carries runout, and it carries the wrong frequency into integration."""
 
 N_BLOCKS = 4
 """Parts of the quiet band, in case the shaft moves unseen in some of them."""
 
 SAME_FLOOR = 3.0
 """Standard deviations within which a part shows the same floor as the quietest."""
-
-
-@dataclass(frozen=True)
-class LineSelection:
-    """Where lines are taken from.
-
-    Parameters
-    ----------
-    guard_bins
-        To each side of every harmonic of the running speed. Hann's main lobe reaches 2 bins; the
-        third takes up what the tone wanders within a segment.
-    max_leakage
-        Largest share of a line's shaft power that may have come through side lobes of stronger
-        lines. Leakage carries runout, and it carries the wrong frequency into integration.
-    """
-
-    guard_bins: float = 3.0
-    max_leakage: float = 0.005
-
-    def __post_init__(self) -> None:
-        if self.guard_bins < 0.0 or not self.max_leakage > 0.0:
-            raise ValueError(
-                f"guard of {self.guard_bins} bins and leakage of {self.max_leakage}"
-                " must be at least 0 and above 0"
-            )
 
 
 @dataclass(frozen=True)
@@ -54,21 +34,16 @@ class DynamicSettings:
     ----------
     band_hz
         Lines are taken from here, between the harmonics of the running speed.
-    selection
-        Distance from harmonics and from anything else that is strong and narrow.
+    guard_bins
+        Distance of lines from every harmonic. Hann's main lobe reaches 2 bins; the third takes up
+        what the tone wanders within a segment.
     probe_noise_um2_per_hz
         Known one-sided noise density (x, y) of the shaft probes; ``None`` estimates it.
     quiet_band_hz
         Where it is estimated: the shaft hardly moves there, and what it moves shows in the
         bearing channels and is taken out.
-    smoothing_reach_bins
-        To each side, over which the residual spectrum is smoothed before it weighs the lines.
-    n_iterations
-        Of fitting and weighting; the third changes stiffness by less than 0.01 %.
     min_segments
-        Below this there is no result.
-    min_lines
-        Usable lines below which there is no result.
+        Below this there is no result; at least 3, as two inputs are fitted.
     min_signal_share
         Share of the shaft's weighted motion, in its worst direction, that must not be noise.
     min_coherence
@@ -81,32 +56,45 @@ class DynamicSettings:
     """
 
     band_hz: tuple[float, float] = (0.6, 12.0)
-    selection: LineSelection = field(default_factory=LineSelection)
+    guard_bins: float = 3.0
     probe_noise_um2_per_hz: tuple[float, float] | None = None
     quiet_band_hz: tuple[float, float] = (15.0, 25.0)
-    smoothing_reach_bins: int = 6
-    n_iterations: int = 4
     min_segments: int = 4
-    min_lines: int = 12
     min_signal_share: float = 0.5
     min_coherence: float = 0.1
     max_relative_uncertainty: float = 0.2
     overlap: float = 0.125
 
-    def __post_init__(self) -> None:
-        for name, (low, high) in (("band", self.band_hz), ("quiet band", self.quiet_band_hz)):
-            if not 0.0 < low < high:
-                raise ValueError(f"{name} must rise from above 0 Hz, got {low} to {high} Hz")
-        if min(self.smoothing_reach_bins, self.n_iterations, self.min_lines) < 1:
-            raise ValueError("smoothing reach, iterations and least lines must be at least 1")
-        if self.min_segments < 3:
-            raise ValueError(f"two inputs need at least 3 segments, got {self.min_segments}")
+
+def used_lines(
+    spectrum: CrossSpectrum, turn_hz: tuple[float, float], settings: DynamicSettings
+) -> npt.NDArray[np.int64]:
+    """Indices of the lines that carry the shaft's own broadband motion and some bearing motion."""
+    power = np.diagonal(spectrum.matrix, axis1=1, axis2=2).real
+    used = _between_harmonics_of(settings.band_hz, spectrum, turn_hz, settings)
+    used &= np.all(power > 0.0, axis=1)
+    inside = np.flatnonzero(used)
+    if inside.size:
+        band = slice(int(inside[0]), int(inside[-1]) + 1)
+        used[band] &= little_leakage(power[:, :BEARING_X], band)
+    return np.flatnonzero(used)
+
+
+def _between_harmonics_of(
+    band_hz: tuple[float, float],
+    spectrum: CrossSpectrum,
+    turn_hz: tuple[float, float],
+    settings: DynamicSettings,
+) -> npt.NDArray[np.bool_]:
+    """Lines of a band between the harmonics, (n_lines,)."""
+    inside = (spectrum.frequency_hz >= band_hz[0]) & (spectrum.frequency_hz <= band_hz[1])
+    return inside & between_harmonics(spectrum.frequency_hz, turn_hz, settings.guard_bins)
 
 
 def between_harmonics(
     frequency_hz: FloatArray, turn_hz: tuple[float, float], guard_bins: float
 ) -> npt.NDArray[np.bool_]:
-    """Tell which lines lie between the harmonics of the running speed.
+    """Which lines lie between the harmonics of the running speed.
 
     Parameters
     ----------
@@ -132,10 +120,8 @@ def between_harmonics(
     return clear
 
 
-def little_leakage(
-    shaft_power: FloatArray, max_leakage: float, lines: slice = slice(None)
-) -> npt.NDArray[np.bool_]:
-    """Tell which lines are their own, not the side lobes of stronger ones.
+def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> npt.NDArray[np.bool_]:
+    """Which lines are their own, not the side lobes of stronger ones.
 
     Parameters
     ----------
@@ -148,7 +134,7 @@ def little_leakage(
     (n,)
     """
     leaked = leakage_kernel(shaft_power.shape[0])[lines] @ shaft_power
-    own: npt.NDArray[np.bool_] = np.all(leaked <= max_leakage * shaft_power[lines], axis=1)
+    own: npt.NDArray[np.bool_] = np.all(leaked <= MAX_LEAKAGE * shaft_power[lines], axis=1)
     return own
 
 
@@ -176,9 +162,12 @@ def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexA
 
 
 def probe_noise_power(
-    spectrum: CrossSpectrum, quiet: npt.NDArray[np.bool_], n_segments: float
+    spectrum: CrossSpectrum,
+    turn_hz: tuple[float, float],
+    settings: DynamicSettings,
+    n_segments: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean squared phasor of the probes' noise, from lines in a quiet band.
+    """Mean squared phasor of the probes' noise, known or from lines in the quiet band.
 
     What shaft and bearing have in common is motion and does not count; the rest is the probes'
     noise and, through the film, the bearing transducers'. Where those are quiet the estimate is
@@ -186,8 +175,6 @@ def probe_noise_power(
 
     Parameters
     ----------
-    quiet : (n_lines,)
-        The lines of the quiet band.
     n_segments
         Independent segments of the average; at least 3.
 
@@ -195,6 +182,11 @@ def probe_noise_power(
     -------
     (2,) in µm², zero if no line is quiet; and their relative standard uncertainties, (2,).
     """
+    if settings.probe_noise_um2_per_hz is not None:
+        bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
+        known = phasor_power_per_density(bin_hz) * np.array(settings.probe_noise_um2_per_hz)
+        return known, np.zeros(2)
+    quiet = _between_harmonics_of(settings.quiet_band_hz, spectrum, turn_hz, settings)
     matrix = spectrum.matrix[quiet]
     if matrix.shape[0] == 0:
         return np.zeros(2), np.zeros(2)

@@ -33,23 +33,7 @@ class EstimatorEntry:
         )
 
 
-def _transfer(line: str, words: str) -> EstimatorEntry:
-    return EstimatorEntry(
-        f"transfer, {words}",
-        f"{line}_transfer_k_{{axes}}_n_per_m",
-        f"{line}_transfer_c_{{axes}}_n_s_per_m",
-        f"{line}_coherence_{{axis}}{{axis}}",
-    )
-
-
-def _ratio(line: str, words: str) -> EstimatorEntry:
-    return EstimatorEntry(
-        f"equation (5), {words}",
-        f"{line}_k_eff_{{axes}}_n_per_m",
-        None,
-        f"{line}_coherence_{{axis}}{{axis}}",
-    )
-
+LINES = {"order1": "1×", "vortex": "vortex"}
 
 ESTIMATORS: Mapping[Estimator, EstimatorEntry] = {
     Estimator.DYNAMIC: EstimatorEntry(
@@ -58,14 +42,38 @@ ESTIMATORS: Mapping[Estimator, EstimatorEntry] = {
         "dynamic_c_{axes}_n_s_per_m",
         "dynamic_coherence_{axis}",
     ),
-    Estimator.TRANSFER_ORDER1: _transfer("order1", "1×"),
-    Estimator.TRANSFER_VORTEX: _transfer("vortex", "vortex"),
-    Estimator.RATIO_ORDER1: _ratio("order1", "1×"),
-    Estimator.RATIO_VORTEX: _ratio("vortex", "vortex"),
+    **{
+        Estimator(f"transfer_{line}"): EstimatorEntry(
+            f"transfer, {words}",
+            f"{line}_transfer_k_{{axes}}_n_per_m",
+            f"{line}_transfer_c_{{axes}}_n_s_per_m",
+            f"{line}_coherence_{{axis}}{{axis}}",
+        )
+        for line, words in LINES.items()
+    },
+    **{
+        Estimator(f"ratio_{line}"): EstimatorEntry(
+            f"equation (5), {words}",
+            f"{line}_k_eff_{{axes}}_n_per_m",
+            None,
+            f"{line}_coherence_{{axis}}{{axis}}",
+        )
+        for line, words in LINES.items()
+    },
 }
 
-TRANSFERS = {"order1": Estimator.TRANSFER_ORDER1, "vortex": Estimator.TRANSFER_VORTEX}
+TRANSFERS = {line: Estimator(f"transfer_{line}") for line in LINES}
 """`transfer` by the line that it is read from."""
+
+DYNAMIC_COEFFICIENTS = tuple(
+    tuple(
+        f"dynamic_{letter}_{row}{column}_{unit}"
+        for letter, unit in (("k", "n_per_m"), ("c", "n_s_per_m"))
+        for column in "xy"
+    )
+    for row in "xy"
+)
+"""Quantities of `dynamic`, (2, 4) as in `core.stiffness.dynamic.DynamicStiffness`."""
 
 MODEL_DOUBTS = frozenset({Reason.POOR_FIT, Reason.CHANNEL_DELAY, Reason.ESTIMATORS_DISAGREE})
 """Why a number with little scatter may be wrong."""

@@ -9,6 +9,9 @@ from core.spectra.lines import SegmentSettings
 CHANCE = 1e-6
 """Probability with which noise alone may be as coherent as what a stiffness is read from."""
 
+MAX_RUNOUT_SHARE = 0.25
+"""Of the shaft's amplitude, beyond which runout hides its motion."""
+
 
 def chance_coherence(n_segments: float) -> float:
     """Squared coherence that two independent noises exceed once in a million averages.
@@ -40,41 +43,23 @@ class EvidenceSettings(SegmentSettings):
     min_coverage: float = 0.5
 
 
-@dataclass(frozen=True)
-class LineLimits:
-    """What counts as excitation at one line.
+def line_excitation(
+    spectrum: CrossSpectrum,
+    line: int,
+    shaft: int,
+    bearing: int,
+    min_coherence: float = 0.9,
+    runout_um_pk: float = 0.0,
+) -> Reason:
+    """Whether a line carries enough motion for `ratio` and `transfer`, else the reason.
 
     Parameters
     ----------
     min_coherence
-        Squared coherence of shaft and bearing motion. At 0.9, a bearing line that is noise to the
-        rest makes equation (5) read 5 % high.
+        Least squared coherence of shaft and bearing motion.
     runout_um_pk
-        Largest runout that the shaft's surface may have at this line and that is not taken off;
-        zero away from the harmonics of the running speed. It is as coherent as motion, so that
-        amplitude alone can tell.
-    max_runout_share
-        Of the shaft's amplitude.
-    """
-
-    min_coherence: float = 0.9
-    runout_um_pk: float = 0.0
-    max_runout_share: float = 0.25
-
-    def __post_init__(self) -> None:
-        if not 0.0 <= self.min_coherence <= 1.0:
-            raise ValueError(f"coherence lies between 0 and 1, got {self.min_coherence}")
-        if not (self.runout_um_pk >= 0.0 and self.max_runout_share > 0.0):
-            raise ValueError(
-                f"runout of {self.runout_um_pk} µm and share of {self.max_runout_share}"
-                " must be at least 0 and above 0"
-            )
-
-
-def line_excitation(
-    spectrum: CrossSpectrum, line: int, shaft: int, bearing: int, limits: LineLimits
-) -> Reason:
-    """Whether a line carries enough motion for `ratio` and `transfer`, else the reason.
+        Largest runout of the shaft's surface at this line that is not taken off; zero away from the
+        harmonics of the running speed. It is as coherent as motion: only amplitude can tell.
 
     Returns
     -------
@@ -83,6 +68,6 @@ def line_excitation(
     if spectrum.n_segments[shaft, bearing] < 2:
         return Reason.FEW_SEGMENTS  # one segment is coherent with anything
     shaft_um_pk = float(spectrum.amplitude_um_pk(shaft)[line])
-    hidden = limits.runout_um_pk > limits.max_runout_share * shaft_um_pk
-    incoherent = spectrum.coherence_at(line, shaft, bearing) < limits.min_coherence
+    hidden = runout_um_pk > MAX_RUNOUT_SHARE * shaft_um_pk
+    incoherent = spectrum.coherence_at(line, shaft, bearing) < min_coherence
     return Reason.INSUFFICIENT_EXCITATION if hidden or incoherent else Reason.OK

@@ -1,4 +1,4 @@
-"""Random errors of a fitted film, and what its residual shows of the bracket and of delays.
+"""A fitted film: its evidence, its random errors, and what its residual shows of the bracket.
 
 Every estimate here is linear in ``Σ_lines w Σ_segments conj(f u) e``: e is the force that the fit
 leaves over, f u a linear form of the shaft's motion, its influence on the estimate.
@@ -13,15 +13,14 @@ import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.spectra.cross_spectrum import (
+    CORRELATED_LINES,
     SMEARED_APART,
     SMEARED_IN_PHASE,
     SMEARED_IN_QUADRATURE,
     WHITE_PRODUCTS,
     correlated_sum,
 )
-from core.stiffness.film_fit import NormalEquations
-
-_NONE = (0.0, 0.0, 0.0)
+from core.stiffness.film_fit import N_UNKNOWNS, NormalEquations
 
 PART_PRODUCTS: FloatArray = np.array(
     [
@@ -30,10 +29,14 @@ PART_PRODUCTS: FloatArray = np.array(
         SMEARED_IN_QUADRATURE,
         *[SMEARED_APART] * 4,
         WHITE_PRODUCTS,  # the probes' noise in both
-        _NONE,
+        (0.0, 0.0, 0.0),
     ]
 ).T
 """Correlation of real and imaginary parts of `FilmFit._parts` 0, 1 and 2 bins apart, (3, 12)."""
+
+EACH_ROW = np.array([[0], [1]])
+BOTH_ROWS = np.array([[0, 1]])
+"""Rows through whose residuals groups of estimates are made."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class FilmFit:
     Parameters
     ----------
     weight : (n_lines, 2)
-    unknowns : (2, 4)
+        From `core.stiffness.film_fit.line_weights`.
     lines : (n_lines,)
         Which bins they are, rising.
     smoothing : (n_lines, n_lines)
@@ -58,12 +61,16 @@ class FilmFit:
 
     equations: NormalEquations
     weight: FloatArray
-    unknowns: FloatArray
     lines: npt.NDArray[np.int64]
     smoothing: FloatArray
     smear_share: FloatArray
     n_segments: float
     floor_std: FloatArray
+
+    @cached_property
+    def unknowns(self) -> FloatArray:
+        """Coefficients (k_i1, k_i2, c_i1, c_i2) of each row, in N/m, (2, 4)."""
+        return self.equations.solve(self.weight, self.equations.force)
 
     @cached_property
     def film(self) -> ComplexArray:
@@ -75,41 +82,71 @@ class FilmFit:
         """Power of the force that is left over, (n_lines, 2)."""
         return self.equations.residual(self.unknowns)
 
-    @cached_property
-    def _root(self) -> ComplexArray:
-        """Hermitian square roots of the shaft's spectra, (n_lines, 2, 2)."""
-        shaft = self.equations.shaft
-        trace = (shaft[:, 0, 0] + shaft[:, 1, 1]).real
-        determinant = (shaft[:, 0, 0] * shaft[:, 1, 1]).real - np.abs(shaft[:, 0, 1]) ** 2
-        root = np.sqrt(np.maximum(determinant, 0.0))
-        # a matrix solves its own characteristic equation (Cayley and Hamilton)
-        whole = shaft + root[:, np.newaxis, np.newaxis] * np.eye(2)
-        squared: ComplexArray = whole / np.sqrt(trace + 2.0 * root)[:, np.newaxis, np.newaxis]
-        return squared
+    @property
+    def coherence(self) -> FloatArray:
+        """Share of each bearing channel's weighted power that the film explains, (2,), 0 to 1."""
+        whole = (self.weight * self.equations.force_power).sum(axis=0)
+        share: FloatArray = 1.0 - (self.weight * self.residual).sum(axis=0) / whole
+        return np.minimum(np.maximum(share, 0.0), 1.0)
+
+    @property
+    def coherence_segments(self) -> FloatArray:
+        """Segments by which one line's coherence would be as certain as that of all lines, (2,).
+
+        The share that is left, residual over whole, moves with the relative errors of each line's
+        residual and power, ``1 / √n`` each and common to both as far as the residual is all of it.
+        The residual moves it a second time through the weights.
+        """
+        left, whole = self.weight * self.residual, self.weight * self.equations.force_power
+        left, whole = left / left.sum(axis=0), whole / whole.sum(axis=0)
+        moves = left + self.smoothing.T @ (whole - left)
+        shared = 2.0 * moves * whole * self.residual / self.equations.force_power
+        squares = (moves**2 + whole**2 - shared).sum(axis=0)
+        variance = CORRELATED_LINES * squares / (self.n_segments - 2.0)  # two fitted signals
+        found: FloatArray = 1.0 + 2.0 * self.coherence / variance
+        return found
+
+    @property
+    def lack_of_fit(self) -> FloatArray:
+        """How much the residual still has in common with the shaft's motion, (2,).
+
+        Its mean is 1 if stiffness and damping are constant over the lines: the residual is then as
+        little correlated with the shaft as `n_segments` independent segments let it be.
+        """
+        equations, ratio = self.equations, self.equations.ratio[:, np.newaxis, np.newaxis]
+        # moments of the residual with (u_1, u_2, iω u_1, iω u_2): real part, then ratio × imaginary
+        left = equations.force - np.einsum("lab,rb->lra", equations.true_gram, self.unknowns)
+        common = (left[..., :2] + 1j * left[..., 2:] / ratio).transpose(0, 2, 1)
+        shaft = equations.gram[:, :2, :2] + 1j * equations.gram[:, :2, 2:] / ratio
+        scaled = np.linalg.solve(shaft.transpose(0, 2, 1), common)
+        power = (common.conj() * scaled).sum(axis=1).real
+        whole = (self.weight * self.residual).sum(axis=0)
+        found: FloatArray = self.n_segments * (self.weight * power).sum(axis=0) / (2.0 * whole)
+        return found
 
     @cached_property
     def own_influences(self) -> ComplexArray:
         """Influence of the shaft's motion on the unknowns of each row, (2, n_lines, 4, 2)."""
-        inverse = self.equations.inverse(self.weight)
-        own: ComplexArray = inverse[:, np.newaxis] @ self.equations.regressors
+        ratio = self.equations.ratio
+        regressors = np.zeros((ratio.size, N_UNKNOWNS, 2), dtype=np.complex128)
+        regressors[:, (0, 1), (0, 1)] = 1.0
+        regressors[:, (2, 3), (0, 1)] = 1j * ratio[:, np.newaxis]
+        inverse = np.linalg.inv(self.equations.normal(self.weight))
+        own: ComplexArray = inverse[:, np.newaxis] @ regressors
         return own
 
-    def covariance(self) -> FloatArray:
-        """Covariance of the unknowns of each row, (2, 4, 4)."""
-        return self._spread(self.own_influences[:, np.newaxis], np.array([[0], [1]]))
-
-    def spread(self, influences: ComplexArray) -> FloatArray:
+    def spread(
+        self, influences: ComplexArray, rows: npt.NDArray[np.int64] = BOTH_ROWS
+    ) -> FloatArray:
         """Covariance of groups of n estimates by their influences, (n_groups, n, n).
 
         Parameters
         ----------
-        influences : (n_groups, 2, n_lines, n, 2)
+        influences : (n_groups, n_rows, n_lines, n, 2)
             Of the shaft's motion on the estimates, through the residual of each row.
+        rows : (n_groups or 1, n_rows)
+            Which rows these are.
         """
-        return self._spread(influences, np.array([[0, 1]]))
-
-    def _spread(self, influences: ComplexArray, rows: npt.NDArray[np.int64]) -> FloatArray:
-        """The same through the residuals of some rows, (n_groups or 1, n_rows)."""
         parts = (influences @ self._parts[rows]).view(np.float64)
         of_rows = correlated_sum(parts, self.lines, PART_PRODUCTS).sum(axis=1)
         weighted = (self.weight[..., np.newaxis] * self.film).transpose(1, 0, 2)[rows]
@@ -128,22 +165,25 @@ class FilmFit:
         What integration leaves of neighbouring lines cancels in the part of an influence that is in
         phase with a row's force, whatever chance makes of the size of each: powers are smooth.
         """
+        shaft, root = self.equations.shaft, _hermitian_root(self.equations.shaft)
         weight, film = self.weight.T[..., None, None], self.film.transpose(1, 0, 2)[..., None, :]
         smear = (self._smoothed(self.equations.force_power) * self.smear_share).T[..., None, None]
         smeared = np.minimum(weight * smear, 1.0)  # of the smooth residual, one over the weight
         rest = weight**2 * self.residual.T[..., None, None] * (1.0 - smeared)
-        shaft, across = self.equations.shaft, film.conj().swapaxes(-1, -2)
+        across = film.conj().swapaxes(-1, -2)
         force = (film @ shaft @ across).real
         shared = shaft @ across / force
         size = np.sqrt(self._smoothed(force[:, :, 0, 0].T).T)[..., None, None]
+        power = np.diagonal(shaft, axis1=1, axis2=2).real
+        smooth_root = np.sqrt(self._smoothed(power) / power)[:, :, np.newaxis] * root
         # The residual holds the probes' noise as the shaft's motion does, and so with one phase:
         # E[x*e x*e] is not 0 as for independent signals (Isserlis 1918). What that takes off some
         # coefficients is left in.
         noise = self.equations.noise_power[:, np.newaxis]
         parts = (
-            np.sqrt(rest) * self._root,
+            np.sqrt(rest) * root,
             np.sqrt(weight * smeared) * size * shared,
-            np.sqrt(weight * smeared) * ((np.eye(2) - shared @ film) @ self._smooth_root),
+            np.sqrt(weight * smeared) * ((np.eye(2) - shared @ film) @ smooth_root),
             weight * noise * across,
         )
         return np.concatenate(parts, axis=-1)
@@ -153,12 +193,33 @@ class FilmFit:
         smooth: FloatArray = np.exp(self.smoothing @ np.log(power))
         return smooth
 
-    @cached_property
-    def _smooth_root(self) -> ComplexArray:
-        """Square roots of the shaft's spectra with smooth powers, (n_lines, 2, 2)."""
-        power = np.diagonal(self.equations.shaft, axis1=1, axis2=2).real
-        scale: ComplexArray = np.sqrt(self._smoothed(power) / power)[:, :, np.newaxis] * self._root
-        return scale
+
+def _hermitian_root(shaft: ComplexArray) -> ComplexArray:
+    """Hermitian square roots of (n_lines, 2, 2) spectra."""
+    trace = (shaft[:, 0, 0] + shaft[:, 1, 1]).real
+    determinant = (shaft[:, 0, 0] * shaft[:, 1, 1]).real - np.abs(shaft[:, 0, 1]) ** 2
+    root = np.sqrt(np.maximum(determinant, 0.0))
+    # a matrix solves its own characteristic equation (Cayley and Hamilton)
+    whole = shaft + root[:, np.newaxis, np.newaxis] * np.eye(2)
+    squared: ComplexArray = whole / np.sqrt(trace + 2.0 * root)[:, np.newaxis, np.newaxis]
+    return squared
+
+
+@dataclass(frozen=True)
+class BracketEstimate:
+    """Estimates of some changes of the bracket.
+
+    Parameters
+    ----------
+    value, std : (n,)
+        With random standard uncertainties.
+    influences : (2, n_lines, n, 2)
+        Of the shaft's motion on the values, through the residual of each row.
+    """
+
+    value: FloatArray
+    std: FloatArray
+    influences: ComplexArray
 
 
 @dataclass(frozen=True)
@@ -211,7 +272,7 @@ class BracketChanges:
         step = np.linalg.solve(information[np.ix_(fitted, fitted)], information[fitted, change])
         return np.asarray(-step, dtype=np.float64)
 
-    def estimate(self, fitted: Sequence[int]) -> "BracketEstimate | None":
+    def estimate(self, fitted: Sequence[int]) -> BracketEstimate | None:
         """Estimate some together, the others as they are; None if they cannot be separated."""
         information = self._information[np.ix_(fitted, fitted)]
         if not np.all(np.linalg.eigvalsh(information) > 0.0):
@@ -225,36 +286,17 @@ class BracketChanges:
         inverse = np.linalg.inv(information)
         influences: ComplexArray = -(inverse @ left.transpose(2, 0, 1, 3))
         [covariance] = self.fit.spread(influences[np.newaxis])
-        return BracketEstimate(-inverse @ score, covariance, self.per[fitted], influences)
+        return BracketEstimate(-inverse @ score, np.sqrt(np.diagonal(covariance)), influences)
 
+    def film_covariance(self, fitted: Sequence[int], influences: ComplexArray) -> FloatArray:
+        """Covariance of the film's unknowns if some changes are fitted with them, (2, 4, 4).
 
-@dataclass(frozen=True)
-class BracketEstimate:
-    """Estimates of some changes.
-
-    Parameters
-    ----------
-    value, covariance : (n,), (n, n)
-    per : (n, 2, 4)
-        Change of the film's unknowns with each.
-    influences : (2, n_lines, n, 2)
-        Of the shaft's motion on the values, through the residual of each row.
-    """
-
-    value: FloatArray
-    covariance: FloatArray
-    per: FloatArray
-    influences: ComplexArray
-
-    @property
-    def std(self) -> FloatArray:
-        """Random standard uncertainties, (n,)."""
-        std: FloatArray = np.sqrt(np.diagonal(self.covariance))
-        return std
-
-    def with_film(self, fit: FilmFit) -> FloatArray:
-        """Covariance of the film's unknowns if these are fitted with them, (2, 4, 4)."""
-        through = self.per.transpose(1, 2, 0)[:, np.newaxis, np.newaxis] @ self.influences
+        Parameters
+        ----------
+        fitted, influences
+            These changes, and the influences on their estimate.
+        """
+        through = self.per[fitted].transpose(1, 2, 0)[:, np.newaxis, np.newaxis] @ influences
         for row in (0, 1):
-            through[row, row] += fit.own_influences[row]
-        return fit.spread(through)
+            through[row, row] += self.fit.own_influences[row]
+        return self.fit.spread(through)

@@ -29,19 +29,17 @@ from core.stiffness.channel_budget import (
     amplitude_lines,
     coherence_budget,
     phase_budget,
-    phase_lines,
     roundness_budget,
 )
-from core.stiffness.evidence import EvidenceSettings, LineLimits, chance_coherence, line_excitation
+from core.stiffness.evidence import EvidenceSettings, chance_coherence, line_excitation
 from core.stiffness.stiffness_budget import (
-    n_changed,
-    n_effective,
+    changed_polls,
+    effective_stiffness_n_per_m,
     polls_ratio_budget,
     ratio_budget,
     transfer_budgets,
 )
-from core.stiffness.transfer import effective_stiffness_n_per_m, line_transfer
-from core.uncertainty import Budgeted
+from core.uncertainty import Budgeted, effective_number
 
 FLOOR_REACH = 12
 """Bins to each side of a line in which its surroundings are judged."""
@@ -114,7 +112,7 @@ class OrderLine:
         if self.bins is not None:
             return int(self.orders.n_segments[first, last])
         both = self.usable[:, first] & self.usable[:, last]
-        return n_changed(*np.abs(self.phasors_um_pk[both][:, [first, last]]).T)
+        return int(changed_polls(*np.abs(self.phasors_um_pk[both][:, [first, last]]).T).sum())
 
     def readings(self, quality_of: QualityOf) -> dict[str, Budgeted]:
         """Amplitudes, roundness, coherence, equation (5) and transfer, by quantity."""
@@ -157,13 +155,12 @@ class OrderLine:
         free = not is_shaft or self.line != ORDER1 or place in self.round_shafts
         return 0.0 if free else self.bearing.runout_um_pk
 
-    def _phased(self, first: int, second: int) -> CrossSpectrum | None:
-        """Averages where the phases of two channels are known; None if they never are."""
+    @cached_property
+    def _phased(self) -> CrossSpectrum:
+        """Averages over the segments or polls in which the phases of two channels are known."""
         if self.bins is not None:
             return self.orders
         known = self.usable & self.has_phase
-        if not known[:, [first, second]].all(axis=1).any():
-            return None
         return average(self.orders.frequency_hz, self.phasors_um_pk[:, :, np.newaxis], known)
 
     def _amplitude(self, place: int, quality: Quality | Reading) -> Budgeted:
@@ -184,80 +181,71 @@ class OrderLine:
         if mean == 0j:
             return missing(Reason.INSUFFICIENT_EXCITATION), None
         phase_deg = math.degrees(cmath.phase(mean)) % 360.0
-        lines = phase_lines(self._runout_um_pk(place), abs(mean))
-        return Reading(phase_deg, quality), phase_budget(phase_deg, vectors, lines)
+        budget = phase_budget(phase_deg, vectors, self._runout_um_pk(place))
+        return Reading(phase_deg, quality), budget
 
     def _roundness(self, quality: Quality | Reading) -> Budgeted:
-        phased = self._phased(SHAFT_X, SHAFT_Y)
-        if isinstance(quality, Reading) or phased is None:
-            nothing = quality if isinstance(quality, Reading) else missing(Reason.NOT_MEASURED)
-            return nothing, None
-        found, shafts = roundness(phased, self.at), [SHAFT_X, SHAFT_Y]
+        if isinstance(quality, Reading):
+            return quality, None
+        if not self._phased.n_segments[SHAFT_X, SHAFT_Y]:
+            return NOT_MEASURED
+        found, shafts = roundness(self._phased, self.at), [SHAFT_X, SHAFT_Y]
         known = (self.usable & self.has_phase)[:, shafts].all(axis=1)
         counted = self.phasors_um_pk[known][:, shafts]
         runout_um_pk = tuple(self._runout_um_pk(place) for place in shafts)
         return Reading(found, quality), roundness_budget(self.bearing, found, counted, runout_um_pk)
 
     def _pair_quality(self, x: int, y: int, rotation_sense: int) -> Quality:
-        phased = self._phased(x, y)
-        if phased is None or not self._turns(phased, x, y):
-            return GOOD
+        phased = self._phased
         power, cross = phased.power[self.at], complex(phased.matrix[self.at, x, y])
+        if self.bins is not None:
+            moves = bool(phased.n_segments[x, y]) and self._stands_out(x) and self._stands_out(y)
+        else:
+            # runout is as round as the shaft's orbit, and turns as it does or against it
+            least_um_pk = max(self.floors_um_pk[x], self.floors_um_pk[y], self._runout_um_pk(x))
+            moves = bool(min(power[x, y], power[y, x]) > least_um_pk**2)
+        if not moves:
+            return GOOD
         share = backward_share(float(power[x, y]), float(power[y, x]), cross)
         return axes_quality(share, rotation_sense, self.settings.sensors)
-
-    def _turns(self, phased: CrossSpectrum, x: int, y: int) -> bool:
-        """Whether a pair of channels moves so much that its sense of turning means anything."""
-        if self.bins is not None:
-            return bool(phased.n_segments[x, y] and self._stands_out(x) and self._stands_out(y))
-        # runout is as round as the shaft's orbit, and turns as it does or against it
-        least_um_pk = max(self.floors_um_pk[x], self.floors_um_pk[y], self._runout_um_pk(x))
-        power = phased.power[self.at]
-        return bool(min(power[x, y], power[y, x]) > least_um_pk**2)
 
     def _direction(
         self, axes: str, shaft: int, bearing: int, quality: Quality | Reading
     ) -> dict[str, Budgeted]:
         """Coherence, equation (5) and transfer of one direction."""
-        coherence, k_eff, k, c = (
-            f"coherence_{axes}",
-            f"k_eff_{axes}_n_per_m",
-            f"transfer_k_{axes}_n_per_m",
-            f"transfer_c_{axes}_n_s_per_m",
-        )
+        coherence: Budgeted
+        found: list[Budgeted]
         if isinstance(quality, Reading):
-            found = dict.fromkeys((coherence, k_eff, k, c), (quality, None))
-            return found | ({} if self.bins is not None else {coherence: NOT_MEASURED})
-        few = self.n_segments(shaft, bearing) < self.min_segments
-        u, v = self._common(shaft, bearing)
-        n = (
-            n_effective(u, v)
-            if self.bins is None
-            else independent_segments(
-                int(self.orders.n_segments[shaft, bearing]), self.settings.overlap
-            )
-        )
-        shown = self._coherence(shaft, bearing, quality, n, few)
-        reason = self._exclusion_reason(shaft, bearing, n, few)
-        if reason is not Reason.OK:
-            return {coherence: shown} | dict.fromkeys((k_eff, k, c), (missing(reason), None))
-        of_k, of_c = self._transfer(shaft, bearing, quality, n, few)
+            coherence, found = (quality, None), [(quality, None)] * 3
+        else:
+            few = self.n_segments(shaft, bearing) < self.min_segments
+            n_segments = self._n_independent(shaft, bearing)
+            value = self.orders.coherence_at(self.at, shaft, bearing)
+            coherence = Reading(value, quality), coherence_budget(value, n_segments)
+            if few:
+                coherence = missing(Reason.FEW_SEGMENTS), None
+            reason = self._exclusion_reason(shaft, bearing, n_segments, few)
+            if reason is Reason.OK:
+                ratio = self._ratio(shaft, bearing, quality, n_segments)
+                found = [ratio, *self._transfer(shaft, bearing, quality, n_segments, few)]
+            else:
+                found = [(missing(reason), None)] * 3
+        k_eff, k, c = found
         return {
-            coherence: shown,
-            k_eff: self._ratio(shaft, bearing, quality, n),
-            k: of_k,
-            c: of_c,
+            f"coherence_{axes}": NOT_MEASURED if self.bins is None else coherence,
+            f"k_eff_{axes}_n_per_m": k_eff,
+            f"transfer_k_{axes}_n_per_m": k,
+            f"transfer_c_{axes}_n_s_per_m": c,
         }
 
-    def _coherence(
-        self, shaft: int, bearing: int, quality: Quality, n_segments: float, few: bool
-    ) -> Budgeted:
-        if self.bins is None:
-            return NOT_MEASURED
-        if few:
-            return missing(Reason.FEW_SEGMENTS), None
-        coherence = self.orders.coherence_at(self.at, shaft, bearing)
-        return Reading(coherence, quality), coherence_budget(coherence, n_segments)
+    def _n_independent(self, shaft: int, bearing: int) -> float:
+        """Independent segments or polls with as much information as those of a direction."""
+        if self.bins is not None:
+            n_common = int(self.orders.n_segments[shaft, bearing])
+            return independent_segments(n_common, self.settings.overlap)
+        u, v = self._common(shaft, bearing)
+        changed = changed_polls(u, v)
+        return effective_number(v[changed] / u[changed])
 
     def _ratio(self, shaft: int, bearing: int, quality: Quality, n_segments: float) -> Budgeted:
         bracket, accuracy = self.bearing.bracket, self.bearing.accuracy
@@ -267,19 +255,19 @@ class OrderLine:
                 self.orders, self.at, shaft, bearing, bracket, accuracy, n_segments, runout_um_pk
             )
         else:
-            phased = self._phased(shaft, bearing)
-            known = 0.0 if phased is None else phased.coherence_at(self.at, shaft, bearing)
+            known = self._phased.coherence_at(self.at, shaft, bearing)
             budget = polls_ratio_budget(
                 *self._common(shaft, bearing),
                 self.frequency_hz,
                 bracket,
                 accuracy,
                 max(self.settings.min_coherence, known),
+                n_segments,
                 runout_um_pk,
                 self._across(shaft),
             )
         if budget is not None:
-            return budget.reading(quality), budget
+            return Reading(budget.value, quality), budget
         ratio = float(self.orders.amplitude_ratio(bearing, shaft)[self.at])
         k_eff = effective_stiffness_n_per_m(ratio, 1.0, self.bearing.bracket_stiffness_n_per_m)
         return Reading(k_eff, quality), None
@@ -287,17 +275,17 @@ class OrderLine:
     def _transfer(
         self, shaft: int, bearing: int, quality: Quality, n_segments: float, few: bool
     ) -> tuple[Budgeted, Budgeted]:
-        phased, bracket = self._phased(shaft, bearing), self.bearing.bracket
-        if phased is None:
+        phased, runout_um_pk = self._phased, self._runout_um_pk(shaft)
+        if not phased.n_segments[shaft, bearing]:
             return NOT_MEASURED, NOT_MEASURED
-        found = line_transfer(phased, self.at, shaft, bearing, bracket, n_segments)
-        if few or found is None:
-            nothing = missing(Reason.FEW_SEGMENTS), None
-            return nothing, nothing
-        of_k, of_c = transfer_budgets(
-            found, bracket, self.bearing.accuracy, self._runout_um_pk(shaft)
+        bracket, accuracy = self.bearing.bracket, self.bearing.accuracy
+        found = transfer_budgets(
+            phased, self.at, shaft, bearing, bracket, accuracy, n_segments, runout_um_pk
         )
-        return (of_k.reading(quality), of_k), (of_c.reading(quality), of_c)
+        if few or found is None:
+            return (missing(Reason.FEW_SEGMENTS), None), (missing(Reason.FEW_SEGMENTS), None)
+        of_k, of_c = found
+        return (Reading(of_k.value, quality), of_k), (Reading(of_c.value, quality), of_c)
 
     def _exclusion_reason(self, shaft: int, bearing: int, n_segments: float, few: bool) -> Reason:
         """Why no stiffness may be read from the line; OK if one may."""
@@ -306,14 +294,12 @@ class OrderLine:
             return quiet
         if self.orders.amplitude_um_pk(bearing)[at] < self.floors_um_pk[bearing]:
             return quiet
-        runout_um_pk = self._runout_um_pk(shaft)
+        min_coherence, runout_um_pk = self.settings.min_coherence, self._runout_um_pk(shaft)
         if self.bins is None:
-            limits = LineLimits(0.0, runout_um_pk)
-            reason = line_excitation(self.orders, at, shaft, bearing, limits)
-            phased = self._phased(shaft, bearing)
-            if reason is Reason.OK and phased is not None:  # phases that change at random
-                limits = LineLimits(self.settings.min_coherence, runout_um_pk)
-                reason = line_excitation(phased, at, shaft, bearing, limits)
+            reason = line_excitation(self.orders, at, shaft, bearing, 0.0, runout_um_pk)
+            if reason is Reason.OK:  # phases, where known, may change at random
+                at_phases = self._phased, at, shaft, bearing
+                reason = line_excitation(*at_phases, min_coherence, runout_um_pk)
             return Reason.OK if reason is Reason.FEW_SEGMENTS else reason
         # what is no line must not be read as the vortex's
         if (few or self.line == VORTEX) and not self._stands_out(shaft):
@@ -321,9 +307,8 @@ class OrderLine:
         if few and not self._stands_out(bearing):
             return quiet
         # few segments are coherent with anything
-        least = 0.0 if few else max(self.settings.min_coherence, chance_coherence(n_segments))
-        limits = LineLimits(least, runout_um_pk)
-        reason = line_excitation(self.orders, at, shaft, bearing, limits)
+        least = 0.0 if few else max(min_coherence, chance_coherence(n_segments))
+        reason = line_excitation(self.orders, at, shaft, bearing, least, runout_um_pk)
         return Reason.OK if few and reason is Reason.FEW_SEGMENTS else reason
 
     def _common(self, shaft: int, bearing: int) -> tuple[FloatArray, FloatArray]:

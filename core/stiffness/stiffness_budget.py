@@ -1,4 +1,4 @@
-"""Budgets of the three estimators of film stiffness: which errors reach which result, and how."""
+"""Film stiffness at one line with its budget: equation (5) by amplitudes, `transfer` by phasors."""
 
 import math
 from collections.abc import Callable
@@ -8,14 +8,11 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.machine.unit import BearingAccuracy, BracketDynamics
-from core.spectra.cross_spectrum import CrossSpectrum
-from core.stiffness.dynamic import DynamicStiffness
-from core.stiffness.transfer import LineTransfer, motion_across
+from core.spectra.cross_spectrum import SHAFT_X, SHAFT_Y, CrossSpectrum
 from core.uncertainty import (
     SHAFT_GAIN,
     Budget,
     BudgetLine,
-    effective_number,
     random_line,
     systematic_line,
 )
@@ -31,18 +28,47 @@ RUNOUT = "runout"
 SPREAD = "spread of polls"
 COHERENCE = "coherence not known"
 
-RESOLUTION = 0.001
-"""Half-width, relative to a row's direct coefficient, of what tapering does to `dynamic`: a line
-holds motion of its neighbours, which is integrated with the line's own frequency. Found to be
-0.03 % in simulations without any noise, at 0.07 Hz a bin."""
 
-
-def _gains(value: float, accuracy: BearingAccuracy) -> tuple[BudgetLine, BudgetLine]:
+def gain_lines(value: float, accuracy: BearingAccuracy) -> tuple[BudgetLine, BudgetLine]:
     """Results are proportional to bearing motion and inversely to shaft motion."""
     return (
         systematic_line(SHAFT_GAIN, accuracy.shaft_gain, -value),
         systematic_line(BEARING_GAIN, accuracy.bearing_gain, value),
     )
+
+
+def effective_stiffness_n_per_m(
+    bearing_um_pk: float, shaft_um_pk: float, bracket_stiffness_n_per_m: float
+) -> float:
+    """Effective stiffness ``|k + iωc|`` of an oil film at one spectral line.
+
+    Parameters
+    ----------
+    bearing_um_pk
+        Absolute displacement of the bearing.
+    shaft_um_pk
+        Displacement of the shaft relative to the bearing, same direction and line. The two
+        amplitudes may carry any unit and detector as long as it is the same.
+    bracket_stiffness_n_per_m
+        Radial stiffness k_b of the bracket. Its inertia is left out, which biases the result by
+        m_b ω² / k_b (+0.4 % on the paper's machine at rated speed).
+
+    Raises
+    ------
+    ValueError
+        If the shaft amplitude is not positive.
+    """
+    if not shaft_um_pk > 0.0:
+        raise ValueError(f"shaft amplitude must be above 0 µm, got {shaft_um_pk}")
+    # Brito et al., equation (5): k_eff = |X_b| / |U| · k_b
+    return bearing_um_pk / shaft_um_pk * bracket_stiffness_n_per_m
+
+
+def motion_across(spectrum: CrossSpectrum, line: int, shaft: int) -> complex:
+    """Coherent shaft motion across a direction per motion along it; 1 if that is not known."""
+    across = SHAFT_Y if shaft == SHAFT_X else SHAFT_X
+    power = float(spectrum.power[line, shaft, across])
+    return complex(spectrum.matrix[line, across, shaft]) / power if power > 0.0 else 1.0
 
 
 def ratio_budget(
@@ -99,6 +125,7 @@ def polls_ratio_budget(
     bracket: BracketDynamics,
     accuracy: BearingAccuracy,
     coherence: float,
+    n_effective: float,
     runout_um_pk: float = 0.0,
     across: float = 1.0,
 ) -> Budget | None:
@@ -113,8 +140,10 @@ def polls_ratio_budget(
         Amplitudes of the same polls; shaft amplitudes above zero.
     coherence
         Squared, of the two; without phases the least that would be accepted of waveforms.
+    n_effective
+        Number of independent polls with as much information.
     runout_um_pk
-        Largest runout at this line, not taken off.
+        As for `ratio_budget`.
     across
         Shaft amplitude across this direction over that along it.
 
@@ -122,18 +151,17 @@ def polls_ratio_budget(
     -------
     None with fewer than two independent polls.
     """
-    independent = n_effective(shaft_um_pk, bearing_um_pk)
-    if independent < 2.0:
+    if n_effective < 2.0:
         return None
     shaft = float(np.sqrt(np.mean(shaft_um_pk**2)))
     value = float(np.sqrt(np.mean(bearing_um_pk**2))) / shaft * bracket.stiffness_n_per_m
     each = bearing_um_pk / shaft_um_pk * bracket.stiffness_n_per_m
-    random = float(np.std(each, ddof=1)) / math.sqrt(independent)
+    random = float(np.std(each, ddof=1)) / math.sqrt(n_effective)
     known = (COHERENCE, coherence)
     lines = _ratio_lines(
         value, frequency_hz, bracket, accuracy, (runout_um_pk, shaft), across, known
     )
-    return Budget(value, (random_line(SPREAD, random, independent - 1.0), *lines))
+    return Budget(value, (random_line(SPREAD, random, n_effective - 1.0), *lines))
 
 
 def _ratio_lines(
@@ -149,7 +177,7 @@ def _ratio_lines(
     runout_um_pk, shaft_um_pk = runout_of_um_pk
     inertia = bracket.max_mass_kg * (2.0 * math.pi * frequency_hz) ** 2 / bracket.stiffness_n_per_m
     return (
-        *_gains(value, accuracy),
+        *gain_lines(value, accuracy),
         systematic_line(BRACKET, accuracy.bracket_stiffness, value),
         systematic_line(CROSS_COUPLING, accuracy.cross_coupling, value * across),
         systematic_line(coherence[0], 1.0 / math.sqrt(coherence[1]) - 1.0, value),
@@ -158,22 +186,8 @@ def _ratio_lines(
     )
 
 
-def n_changed(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> int:
-    """Polls in which at least one of two amplitudes differs from the poll before."""
-    return int(np.count_nonzero(_changed(shaft_um_pk, bearing_um_pk)))
-
-
-def n_effective(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> float:
-    """Number of independent polls with as much information, at least 2 of 2 or more.
-
-    A rack averages, perhaps for longer than a poll period: neighbouring polls then share much of
-    what they show.
-    """
-    changed = _changed(shaft_um_pk, bearing_um_pk)
-    return effective_number(bearing_um_pk[changed] / shaft_um_pk[changed])
-
-
-def _changed(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> npt.NDArray[np.bool_]:
+def changed_polls(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> npt.NDArray[np.bool_]:
+    """Polls in which at least one of two amplitudes differs from the poll before, (n_polls,)."""
     changed = np.ones(shaft_um_pk.size, dtype=np.bool_)
     changed[1:] = (np.diff(shaft_um_pk) != 0.0) | (np.diff(bearing_um_pk) != 0.0)
     return changed
@@ -193,96 +207,67 @@ def damping_half_width_n_s_per_m(
 
 
 def transfer_budgets(
-    found: LineTransfer,
+    spectrum: CrossSpectrum,
+    line: int,
+    shaft: int,
+    bearing: int,
     bracket: BracketDynamics,
     accuracy: BearingAccuracy,
+    n_segments: float | None = None,
     runout_um_pk: float = 0.0,
-) -> tuple[Budget, Budget]:
-    """Uncertainty of stiffness in N/m and damping in N·s/m from `transfer`.
+) -> tuple[Budget, Budget] | None:
+    """Stiffness in N/m and damping in N·s/m of a film by `transfer`, with their uncertainty.
+
+    H1 with the shaft's motion as input does not grow with bearing noise. It sees one direction at a
+    time, so that a film with cross-coupling shows in it as ``k_xx + k_xy · u_y / u_x``.
 
     Parameters
     ----------
-    runout_um_pk
-        As for `ratio_budget`; its phase is not known, so that it reaches damping as well.
+    n_segments, runout_um_pk
+        As for `ratio_budget`; the phase of runout is not known: it reaches damping as well.
+
+    Returns
+    -------
+    None without shaft motion or with fewer than two segments: one shows no coherence.
     """
-    omega = 2.0 * math.pi * found.frequency_hz
+    shaft_power = float(spectrum.power[line, shaft, bearing])
+    counted = float(spectrum.n_segments[shaft, bearing]) if n_segments is None else n_segments
+    if shaft_power <= 0.0 or counted < 2.0:
+        return None
+    omega = 2.0 * math.pi * float(spectrum.frequency_hz[line])
+    ratio = complex(spectrum.matrix[line, bearing, shaft]) / shaft_power
+    impedance = complex(bracket.dynamic_stiffness_n_per_m(spectrum.frequency_hz[[line]])[0])
+    h1 = impedance * ratio
+    k, c = h1.real, h1.imag / omega
+    # Bendat and Piersol, Random Data, 4th ed., table 9.6, with n - 1 for what H1 itself takes up
+    incoherent = 1.0 - spectrum.coherence_at(line, shaft, bearing)
+    left = incoherent * float(spectrum.power[line, bearing, shaft]) / shaft_power
+    std = abs(impedance) * math.sqrt(left / (2.0 * (counted - 1.0)))
     mass_kg = mass_half_width_kg(bracket, accuracy)
     damping = damping_half_width_n_s_per_m(bracket, bracket.max_mass_kg, accuracy)
-    film = complex(found.k_n_per_m, omega * found.c_n_s_per_m)
-    any_phase = abs(film) * (1.0 + 1.0j)
+    across = abs(motion_across(spectrum, line, shaft))
+    film = complex(k, omega * c)
+    any_phase = abs(film) * (1.0 + 1.0j)  # all of it may be in the real or in the imaginary part
 
     def budget(value: float, std: float, part: Callable[[complex], float]) -> Budget:
         """Budget of a part of the film's dynamic stiffness, a linear function of it."""
         return Budget(
             value,
             (
-                random_line(STATISTICS, std, 2.0 * (found.n_segments - 1.0)),
-                *_gains(value, accuracy),
+                random_line(STATISTICS, std, 2.0 * (counted - 1.0)),
+                *gain_lines(value, accuracy),
                 systematic_line(
-                    BRACKET,
-                    accuracy.bracket_stiffness,
-                    part(bracket.stiffness_n_per_m * found.ratio),
+                    BRACKET, accuracy.bracket_stiffness, part(bracket.stiffness_n_per_m * ratio)
                 ),
-                systematic_line(MASS, mass_kg, part(-(omega**2) * found.ratio)),
-                systematic_line(DAMPING, damping, part(1j * omega * found.ratio)),
+                systematic_line(MASS, mass_kg, part(-(omega**2) * ratio)),
+                systematic_line(DAMPING, damping, part(1j * omega * ratio)),
                 systematic_line(DELAY, accuracy.delay_s, part(1j * omega * film)),
-                # all of it may be in the real or in the imaginary part
-                systematic_line(RUNOUT, runout_um_pk, part(any_phase) / found.shaft_um_pk),
-                systematic_line(
-                    CROSS_COUPLING, accuracy.cross_coupling, part(any_phase) * abs(found.across)
-                ),
+                systematic_line(RUNOUT, runout_um_pk, part(any_phase) / math.sqrt(shaft_power)),
+                systematic_line(CROSS_COUPLING, accuracy.cross_coupling, part(any_phase) * across),
             ),
         )
 
     return (
-        budget(found.k_n_per_m, found.k_std_n_per_m, lambda z: z.real),
-        budget(found.c_n_s_per_m, found.c_std_n_s_per_m, lambda z: z.imag / omega),
+        budget(k, std, lambda z: z.real),
+        budget(c, std / omega, lambda z: z.imag / omega),
     )
-
-
-def dynamic_budgets(
-    found: DynamicStiffness, bracket: BracketDynamics, accuracy: BearingAccuracy
-) -> dict[str, Budget]:
-    """Uncertainty of all eight coefficients from `dynamic`.
-
-    A mass that was fitted with the film is part of the statistics.
-
-    Returns
-    -------
-    By name, ``k_xx`` in N/m to ``c_yy`` in N·s/m.
-    """
-    is_fitted = bracket.mass_kg is None
-    mass_kg = 0.0 if is_fitted else mass_half_width_kg(bracket, accuracy)
-    damping = damping_half_width_n_s_per_m(bracket, max(found.bracket_mass_kg, 0.0), accuracy)
-    widths = (
-        (BRACKET, accuracy.bracket_stiffness, found.per_stiffness),
-        (MASS, mass_kg, found.per_mass),
-        (DAMPING, damping, found.per_damping),
-        (DELAY, accuracy.delay_s, found.per_delay),
-    )
-    # a shaft spectrum that is too large by a share makes every coefficient too small by as much
-    left_in = found.noise_share / (1.0 - found.noise_share)
-    budgets = {}
-    for letter, attribute, std in (
-        ("k", "k_n_per_m", found.k_std_n_per_m),
-        ("c", "c_n_s_per_m", found.c_std_n_s_per_m),
-    ):
-        coefficients = getattr(found, attribute)
-        for at in np.ndindex(2, 2):
-            value = float(coefficients[at])
-            budgets[f"{letter}_{'xy'[at[0]]}{'xy'[at[1]]}"] = Budget(
-                value,
-                (
-                    random_line(STATISTICS, float(std[at])),
-                    *_gains(value, accuracy),
-                    *(
-                        systematic_line(name, width, float(getattr(change, attribute)[at]))
-                        for name, width, change in widths
-                    ),
-                    systematic_line("probe noise taken off", accuracy.probe_noise, value * left_in),
-                    systematic_line(
-                        "spectral resolution", RESOLUTION, float(coefficients[at[0], at[0]])
-                    ),
-                ),
-            )
-    return budgets

@@ -18,6 +18,9 @@ from service.settings.core_values import calibration_of, machine_of
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
 
+ANALYSED_S = 10.0
+"""Length of the blocks of a recording that is analysed and raises no alarm."""
+
 
 def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
     """Create the writer of a recording of a unit; the first block decides on counts or values.
@@ -86,7 +89,7 @@ def recording_source(
     """
     if unit is not None:
         selection = replace(selection, calibration=calibration_of(unit))
-    return RecordingSource(recording, clock, selection)
+    return RecordingSource(recording, clock, selection, block_s=ANALYSED_S)
 
 
 def replay_source(

@@ -11,7 +11,6 @@ from enum import StrEnum
 from pathlib import Path
 
 from acquisition.clock import Clock
-from acquisition.delivery.calibration import UnitCalibration
 from acquisition.errors import AcquisitionError
 from acquisition.simulated.devices.fifo_device import FifoDevice
 from acquisition.simulated.devices.map_device import MapDevice, VectorDevice
@@ -22,6 +21,7 @@ from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSett
 from acquisition.simulated.devices.server import DaqServer
 from acquisition.simulated.feed import SampleFeed
 from core.machine.unit import Unit
+from core.samples.calibration import UnitCalibration
 from service.settings.adapter_values import can_daq_of
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.plant import PlantFile

@@ -148,7 +148,7 @@ async def _read_once(
 ) -> None:
     async with source.connect() as blocks:
         async for block in blocks:
-            writer.write_calibrated(block)
+            writer.write_block(block)
             bar.update(round(min(writer.duration_s, seconds)) - bar.pos)
             if writer.duration_s >= seconds:
                 return

@@ -1,19 +1,23 @@
 """Blocks and news of links as bytes, and back, bit for bit."""
 
 import hashlib
+import itertools
 import json
 import math
 import struct
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Annotated, TypeVar
+from functools import lru_cache
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
-from core.quality import Quality, Reading
-from core.samples.blocks import DeviceClock, Rejection, SampleBlock, StampFault
+from core.quality import Reading
+from core.samples.blocks import DeviceClock, Rejection, SampleBlock, SideValues, StampFault
+from core.samples.calibration import UnitCalibration
 from service.live.live_view import LinkState
 from service.measuring.acquirer import LinkNews
 
@@ -33,18 +37,18 @@ class WireError(ValueError):
 
 
 def require_possible(block: SampleBlock) -> None:
-    """Refuse what no adapter makes, before anything reckons with it.
+    """Refuse what no adapter makes, before anything is calculated from it.
 
     Raises
     ------
     WireError
-        If a block has no samples, or one that is no number, which would blind a whole spectrum; a
-        slow value that is none; or less than no rejected samples.
+        If a block has no samples, a calibration or a reading that is not finite, or a negative
+        number of rejected samples.
     """
     if not block.n_samples:
         raise WireError("impossible", "a block without samples")
-    if not np.isfinite(block.samples).all():
-        raise WireError("impossible", "a block with samples that are no numbers")
+    if not all(math.isfinite(c.unit_per_count) for c in block.calibration.channels):
+        raise WireError("impossible", "a block with a calibration that is no number")
     if not all(math.isfinite(reading.value or 0.0) for reading in block.slow.values()):
         raise WireError("impossible", "a block with a slow value that is no number")
     if any(rejection.n_samples < 0 for rejection in block.rejected):
@@ -81,8 +85,8 @@ def fingerprint(*words: object) -> bytes:
 
 MAGIC = b"PWSM"
 
-VERSION = 1
-READABLE = (1,)
+VERSION = 2
+READABLE = (2,)
 """A reader knows the version it writes and the one before: it is upgraded before the writers."""
 
 MAX_HEAD_BYTES = 1 << 18
@@ -170,7 +174,8 @@ def _other_version(version: int) -> str:
     return f"a message of format version {version}, this program reads {known}: {newer}"
 
 
-SAMPLE = np.dtype("<f4")
+SAMPLE: Mapping[str, np.dtype[Any]] = {"int16": np.dtype("<i2"), "float32": np.dtype("<f4")}
+"""Counts of a converter, or engineering units, as they travel."""
 
 Epoch = Annotated[int, Field(ge=0, lt=2**63)]
 Index = Annotated[int, Field(ge=0, lt=2**53)]
@@ -184,20 +189,28 @@ T = TypeVar("T")
 STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="constants")
 
 
+class Cell(NamedTuple):
+    """Values beside the samples from one sample on; ``ok`` has a bit for each channel."""
+
+    start: Index
+    start_ns: Ns
+    ok: Index
+    slow: tuple[float, ...]
+
+
 @dataclass(frozen=True)
 class BlockHead:
     """All of a block but its samples."""
 
     __pydantic_config__ = STRICT
 
-    unit: str
+    calibration: UnitCalibration
     epoch: Epoch
     first_index: Index
-    start_ns: Ns
-    rate_hz: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
     n_samples: Index
-    channel_quality: tuple[Quality, ...]
-    slow: dict[str, Reading]
+    sample_type: Literal["int16", "float32"]
+    cells: tuple[Cell, ...]
+    elsewhere: dict[str, Reading]
     rejected: tuple[Rejection, ...]
     clock: DeviceClock | None
     stamp_fault: StampFault | None
@@ -235,21 +248,25 @@ class Taken:
 
 def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> bytes:
     """A block as a message. Raises `ValueError` if it is longer than a reader takes."""
+    side, type_ = block.side, block.counts.dtype.name
+    columns = (side.starts.tolist(), side.start_ns.tolist(), side.ok.T.tolist())
     head = BlockHead(
-        unit=block.unit,
+        calibration=block.calibration,
         epoch=block.epoch,
         first_index=block.first_index,
-        start_ns=block.start_ns,
-        rate_hz=block.rate_hz,
         n_samples=block.n_samples,
-        channel_quality=block.channel_quality,
-        slow=dict(block.slow),
+        sample_type="int16" if type_ == "int16" else "float32",
+        cells=tuple(
+            Cell(start, start_ns, sum(is_ok << row for row, is_ok in enumerate(ok)), tuple(slow))
+            for start, start_ns, ok, slow in zip(*columns, side.slow.T.tolist(), strict=True)
+        ),
+        elsewhere=dict(block.elsewhere),
         rejected=block.rejected,
         clock=block.clock,
         stamp_fault=block.stamp_fault,
         taken_ns=taken_ns,
     )
-    samples = np.ascontiguousarray(block.samples, dtype=SAMPLE).tobytes()
+    samples = np.ascontiguousarray(block.counts, dtype=SAMPLE[head.sample_type]).tobytes()
     return framed(Kind.BLOCK, identity, _BLOCK.dump_json(head), samples)
 
 
@@ -282,28 +299,50 @@ def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
 
 def _block(frame: Frame, identity: UnitIdentity) -> Taken:
     head = _read(_BLOCK, frame.head)
-    _require_own(head.unit, identity)
-    n_channels = len(head.channel_quality)
-    if n_channels * head.n_samples * SAMPLE.itemsize != len(frame.samples):
+    _require_own(head.calibration.unit, identity)
+    n_channels, type_ = len(head.calibration.channels), SAMPLE[head.sample_type]
+    if n_channels * head.n_samples * type_.itemsize != len(frame.samples):
         raise WireError(
             "wrong_length",
             f"{len(frame.samples)} bytes of samples for {n_channels} channels of {head.n_samples}",
         )
-    samples = np.frombuffer(frame.samples, dtype=SAMPLE).reshape(n_channels, head.n_samples)
+    counts = np.frombuffer(frame.samples, dtype=type_).reshape(n_channels, head.n_samples)
     block = SampleBlock(
-        unit=head.unit,
+        calibration=_shared(head.calibration),
         epoch=head.epoch,
         first_index=head.first_index,
-        start_ns=head.start_ns,
-        rate_hz=head.rate_hz,
-        samples=samples.astype(np.float32, copy=False),
-        channel_quality=head.channel_quality,
-        slow=head.slow,
+        counts=counts.astype(head.sample_type, copy=False),
+        side=_side_values(head),
+        elsewhere=head.elsewhere,
         rejected=head.rejected,
         clock=head.clock,
         stamp_fault=head.stamp_fault,
     )
     return Taken(block, head.taken_ns)
+
+
+@lru_cache(maxsize=1024)
+def _shared(calibration: UnitCalibration) -> UnitCalibration:
+    """The same object for equal calibrations, as all blocks of a source have."""
+    return calibration
+
+
+def _side_values(head: BlockHead) -> SideValues:
+    n_channels, n_slow = len(head.calibration.channels), len(head.calibration.slow)
+    starts = [cell.start for cell in head.cells]
+    edges = [*starts, head.n_samples]
+    if (
+        starts[:1] != [0]
+        or any(start >= stop for start, stop in itertools.pairwise(edges))
+        or any(len(cell.slow) != n_slow or cell.ok >> n_channels for cell in head.cells)
+    ):
+        raise WireError("not_understood", "a block whose cells do not fit its samples")
+    return SideValues(
+        starts=np.array(starts, dtype=np.int64),
+        start_ns=np.array([cell.start_ns for cell in head.cells], dtype=np.int64),
+        ok=np.array([[bool(c.ok >> row & 1) for c in head.cells] for row in range(n_channels)]),
+        slow=np.array([cell.slow for cell in head.cells], dtype=np.float64).reshape(-1, n_slow).T,
+    )
 
 
 def _read(adapter: TypeAdapter[T], head: bytes) -> T:

@@ -190,6 +190,6 @@ class LiveView:
 
     def _hold(self, block: SampleBlock) -> None:
         if block.unit not in self._blocks:
-            most = HELD_SAMPLES // max(block.samples.shape[0], 1)
+            most = HELD_SAMPLES // max(block.counts.shape[0], 1)
             self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))
         self._blocks[block.unit].add(block)

@@ -9,7 +9,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmNews
-from core.alarms.board import AlarmMemory
+from core.alarms.board import AlarmBoard, AlarmMemory
 from core.alarms.judgements import VectorReference
 from core.alarms.kinds import LINK_LOST
 from core.alarms.operation import Action
@@ -45,7 +45,7 @@ from service.settings.core_values import (
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.settings.units import UnitSettings
-from service.store.access.audit_entries import acting
+from service.store.access.audit_entries import ActedNews, acting
 from service.store.port import AlarmQuery, Store
 
 log = structlog.get_logger()
@@ -58,8 +58,6 @@ NO_FILMS: Mapping[str, Judgement] = MappingProxyType({})
 
 WITHOUT_LINK = (LINK_LOST, MESSAGES_REFUSED)
 """Kinds that are judged also while no samples arrive."""
-
-Board = UnitAlarms | ServiceAlarms | ToldAlarms
 
 LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
 
@@ -212,7 +210,7 @@ class AlarmEngine:
         own = self._owner(id_)
         news = own.operate(id_, action, self._clock.now_ns())
         who = acting()
-        self._publish([replace(told, peer=who.peer, command=who.command) for told in news])
+        self._publish([ActedNews(told.alarm, told.events, who.peer, who.command) for told in news])
         return own.alarm(id_)
 
     def alarm(self, id_: str) -> Alarm:
@@ -273,10 +271,10 @@ class AlarmEngine:
                 self._chatter.note(event, now_ns)
 
     @property
-    def _boards(self) -> list[Board]:
+    def _boards(self) -> list[AlarmBoard]:
         return [*self._units.values(), self._service, *self._kept]
 
-    def _owner(self, id_: str) -> Board:
+    def _owner(self, id_: str) -> AlarmBoard:
         """Who keeps an alarm, if there is one of that name."""
         for board in self._kept:
             if id_ in board:

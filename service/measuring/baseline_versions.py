@@ -7,7 +7,7 @@ import numpy as np
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline
-from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.change.backtest import last_decision, last_operation
 from core.change.decision import INITIAL_DECISION, Decision
 from core.change.film_judge import MAX_RECENT
@@ -60,7 +60,7 @@ def caught_up(
     newest_ns = _newest_ns(store, place)
     start_ns = newest_ns - round(CATCH_UP_NS / rules.time_lapse)
     found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, start_ns))
-    learned = (baseline.of(Watched.STIFFNESS, direction) for direction in DIRECTIONS)
+    learned = (baseline.of(direction) for direction in DIRECTIONS)
     return tuple(
         last_decision(found.history, found.is_settled, quantity, rules)
         if quantity
@@ -136,7 +136,7 @@ def _rises(history: StiffnessHistory, baseline: BearingBaseline | None) -> Float
     """(2, n) rise of the baseline with eccentricity; NaN where there is none."""
     rises = np.full((len(DIRECTIONS), len(history)), np.nan)
     for row, direction in enumerate(DIRECTIONS):
-        learned = baseline.of(Watched.STIFFNESS, direction) if baseline else None
+        learned = baseline.of(direction) if baseline else None
         if learned is not None:
             rises[row] = learned.eccentricity_rise(history.conditions)
     return rises

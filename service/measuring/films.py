@@ -181,7 +181,7 @@ class FilmKeeper:
     async def _learn_response(self, unit: str) -> None:
         films, now_ns = self._films[unit], self._clock.now_ns()
         response = await asyncio.to_thread(self.learner.learn_response, unit, films.rules, now_ns)
-        films.watch.judge.set_response(response)
+        films.watch.judge.response = response
 
     async def act(
         self, place: FilmPlace, action: BaselineAction, actor: str, reason: str
@@ -233,7 +233,7 @@ def _restore(watch: FilmWatch, found: UnitStart) -> None:
     for bearing, its in found.bearings.items():
         watch.judge.activate_baseline(bearing, its.baseline, its.decisions)
     watch.judge.add_recent(found.recent)
-    watch.judge.set_response(found.response)
+    watch.judge.response = found.response
 
 
 async def film_keeper(

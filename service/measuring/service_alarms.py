@@ -9,9 +9,8 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmNews, AlarmRule
-from core.alarms.board import AlarmBoard
-from core.alarms.kinds import LimitWatch, Watch, watch
-from core.alarms.operation import Action
+from core.alarms.board import AlarmBoard, AlarmMemory
+from core.alarms.kinds import Watch, watch
 from core.alarms.rules import LimitRule, rule_of
 from core.condition.cells import NOWHERE_KNOWN
 from core.limits import WITHIN, AlarmLevel, Judgement, Limits
@@ -254,7 +253,7 @@ class SampleLoss:
         return bool(self._seen) and now_ns - self._seen[0][0] >= LOSS_NS - LOOK_EVERY_NS
 
 
-class ServiceAlarms:
+class ServiceAlarms(AlarmBoard):
     """Owns the alarms that belong to no unit, and those of units that are there no more.
 
     Parameters
@@ -283,51 +282,27 @@ class ServiceAlarms:
         watches = service_watches(names, rules or ServiceRules()) if look else {}
         own = {loss_key(unit) for unit in names}
         self._watches = {key: its for key, its in watches.items() if leads or key in own}
-        self._board = AlarmBoard(self._watches.values())
+        super().__init__(self._watches.values())
         self._losses = {unit: SampleLoss() for unit in names}
         self._inherited: set[str] = set()
         self._n_unstored = 0
         self._n_damaged = 0
 
-    @property
-    def alarms(self) -> Sequence[Alarm]:
-        """All of them, whatever their state."""
-        return self._board.alarms
-
-    def alarm(self, id_: str) -> Alarm:
-        """Look one up. Raises `KeyError` if there is no such alarm."""
-        return self._board.alarm(id_)
-
-    def operate(self, id_: str, action: Action, host_ns: int) -> list[AlarmNews]:
-        """Do what somebody asks for.
-
-        Raises
-        ------
-        KeyError
-            If there is no such alarm.
-        ActionRefusedError
-            If it does not fit the alarm as it is now.
-        """
-        self._board.operate(id_, action, host_ns)
-        return self._board.drain_news()
-
-    def restore(self, alarms: Iterable[Alarm], host_ns: int) -> list[AlarmNews]:
+    def restore(
+        self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
+    ) -> list[AlarmNews]:
         """Go on where the service stopped.
 
         Of what was lost before nothing is known here: lost samples that are an alarm stay one until
         this process has seen ten minutes without.
         """
-        self._board.restore(alarms, host_ns)
+        news = super().restore(stored, host_ns, memory)
         self._inherited = {
             unit
             for unit in self._losses
-            if self._board.alarm(self._watches[loss_key(unit)].id).level is not None
+            if self.alarm(self._watches[loss_key(unit)].id).level is not None
         }
-        return self._board.drain_news()
-
-    def pause(self) -> None:
-        """Let all delays stand still up to now."""
-        self._board.pause()
+        return news
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
         """Look at the service once."""
@@ -336,8 +311,7 @@ class ServiceAlarms:
             if self._leads:
                 self._judge(health, host_ns)
             self._count_losses(health, host_ns)
-        self._board.expire(host_ns)
-        return self._board.drain_news()
+        return super().tick(host_ns)
 
     def _judge(self, health: ServiceHealth, now_ns: int) -> None:
         judges = {
@@ -348,7 +322,7 @@ class ServiceAlarms:
         }
         for name in filter(SERVICE_KINDS.__contains__, self._watches):
             judge = judges.get(name, partial(self._by_reading, name))
-            self._update(name, judge(health), now_ns)
+            self.update(self._watches[name], judge(health), now_ns)
 
     def _by_reading(self, name: str, health: ServiceHealth) -> Judgement:
         """Judge the reading of a kind: a value, or the words of a trouble."""
@@ -366,7 +340,7 @@ class ServiceAlarms:
             if condition.level is not None or seen.reaches_back(now_ns):
                 self._inherited.discard(unit)
             if unit not in self._inherited:
-                self._update(loss_key(unit), condition, now_ns)
+                self.update(self._watches[loss_key(unit)], condition, now_ns)
 
     def _store(self, health: ServiceHealth) -> Judgement:
         found = self._compared("results_not_stored", health.store_behind_s)
@@ -376,7 +350,7 @@ class ServiceAlarms:
 
     def _disk(self, health: ServiceHealth) -> Judgement:
         watch = self._watches["disk_nearly_full"]
-        return health.disk(self._board.alarm(watch.id).condition.level)
+        return health.disk(self.alarm(watch.id).condition.level)
 
     def _lost(self, health: ServiceHealth) -> Judgement:
         n_more = health.n_unstored - self._n_unstored
@@ -396,35 +370,17 @@ class ServiceAlarms:
 
     def _compared(self, key: str, value: float) -> Judgement:
         watch = self._watches[key]
-        if not isinstance(watch, LimitWatch):
-            raise TypeError(f"{key} has no limits")
-        held = self._board.alarm(watch.id).condition.level
-        return watch.limits.judge(Reading(value), NOWHERE_KNOWN, held)
-
-    def _update(self, key: str, condition: Judgement, now_ns: int) -> None:
-        self._board.update(self._watches[key], condition, now_ns)
+        return watch.judge(Reading(value), NOWHERE_KNOWN, self.alarm(watch.id).condition.level)
 
 
-class ToldAlarms:
+class ToldAlarms(AlarmBoard):
     """Owns alarms of some watches; what was told of each counts from the next tick on."""
 
     def __init__(self, watches: Iterable[Watch]) -> None:
         self._watches = {watch.id: watch for watch in watches}
-        self._board = AlarmBoard(self._watches.values())
+        super().__init__(self._watches.values())
         self._found: dict[str, Judgement] = {}
         self._once: set[str] = set()
-
-    @property
-    def alarms(self) -> Sequence[Alarm]:
-        """All of them, whatever their state."""
-        return self._board.alarms
-
-    def __contains__(self, id_: str) -> bool:
-        return id_ in self._board
-
-    def alarm(self, id_: str) -> Alarm:
-        """Look one up. Raises `KeyError` if there is no such alarm."""
-        return self._board.alarm(id_)
 
     def tell(self, id_: str, condition: Judgement) -> None:
         """Note what is found; it lasts until something else is told."""
@@ -436,29 +392,14 @@ class ToldAlarms:
         self.tell(id_, condition)
         self._once.add(id_)
 
-    def operate(self, id_: str, action: Action, host_ns: int) -> list[AlarmNews]:
-        """Do what somebody asks for; raises as `AlarmBoard.operate` does."""
-        self._board.operate(id_, action, host_ns)
-        return self._board.drain_news()
-
-    def restore(self, alarms: Iterable[Alarm], host_ns: int) -> list[AlarmNews]:
-        """Go on where somebody stopped."""
-        self._board.restore(alarms, host_ns)
-        return self._board.drain_news()
-
-    def pause(self) -> None:
-        """Let all delays stand still up to now."""
-        self._board.pause()
-
     def tick(self, host_ns: int) -> list[AlarmNews]:
         """Judge what was told last."""
         for id_, condition in self._found.items():
-            self._board.update(self._watches[id_], condition, host_ns)
+            self.update(self._watches[id_], condition, host_ns)
         for id_ in self._once:
             self._found[id_] = WITHIN
         self._once.clear()
-        self._board.expire(host_ns)
-        return self._board.drain_news()
+        return super().tick(host_ns)
 
 
 SHARED = "shared work"

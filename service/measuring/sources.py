@@ -6,7 +6,6 @@ from functools import partial
 
 from acquisition.can.source import CanSource
 from acquisition.clock import Clock
-from acquisition.delivery.calibration import UnitCalibration
 from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
 from acquisition.modbus.fifo_source import FifoSettings, FifoSource
 from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
@@ -17,6 +16,7 @@ from acquisition.source import SampleSource
 from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
+from core.samples.calibration import UnitCalibration
 from core.spectra.polls import PollTransform
 from service.measuring.simulated_sources import simulated_feed
 from service.runtime.polls import TimedSource

@@ -168,7 +168,7 @@ class Capture:
     @property
     def n_pending_samples(self) -> int:
         """Samples of all channels that are still to be written."""
-        return len(self.pending) * self.pending[0].samples.size if self.pending else 0
+        return len(self.pending) * self.pending[0].counts.size if self.pending else 0
 
 
 log = structlog.get_logger()

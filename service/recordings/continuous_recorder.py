@@ -342,7 +342,7 @@ class Tape:
         told = self._holes[block.unit].before(fresh)
         self._holes[block.unit].clear()
         self._waiting.append((self._clock.monotonic_s(), told))
-        self._n_waiting += told.samples.size
+        self._n_waiting += told.counts.size
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Write what is to be written, for ever; afterwards `close`."""

@@ -116,7 +116,10 @@ class Index:
             del self._files[key]
 
 
-OF_THE_FILES = (errno.ENOENT, errno.EISDIR, errno.ENOTDIR, errno.ELOOP, errno.EINVAL)
+OF_THE_FILES = (
+    *(errno.ENOENT, errno.EISDIR, errno.ENOTDIR),
+    *(errno.ELOOP, errno.EINVAL, errno.EFBIG),
+)
 """What the system says of what lies there; all else may be otherwise at the next try."""
 
 

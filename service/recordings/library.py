@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.blocks import sample_block
 from acquisition.errors import ConfigError
-from acquisition.recordings.export import csv_tables
+from acquisition.recordings.export import ExportFormat, write_rows
 from acquisition.recordings.manifest import Manifest, checksum_of, read_manifest
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.source import all_of
@@ -131,7 +131,7 @@ class Shelf:
             If it is damaged, or not there.
         """
         recording, sink = self.opened(name), Sink()
-        for _ in csv_tables(recording, sink):
+        for _ in write_rows(recording, ExportFormat.CSV, sink):
             yield from sink.taken()
 
     def _folder(self, name: str) -> Path | None:
@@ -230,4 +230,4 @@ def _read(recording: Recording, wanted: Sequence[int]) -> list[SampleBlock]:
     if not wanted:
         return []
     raws = recording.raw_blocks(wanted[0], wanted[-1] + 1)
-    return [calibrate(raw, calibration) for raw in raws]
+    return [sample_block([raw], calibration) for raw in raws]

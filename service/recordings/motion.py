@@ -152,10 +152,9 @@ def _centre(
         )
     )
     x, y = (probe_axis(bearing, near, far, axis) for axis in (0, 1))
-    centre = locate_shaft(x, y, bearing.clearance_um, bearing.gap_accuracy)
-    if centre.x_um.value is None or centre.y_um.value is None:
-        return None
-    return centre.x_um.value, centre.y_um.value
+    found, _ = locate_shaft(x, y, bearing.clearance_um, bearing.gap_accuracy)
+    x_um, y_um = (found[f"shaft_centre_{axis}_um"].value for axis in "xy")
+    return None if x_um is None or y_um is None else (x_um, y_um)
 
 
 def _gap(stretch: ShaftStretch, channel: Channel | None, slow_channel: str | None) -> Reading:

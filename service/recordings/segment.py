@@ -86,7 +86,7 @@ class CaptureFile:
         try:
             writer = self._writer or self._open()
             for block in blocks:
-                writer.write_calibrated(block)
+                writer.write_block(block)
         except (OSError, ConfigError) as error:
             raise self.given_up(str(error)) from error
 
@@ -211,7 +211,7 @@ class Stretch:
         """
         if self._writer is None:
             self._writer, self._opened_s = self._open(), now_s
-        self._writer.write_calibrated(block)
+        self._writer.write_block(block)
         self._n_samples += block.n_samples
 
     def is_due(self, now_s: float) -> bool:

@@ -7,7 +7,6 @@ import numpy as np
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
-from core.baseline.history import Watched
 from core.change.decision import Decision
 from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
@@ -46,7 +45,7 @@ def comparisons(
 
 def cell_of(news: FilmNews, rules: FilmRules) -> Cell | None:
     """The cell of a reading; None where its condition is not known."""
-    here = _here(news)
+    here = news.reading.conditions
     if not rules.grid.is_known(here)[0]:
         return None
     return tuple(rules.grid.cells(here)[:, 0].tolist())
@@ -61,9 +60,9 @@ def _comparison(
 ) -> ComparisonPart:
     reading, row = news.reading, AXES.index(direction)
     value, cell = reading.values[row], cell_of(news, rules)
-    learned = baseline.of(Watched.STIFFNESS, direction) if baseline else None
+    learned = baseline.of(direction) if baseline else None
     own = None if learned is None or cell is None else _own_cell(learned, cell)
-    found = _expected(learned, _here(news)) if learned and own else None
+    found = _expected(learned, news.reading.conditions) if learned and own else None
     return ComparisonPart(
         bearing=reading.bearing,
         direction=direction,
@@ -82,13 +81,6 @@ def _comparison(
         members=None if members is None or cell is None else members.part(direction),
         expected=None if learned is None else _line(learned, news),
         map=[] if learned is None else [_cell(each) for each in learned.table.cells],
-    )
-
-
-def _here(news: FilmNews) -> FilmConditions:
-    reading = news.reading
-    return FilmConditions.one(
-        reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
     )
 
 

@@ -6,10 +6,9 @@ from typing import Any
 from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.clock import Clock
-from acquisition.delivery.calibration import COUNTS_FULL_SCALE
 from acquisition.delivery.units import UNIT_OF
 from acquisition.modbus.identity import ExpectedIdentification, ExpectedRegisters, Identity
-from acquisition.modbus.transport import ConnectionUse, SerialTransport, TcpTransport, Transport
+from acquisition.modbus.transport import SerialTransport, TcpTransport, Transport
 from acquisition.recordings.manifest import RecordedChannel, RecordedSlowChannel, RecordedUnit
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_server import CanBusServer
@@ -17,6 +16,7 @@ from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_set
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.server import DaqServer
 from acquisition.simulated.feed import SampleFeed
+from core.checks.channels import COUNTS_FULL_SCALE
 from service.settings.core_values import calibration_of
 from service.settings.sources import can as settings
 from service.settings.sources.devices import MappedDeviceSettings, ModbusRingSettings
@@ -213,13 +213,13 @@ def transport_of(source: ModbusLinkSettings) -> Transport:
 
 def link_fields(source: ModbusLinkSettings) -> dict[str, Any]:
     """How a device is reached and known, as every source's settings take it."""
-    use = source.connection if isinstance(source, MappedDeviceSettings) else ConnectionUse.KEPT
+    is_per_reply = isinstance(source, MappedDeviceSettings) and source.connection == "per_reply"
     return {
         "transport": transport_of(source),
         "device_id": source.device_id,
         "timeout_s": source.timeout_s,
         "identity": identity_of(source.identity),
-        "connection": ConnectionUse(use),
+        "keeps_connection": not is_per_reply,
         "requests_in_flight": _requests_in_flight(source),
     }
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AwareDatetime, Field, StringConstraints, model_validator
 
-from acquisition.delivery.calibration import COUNTS_FULL_SCALE
+from core.checks.channels import COUNTS_FULL_SCALE
 from core.machine.channel import Measurand, SlowRollVector
 from core.units import NS_PER_S, STANDARD_GRAVITY_M_S2
 from service.settings.base import Identifier, MisfitError, MissingError, Settings

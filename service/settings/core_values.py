@@ -1,6 +1,5 @@
 """Settings of units as values of core: machine, calibration, analysis, alarm and film rules."""
 
-from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
 from core.alarms.statistics import ChatterRule
@@ -10,7 +9,8 @@ from core.limits import Limits, ZoneLimits
 from core.machine.channel import Channel
 from core.machine.unit import Bearing, BearingAccuracy, Estimator, GapAccuracy, Unit
 from core.monitor.assessment import AnalysisSettings
-from core.stiffness.dynamic_lines import DynamicSettings, LineSelection
+from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
+from core.stiffness.dynamic_lines import DynamicSettings
 from core.units import ns_from_s
 from service.settings.alarms import AlarmSettings
 from service.settings.bearings import BearingSettings
@@ -140,7 +140,7 @@ def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
         ),
         dynamic=DynamicSettings(
             band_hz=dynamic.band_hz,
-            selection=LineSelection(guard_bins=dynamic.guard_bins),
+            guard_bins=dynamic.guard_bins,
             probe_noise_um2_per_hz=None if noise is None else (noise, noise),
             quiet_band_hz=dynamic.quiet_band_hz,
             min_segments=max(settings.min_segments, 3),

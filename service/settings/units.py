@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from acquisition.delivery.calibration import BLOCK_SAMPLES
 from core.alarms.alarm import PLANT
+from core.samples.calibration import BLOCK_SAMPLES
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS, BearingSettings
 from service.settings.channels import ChannelSettings, SlowChannelSettings, Transducer

@@ -16,7 +16,7 @@ from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
 from service.settings.alarm_kinds import ALARM_KINDS
-from service.store.access.audit_entries import Deed
+from service.store.access.audit_entries import ActedNews, Deed
 from service.store.audit_deeds import alarm_deeds
 from service.store.database import Connection
 from service.store.outbox import Address, insert_letters, no_recipients
@@ -77,7 +77,7 @@ def insert_alarms(
                 insert_letters(writer, event, address(told.alarm, event))
                 tell(writer, alarm_deeds(event, told))
         writer.execute(UPSERT, _alarm_row(told.alarm))
-        if told.command is not None:
+        if isinstance(told, ActedNews) and told.command is not None:
             # with what it did, so that whoever finds it unanswered knows that nothing was done
             answer_command(writer, told.command, DONE, told.events[-1].time_ns)
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmNews, Hold
-from service.store.access.audit_entries import Deed, Source, acting
+from service.store.access.audit_entries import ActedNews, Deed, Source, acting
 from service.store.baselines import Versions, select_steps, versions_after
 from service.store.database import Connection
 from service.store.film_port import BaselineStep, StoredStep
@@ -35,7 +35,7 @@ def alarm_deeds(event: AlarmEvent, told: AlarmNews) -> list[Deed]:
         after=after,
         reason=event.reason,
         source=Source.API,  # nobody reaches alarms by any other way
-        peer=told.peer,
+        peer=told.peer if isinstance(told, ActedNews) else None,
     )
     return [deed]
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 from rigs.shaken_shaft import shaken
 
 from core.arrays import ComplexArray, FloatArray
@@ -49,7 +50,7 @@ def blocks() -> BlockMaker:
             samples = signals[:, start : start + n_each].astype(np.float32)
             index, quality = first_index + start, (GOOD,) * len(samples)
             start_ns = round(index / RATE_HZ * 1e9)
-            yield SampleBlock("U1", epoch, index, start_ns, RATE_HZ, samples, quality, slow)
+            yield given_block("U1", epoch, index, start_ns, RATE_HZ, samples, quality, slow)
 
     return cut
 

@@ -12,16 +12,12 @@ from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingLimits
 from core.limits import Limits
 from core.machine.response import ResponseTable
-from core.machine.unit import BearingAccuracy, BracketDynamics
-from core.spectra.polls import PollSettings
-from core.stiffness.dynamic_lines import DynamicSettings
-from core.stiffness.evidence import LineLimits
+from core.machine.unit import BracketDynamics
+from service.settings.plant import DynamicModel
 
 Operating = partial(OperatingLimits, rated_speed_rpm=92.3)
 PAIR, ZEROS = (1.0, 2.0), (0.0, 0.0)
 Sheet = partial(ResponseTable, frequency_hz=PAIR, magnitude=PAIR, phase_deg=ZEROS)
-Vector = partial(PollSettings, n_polls=60)
-SHARES = tuple(vars(BearingAccuracy()))
 
 
 @pytest.mark.parametrize(
@@ -44,10 +40,8 @@ SHARES = tuple(vars(BearingAccuracy()))
         (ChangeLimits, {"deadband": -0.01}, "deadband = -0.01"),
         (ChangeLimits, {"significance": math.inf}, "significance = inf"),
         (ChangeLimits, {"on_delay_h": 0.0}, "on_delay_h = 0 "),
-        (DynamicSettings, {"band_hz": (0.0, 12.0)}, "band"),
-        (DynamicSettings, {"quiet_band_hz": (25.0, 15.0)}, "quiet band"),
-        (DynamicSettings, {"min_segments": 2}, "3 segments"),
-        (DynamicSettings, {"min_lines": 0}, "at least 1"),
+        (DynamicModel, {"band_hz": (0.0, 12.0)}, "must rise from above 0, got .0, 12"),
+        (DynamicModel, {"quiet_band_hz": (25.0, 15.0)}, "must rise from above 0, got .25, 15"),
         (Limits, {}, "give alert, danger or both"),
         (Limits, {"alert": math.nan}, "limit nan must be a number above 0"),
         (Limits, {"danger": math.inf}, "limit inf"),
@@ -61,8 +55,6 @@ SHARES = tuple(vars(BearingAccuracy()))
         (Limits, {"alert_below": 4.0, "danger_below": 4.0}, "danger_below 4 must be below"),
         (Limits, {"alert_below": 5.0, "alert": 5.0}, "lower limit 5 must be below upper limit 5"),
         (Limits, {"alert_below": 4.0, "alert": 5.0, "deadband": 0.5}, "deadband 0.5 must be"),
-        (LineLimits, {"min_coherence": 1.2}, r"coherence.*1\.2"),
-        (LineLimits, {"runout_um_pk": -1.0}, "runout of -1"),
         (Operating, {"rated_power_mw": 330.0, "settling_s": 0.0}, "settling_s = 0 "),
         (Operating, {"rated_power_mw": math.nan}, "rated_power_mw = nan"),
         (Operating, {"rated_power_mw": 330.0, "full_load_above": -1.0}, "full_load_above = -1 "),
@@ -74,10 +66,6 @@ SHARES = tuple(vars(BearingAccuracy()))
         (Sheet, {"frequency_hz": (2.0, 1.0)}, "must rise"),
         (Sheet, {"magnitude": (0.0, 1.0)}, "above 0, got 0"),
         (Sheet, {"magnitude": (1.0, math.nan)}, "finite"),
-        (Vector, {"hop_polls": 0}, "polls"),
-        (Vector, {"hop_polls": 61}, "polls"),
-        (Vector, {"min_polls": 1}, "polls"),
-        *((BearingAccuracy, {n: v}, n) for n in SHARES for v in (-0.01, 1.0, math.nan)),
     ],
 )
 def test_settings_that_cannot_be_meant_are_refused(

@@ -8,7 +8,6 @@ import pytest
 from core.machine.unit import BearingAccuracy, BracketDynamics
 from core.spectra.cross_spectrum import BEARING_X, SHAFT_X, average
 from core.stiffness.stiffness_budget import ratio_budget, transfer_budgets
-from core.stiffness.transfer import line_transfer
 from core.uncertainty import Budget, coverage_factor, random_line, systematic_line
 
 
@@ -49,11 +48,12 @@ def at_line() -> tuple[Budget, Budget]:
     phasors[:, 2:] = 0.4 * phasors[:, :2] + 0.07 * phasors[:, 2:]
     spectrum = average(np.array([1.5]), phasors, np.ones((50, 4), dtype=bool))
     bracket, accuracy = BracketDynamics(1.18e9, 0.45e5), BearingAccuracy()
-    ratio = ratio_budget(spectrum, 0, SHAFT_X, BEARING_X, bracket, accuracy, runout_um_pk=0.1)
-    transfer = line_transfer(spectrum, 0, SHAFT_X, BEARING_X, bracket)
+    at = spectrum, 0, SHAFT_X, BEARING_X, bracket, accuracy
+    ratio = ratio_budget(*at, runout_um_pk=0.1)
+    transfer = transfer_budgets(*at, runout_um_pk=0.1)
     assert ratio is not None
     assert transfer is not None
-    return ratio, transfer_budgets(transfer, bracket, accuracy, runout_um_pk=0.1)[0]
+    return ratio, transfer[0]
 
 
 def test_each_estimator_names_what_reaches_it_and_without_motion_has_no_budget(

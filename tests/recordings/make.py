@@ -14,8 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import BlockAssembler, RawBlock
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from service.app.recordings import recording_writer, replay_source
@@ -78,9 +77,9 @@ def record(unit: UnitSettings) -> Path:
     with recording_writer(unit, folder, "tests/recordings/make.py") as writer:
         for raw in run(unit):
             for block in delivery.take(raw):
-                writer.write_calibrated(block)
+                writer.write_block(block)
         for block in delivery.flush():
-            writer.write_calibrated(block)
+            writer.write_block(block)
     return folder
 
 

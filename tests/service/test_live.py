@@ -4,16 +4,16 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 
 from acquisition.clock import Clock
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reason
-from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount
 from service.live.live_view import LinkState, LiveView
 
 STALE_AFTER_S = 30.0
-BLOCK = SampleBlock("U1", 1, 0, 0, 600.0, np.zeros((1, 60), dtype=np.float32), (GOOD,))
+BLOCK = given_block("U1", 1, 0, 0, 600.0, np.zeros((1, 60), dtype=np.float32), (GOOD,))
 
 
 @pytest.fixture

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.delivery.blocks import BlockAssembler
-from acquisition.delivery.calibration import RawBlock, calibrate
+from acquisition.delivery.blocks import BlockAssembler, RawBlock, sample_block
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import Rejection
@@ -70,7 +69,7 @@ async def test_a_recording_analysed_equals_what_was_seen_live_to_the_last_bit(
         blocks = [b for raw in rough_ride(unit, stepped_clock) for b in delivery.take(raw)]
         for block in blocks + delivery.flush():
             live += live_monitor.ingest(block)
-            writer.write_calibrated(block)
+            writer.write_block(block)
 
     recording = recording_of(tmp_path / "run")
     source = recording_source(recording, selection_of(recording, unit), None, stepped_clock)
@@ -94,7 +93,7 @@ def assessment(bearing: str, time_ns: int, n_segments: int, sample: Assessment) 
 @pytest.fixture
 def sample(unit: UnitSettings, stepped_clock) -> Assessment:
     monitor, feed = UnitMonitor(machine_of(unit), ANALYSIS), simulated_feed(unit, stepped_clock)
-    return monitor.ingest(calibrate(feed.advance(1024), calibration_of(unit)))[0]
+    return monitor.ingest(sample_block([feed.advance(1024)], calibration_of(unit)))[0]
 
 
 @pytest.mark.parametrize(

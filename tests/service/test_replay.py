@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 
 from acquisition.errors import LinkError
 from core.quality import GOOD
@@ -37,7 +38,7 @@ class Standing:
 def block(number: int, clock: DeviceClock | None = None) -> SampleBlock:
     """One sample of one channel, of long ago."""
     samples = np.full((1, 1), number, np.float32)
-    return SampleBlock("U1", 1, number, NEW_YEAR_NS, 600.0, samples, (GOOD,), clock=clock)
+    return given_block("U1", 1, number, NEW_YEAR_NS, 600.0, samples, (GOOD,), clock=clock)
 
 
 FIRST, SECOND = block(1), block(2)

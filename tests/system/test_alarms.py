@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.recordings.reader import open_recording
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.blocks import sample_block
 from acquisition.simulated.plant.films import DAMPING_OVER_STIFFNESS_S, Film
 from acquisition.simulated.plant.scenario import ChannelScenario, Scenario
 from acquisition.simulated.plant.unit import SimulatedUnit
@@ -57,13 +57,13 @@ def watch(
     monitor = UnitMonitor(described, analysis_of(plant.analysis))
     newest: list[Assessment] = []
     rows = bearing_rows(machine)
-    held = np.zeros((len(rows), late), dtype=np.float32)
+    held = np.zeros((len(rows), late), dtype=np.int16)
     for _ in range(int(minutes * 60)):
-        block = calibrate(feed.advance(600), calibration)
-        delayed = np.concatenate([held, block.samples[rows]], axis=1)
-        samples = block.samples.copy()
-        samples[rows], held = delayed[:, : block.n_samples], delayed[:, block.n_samples :]
-        newest = monitor.ingest(replace(block, samples=samples)) or newest
+        block = sample_block([feed.advance(600)], calibration)
+        delayed = np.concatenate([held, block.counts[rows]], axis=1)
+        counts = block.counts.copy()
+        counts[rows], held = delayed[:, : block.n_samples], delayed[:, block.n_samples :]
+        newest = monitor.ingest(replace(block, counts=counts)) or newest
     return newest
 
 

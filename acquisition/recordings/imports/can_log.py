@@ -3,12 +3,14 @@
 import logging
 import re
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import can
 import numpy as np
 from can.io.blf import BLFParseError
+from can.util import CAN_FD_DLC
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.csv_file import CUT_OFF
@@ -16,9 +18,6 @@ from acquisition.recordings.imports.job import ImportJob
 from acquisition.recordings.messages import FRAME, MAX_DATA, Frames
 
 _BATCH = 8192
-_LENGTHS = {*range(9), 12, 16, 20, 24, 32, 48, 64}
-"""That a CAN FD frame can have; a classic one up to 8."""
-
 _CANDUMP_LINE = re.compile(
     r"\(\d{1,12}\.\d{1,9}\) \S{1,64} "
     r"(?:(?P<error>[23][0-9A-Fa-f]{7})|[0-9A-Fa-f]{3}|[01][0-9A-Fa-f]{7})#"
@@ -41,27 +40,19 @@ def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[Frames, float]]:
     """
     size = max(path.stat().st_size, 1)
     with path.open("rb") as stream:
-        waiting: list[can.Message] = []
-        for frame in _of_one_bus(_data_frames(stream, job), job):
-            waiting.append(frame)
-            if len(waiting) == _BATCH:
-                yield _batch(waiting, job), min(stream.tell() / size, 1.0)
-                waiting = []
-        if waiting:
-            yield _batch(waiting, job), 1.0
+        frames = _of_one_bus(_data_frames(stream, job), job)
+        while batch := list(islice(frames, _BATCH)):
+            done = 1.0 if stream.closed else min(stream.tell() / size, 1.0)  # by python-can
+            yield _batch(batch, job), done
 
 
 def _data_frames(stream: BinaryIO, job: ImportJob) -> Iterator[can.Message]:
-    frames = _candump_frames(stream) if job.format == "candump" else _blf_frames(stream)
-    for number, frame in enumerate(frames):
-        _require_possible(frame, number + 1)
+    lines: Any = _candump_lines(stream)
+    frames = can.CanutilsLogReader(lines) if job.format == "candump" else _blf_frames(stream)
+    for number, frame in enumerate(frames, start=1):
+        _require_possible(frame, number)
         if not (frame.is_error_frame or frame.is_remote_frame):
             yield frame
-
-
-def _candump_frames(stream: BinaryIO) -> Iterator[can.Message]:
-    lines: Any = _candump_lines(stream)
-    yield from can.CanutilsLogReader(lines)
 
 
 def _candump_lines(stream: BinaryIO) -> Iterator[str]:
@@ -128,36 +119,30 @@ class _CountingBlfReader(can.BLFReader):
 
 def _of_one_bus(frames: Iterator[can.Message], job: ImportJob) -> Iterator[can.Message]:
     """Frames of the same id on two buses come from two devices."""
-    wanted = job.bus
-    bus, other, n_taken = wanted, "", 0
+    bus, other, n_taken = job.bus, "", 0
     for frame in frames:
-        found = _bus(frame, job)
+        # candump has names, BLF counts from 1 and python-can from 0
+        is_counted = job.format == "blf" and isinstance(frame.channel, int)
+        found = str(frame.channel + 1 if is_counted else frame.channel)  # type: ignore[operator]
         bus = bus or found
         if found == bus:
             n_taken += 1
             yield frame
-        elif wanted:
-            other = found
-        else:
+        elif not job.bus:
             raise ConfigError(
                 f'has frames of bus "{bus}" and of bus "{found}": say by bus = "{bus}" which is'
                 " meant"
             )
+        other = found
     if other and not n_taken:
-        raise ConfigError(f'has no frame of bus "{wanted}", but of bus "{other}"')
-
-
-def _bus(frame: can.Message, job: ImportJob) -> str:
-    """Name of the bus: candump has names, BLF counts from 1 and python-can from 0."""
-    is_counted = job.format == "blf" and isinstance(frame.channel, int)
-    return str(frame.channel + 1 if is_counted else frame.channel)  # type: ignore[operator]
+        raise ConfigError(f'has no frame of bus "{bus}", but of bus "{other}"')
 
 
 def _require_possible(frame: can.Message, number: int) -> None:
     n_bytes = len(frame.data)
     limit = MAX_DATA if frame.is_fd else 8
     id_limit = 2**29 if frame.is_extended_id else 2**11
-    is_sound = n_bytes <= limit and n_bytes in _LENGTHS and 0 <= frame.arbitration_id < id_limit
+    is_sound = n_bytes <= limit and n_bytes in CAN_FD_DLC and 0 <= frame.arbitration_id < id_limit
     if not is_sound or (not frame.is_remote_frame and frame.dlc != n_bytes):
         raise ConfigError(
             f"frame {number}: id {frame.arbitration_id:#x}, length {frame.dlc}, {n_bytes} bytes of"

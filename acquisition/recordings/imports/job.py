@@ -3,22 +3,10 @@
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from acquisition.delivery.calibration import BLOCK_SAMPLES
+from core.samples.calibration import BLOCK_SAMPLES
 
 Format: TypeAlias = Literal["mdf4", "tdms", "hdf5", "csv", "candump", "blf"]
 TimeKind: TypeAlias = Literal["file", "column", "start"]
-TimeForm: TypeAlias = Literal[
-    "iso8601",
-    "epoch_s",
-    "epoch_ms",
-    "epoch_us",
-    "epoch_ns",
-    "elapsed_s",
-    "elapsed_ms",
-    "elapsed_us",
-    "elapsed_ns",
-    "timestamp",
-]
 
 
 @dataclass(frozen=True)
@@ -51,8 +39,8 @@ class TimeAxis:
         "file": times of the format itself. "column": a time column. "start": from a given time on
         at the unit's rate, without a gap.
     form
-        What a column has: text, seconds since 1970, seconds since the start, or the format's own
-        time stamps.
+        What a column has: text ("iso8601"), the format's own stamps ("timestamp"), or numbers since
+        1970 ("epoch_s") or since the start ("elapsed_s"), in s, ms, us or ns.
     start_ns
         Start in UTC; None if the file has it.
     utc_offset_s
@@ -64,7 +52,7 @@ class TimeAxis:
     kind: TimeKind
     utc_offset_s: int
     place: ColumnName | None = None
-    form: TimeForm = "elapsed_s"
+    form: str = "elapsed_s"
     start_ns: int | None = None
     tolerance: float = 0.4
 
@@ -134,7 +122,7 @@ class ImportJob:
     Parameters
     ----------
     rate_hz, block_samples
-        Of the unit: see :class:`acquisition.delivery.calibration.UnitCalibration`.
+        Of the unit: see :class:`core.samples.calibration.UnitCalibration`.
     channels, slow
         In the order of the unit.
     bus

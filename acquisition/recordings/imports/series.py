@@ -1,9 +1,9 @@
 """Files whose columns can be read from anywhere: one way to rows for HDF5, TDMS and MDF."""
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -11,9 +11,9 @@ import numpy.typing as npt
 from acquisition.delivery.units import require_unit
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ChannelColumn, ColumnName, ImportJob, SlowColumn
-from acquisition.recordings.imports.rows import Rows, SlowValues
+from acquisition.recordings.imports.rows import Rows
 from acquisition.recordings.imports.times import TimeArray, from_start, numbers_to_ns
-from core.arrays import RawArray, SampleArray
+from core.arrays import FloatArray, SampleArray
 
 MAX_SAMPLES = 2**29
 """Per channel, as in a recording."""
@@ -22,188 +22,191 @@ _SAME_GAIN = 1e-6
 """Gains that differ by less come from rounding in files; 24 bits cannot tell them apart."""
 
 _ROWS = 65_536
-_SLOW_ROWS = 4096
+"""Rows of a column that are read at once."""
 
 
-class Series(Protocol):
-    """A column of a file."""
+Read: TypeAlias = Callable[[int, int], npt.NDArray[Any]]
+"""Returns the part of a column from one row up to before another."""
 
-    unit: str | None
-    """As the file has it."""
+
+@dataclass(frozen=True)
+class Series:
+    """A column of a file.
+
+    Parameters
+    ----------
+    unit
+        As the file has it.
+    values
+        Counts where `per_count` is given, else values in the file's unit.
+    per_count
+        Unit of the file per count, for a column of int16 counts with a linear scale.
+    times_ns
+        Times by what the format itself has; None where it has nothing.
+    time_key
+        Columns of the same key have the same times.
+    """
 
     n_samples: int
-
-    per_count: float | None
-    """Unit of the file per count, for a column of int16 counts with a linear scale."""
-
-    time_key: object
-    """Columns of the same key have the same times."""
-
-    def values(self, start: int, stop: int) -> npt.NDArray[Any]:
-        """Counts where `per_count` is given, else values in the file's unit."""
-        ...
-
-    def times_ns(self, start: int, stop: int) -> TimeArray:
-        """By what the format itself has; raises ConfigError where it has nothing."""
-        ...
+    unit: str | None
+    values: Read
+    per_count: float | None = None
+    times_ns: Read | None = None
+    time_key: object = None
 
 
-class SeriesFile(ABC):
+@dataclass(frozen=True)
+class SeriesFile:
     """An opened file.
 
-    Attributes
+    Parameters
     ----------
+    find
+        Returns a column; raises ConfigError if it is not there, or there twice.
     start_ns
         What its times count from, if the file has that.
     """
 
+    find: Callable[[ColumnName], Series]
     start_ns: int | None = None
 
-    def __init__(self) -> None:
-        self._found: dict[ColumnName, Series] = {}
 
-    def series(self, name: ColumnName) -> Series:
-        """A column; raises ConfigError if it is not there, or there twice."""
-        if name not in self._found:
-            self._found[name] = self._find(name)
-        return self._found[name]
+def series_rows(file: SeriesFile, job: ImportJob) -> Iterator[Rows]:
+    """The columns of a job as rows.
 
-    @abstractmethod
-    def _find(self, name: ColumnName) -> Series:
-        """Find a column that has not been asked for yet."""
-
-
-class SeriesTable:
-    """The columns of a job as rows; see :class:`acquisition.recordings.imports.rows.Table`."""
-
-    def __init__(self, file: SeriesFile, job: ImportJob) -> None:
-        self._file, self._job = file, job
-        self._channels = [file.series(channel.place) for channel in job.channels]
-        for channel, series in zip(job.channels, self._channels, strict=True):
-            require_unit(channel.place, series.unit, channel.unit)
-        self._n_samples = self._common_length()
-        found = [series.per_count for series in self._channels]
-        self.sample_type = (
-            "int16" if counts_are_kept(job, found) and self._are_int16() else "float32"
+    Raises
+    ------
+    ConfigError
+        If the file is not what the job describes.
+    """
+    found = [_column(file, column) for column in job.channels]
+    channels = list(zip(job.channels, found, strict=True))
+    n_samples = _common_length(channels)
+    keeps_counts = counts_are_kept(job, [series.per_count for series in found]) and all(
+        series.values(0, 1).dtype == np.int16 for series in found
+    )
+    slow = [_SlowFeed(file, job, column, n_samples) for column in job.slow]
+    has_own_times = job.time.kind == "file"
+    clocks = {
+        s.time_key if has_own_times else None: (c, _times_of(file, job, c, s)) for c, s in channels
+    }
+    for start in range(0, n_samples, _ROWS):
+        stop = min(start + _ROWS, n_samples)
+        times_ns = _common_times_ns(list(clocks.values()), start, stop)
+        samples: list[Any] = [
+            values.astype(np.int16) if keeps_counts else engineering_units(values, c, s.per_count)
+            for c, s in channels
+            for values in [_numbers(s.values, start, stop, c.place)]
+        ]
+        yield Rows(
+            times_ns=times_ns,
+            samples=np.stack(samples),
+            slow=tuple(feed.at(times_ns) for feed in slow),
+            done=stop / n_samples,
         )
-        self._slow = [self._slow_feed(column) for column in job.slow]
 
-    def rows(self) -> Iterator[Rows]:
-        """All rows."""
-        for start in range(0, self._n_samples, _ROWS):
-            stop = min(start + _ROWS, self._n_samples)
-            times_ns = self._times_ns(start, stop)
-            yield Rows(
-                times_ns=times_ns,
-                samples=self._samples(start, stop),
-                slow=tuple(feed.up_to(int(times_ns[-1])) for feed in self._slow),
-                done=stop / self._n_samples,
+
+def _column(file: SeriesFile, column: ChannelColumn | SlowColumn) -> Series:
+    series = file.find(column.place)
+    require_unit(column.place, series.unit, column.unit)
+    return series
+
+
+def _common_length(channels: Sequence[tuple[ChannelColumn, Series]]) -> int:
+    first, n_samples = channels[0][0], channels[0][1].n_samples
+    for column, series in channels:
+        if series.n_samples != n_samples:
+            raise ConfigError(
+                f"column {str(column.place)!r} has {series.n_samples} samples, column"
+                f" {str(first.place)!r} has {n_samples}; waveform channels are sampled together"
             )
+    if not 1 <= n_samples <= MAX_SAMPLES:
+        raise ConfigError(f"{n_samples} samples per channel; 1 to {MAX_SAMPLES} can be read")
+    return n_samples
 
-    def _are_int16(self) -> bool:
-        return all(series.values(0, 1).dtype == np.int16 for series in self._channels)
 
-    def _common_length(self) -> int:
-        lengths = [series.n_samples for series in self._channels]
-        for channel, length in zip(self._job.channels, lengths, strict=True):
-            if length != lengths[0]:
-                raise ConfigError(
-                    f"column {str(channel.place)!r} has {length} samples, column"
-                    f" {str(self._job.channels[0].place)!r} has {lengths[0]}; waveform channels"
-                    " are sampled together"
-                )
-        if not 1 <= lengths[0] <= MAX_SAMPLES:
-            raise ConfigError(f"{lengths[0]} samples per channel; 1 to {MAX_SAMPLES} can be read")
-        return lengths[0]
-
-    def _times_ns(self, start: int, stop: int) -> TimeArray:
-        first = _times_ns(self._file, self._job, None, self._channels[0], start, stop)
-        if self._job.time.kind == "start" or self._job.time.place is not None:
-            return first
-        seen = {self._channels[0].time_key}
-        for channel, series in zip(self._job.channels, self._channels, strict=True):
-            if series.time_key not in seen:
-                seen.add(series.time_key)
-                if np.any(np.abs(series.times_ns(start, stop) - first) > 1000):
-                    raise ConfigError(
-                        f"column {str(channel.place)!r} was not sampled at the times of column"
-                        f" {str(self._job.channels[0].place)!r}"
-                    )
-        return first
-
-    def _samples(self, start: int, stop: int) -> RawArray:
-        pairs = list(zip(self._job.channels, self._channels, strict=True))
-        found = [_complete(s.values(start, stop), stop - start, c.place) for c, s in pairs]
-        if self.sample_type == "int16":
-            return np.stack(found).astype(np.int16, copy=False)
-        return np.stack(
-            [engineering_units(v, c, s.per_count) for v, (c, s) in zip(found, pairs, strict=True)]
-        )
-
-    def _slow_feed(self, column: SlowColumn) -> "_SlowFeed":
-        series = self._file.series(column.place)
-        require_unit(column.place, series.unit, column.unit)
-        return _SlowFeed(self._file, self._job, column, series, self._n_samples)
+def _common_times_ns(
+    clocks: Sequence[tuple[ChannelColumn, Read]], start: int, stop: int
+) -> TimeArray:
+    (first, read), *others = clocks
+    times_ns: TimeArray = read(start, stop)
+    for other, read_other in others:
+        if np.any(np.abs(read_other(start, stop) - times_ns) > 1000):
+            raise ConfigError(
+                f"column {str(other.place)!r} was not sampled at the times of column"
+                f" {str(first.place)!r}"
+            )
+    return times_ns
 
 
 class _SlowFeed:
-    """Values of a slow channel in the order of time, a few thousand at once."""
+    """Values of a slow channel at the times of the waveforms."""
 
-    def __init__(
-        self, file: SeriesFile, job: ImportJob, column: SlowColumn, series: Series, n_rows: int
-    ) -> None:
-        self._file, self._job, self._column, self._series = file, job, column, series
-        self._next = 0
+    def __init__(self, file: SeriesFile, job: ImportJob, column: SlowColumn, n_rows: int) -> None:
+        self._series, self._slow = _column(file, column), column
+        self._read_times_ns = _times_of(file, job, column, self._series)
+        self._n_read = 0
+        self._times_ns = np.empty(0, np.int64)
+        self._values = np.full(1, np.nan)  # valid before the first time, then from each on
         own_time = column.time is not None or job.time.kind == "file"
-        if not own_time and series.n_samples != n_rows:
+        if not own_time and self._series.n_samples != n_rows:
             raise ConfigError(
-                f"slow channel {column.id} has {series.n_samples} values, the waveforms {n_rows}:"
-                " it needs a time column of its own"
+                f"slow channel {column.id} has {self._series.n_samples} values, the waveforms"
+                f" {n_rows}: it needs a time column of its own"
             )
 
-    def up_to(self, time_ns: int) -> SlowValues:
-        """What follows, at least up to this time."""
-        times: list[TimeArray] = [np.empty(0, np.int64)]
-        values: list[npt.NDArray[Any]] = [np.empty(0)]
-        while self._next < self._series.n_samples and not (
-            len(times[-1]) and times[-1][-1] > time_ns
-        ):
-            start, stop = self._next, min(self._next + _SLOW_ROWS, self._series.n_samples)
-            times.append(
-                _times_ns(self._file, self._job, self._column.time, self._series, start, stop)
+    def at(self, times_ns: TimeArray) -> FloatArray:
+        """Values that are valid at some times, later than those of the last call."""
+        n_samples = self._series.n_samples
+        while self._n_read < n_samples and not np.any(self._times_ns[-1:] > times_ns[-1]):
+            self._read(self._n_read, min(self._n_read + _ROWS, n_samples))
+        n_passed = np.searchsorted(self._times_ns, times_ns, side="right")
+        found, last = self._values[n_passed], n_passed[-1]
+        self._times_ns, self._values = self._times_ns[last:], self._values[last:]
+        return found
+
+    def _read(self, start: int, stop: int) -> None:
+        self._times_ns = np.append(self._times_ns, self._read_times_ns(start, stop))
+        if np.any(np.diff(self._times_ns) < 0):
+            raise ConfigError(f"the time of slow channel {self._slow.id} goes back")
+        found = _numbers(self._series.values, start, stop, self._slow.place)
+        scale = (self._series.per_count or 1.0) * self._slow.factor
+        values = found.astype(np.float64) * scale + self._slow.offset
+        self._values, self._n_read = np.append(self._values, values), stop
+
+
+def _times_of(
+    file: SeriesFile, job: ImportJob, column: ChannelColumn | SlowColumn, series: Series
+) -> Read:
+    """The times of a column: by a time column of its own, or as the job describes them."""
+    own, axis = column.time if isinstance(column, SlowColumn) else None, job.time
+    place = own or axis.place
+    if own is None and axis.kind == "start":
+        return lambda start, stop: from_start(axis.start_ns or 0, start, stop, job.rate_hz)
+    if place is None:
+        if series.times_ns is None:
+            raise ConfigError(
+                f"column {str(column.place)[:200]!r} has no time of its own: name a time column or"
+                " a start"
             )
-            found = _complete(self._series.values(start, stop), stop - start, self._column.place)
-            scale = (self._series.per_count or 1.0) * self._column.factor
-            values.append(found.astype(np.float64) * scale + self._column.offset)
-            self._next = stop
-        return SlowValues(np.concatenate(times), np.concatenate(values))
+        return series.times_ns
+    times = file.find(place)
+
+    def times_ns(start: int, stop: int) -> TimeArray:
+        values = _numbers(times.values, start, stop, place)
+        if axis.form == "timestamp":
+            return values.astype(np.int64)
+        return numbers_to_ns(values, axis, axis.start_ns or file.start_ns)
+
+    return times_ns
 
 
-def _times_ns(
-    file: SeriesFile,
-    job: ImportJob,
-    column: ColumnName | None,
-    series: Series,
-    start: int,
-    stop: int,
-) -> TimeArray:
-    """Times of samples of a series by its own time column, or as the job describes them."""
-    if column is None and job.time.kind == "start":
-        return from_start(job.time.start_ns or 0, start, stop, job.rate_hz)
-    column = column or job.time.place
-    if column is None:
-        return series.times_ns(start, stop)
-    values = _complete(file.series(column).values(start, stop), stop - start, column)
-    if job.time.form == "timestamp":
-        return values.astype(np.int64)
-    return numbers_to_ns(values, job.time, job.time.start_ns or file.start_ns)
-
-
-def _complete(values: npt.NDArray[Any], n_values: int, place: ColumnName) -> npt.NDArray[Any]:
-    if values.shape != (n_values,) or values.dtype.kind not in "iuf":
+def _numbers(read: Read, start: int, stop: int, place: ColumnName) -> npt.NDArray[Any]:
+    values = read(start, stop)
+    if values.shape != (stop - start,) or values.dtype.kind not in "iuf":
         raise ConfigError(
             f"column {str(place)[:200]!r}: {values.dtype} of shape {values.shape} where"
-            f" {n_values} numbers are needed"
+            f" {stop - start} numbers are needed"
         )
     return values
 
@@ -231,12 +234,11 @@ def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
     per_count
         Unit of the file per count of each column, as stated in the file; None if it states none.
     """
+    gains = [found or c.per_count for c, found in zip(job.channels, per_count, strict=True)]
     return all(
         gain is not None
         and math.isclose(gain * c.factor, c.calibrated_per_count, rel_tol=_SAME_GAIN)
-        for c, gain in (
-            (c, found or c.per_count) for c, found in zip(job.channels, per_count, strict=True)
-        )
+        for c, gain in zip(job.channels, gains, strict=True)
     )
 
 

@@ -9,11 +9,13 @@ import numpy.typing as npt
 
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ColumnName
-from acquisition.recordings.imports.series import SeriesFile, require_one
+from acquisition.recordings.imports.series import Series, SeriesFile, require_one
 from acquisition.recordings.imports.times import TimeArray, from_start, library
+from core.units import NS_PER_S
 
 _EPOCH_1904_S = -2_082_844_800
 _UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription")
+_WAVEFORM_PROPERTIES = ("wf_start_time", "wf_increment", "wf_start_offset")
 _SCALE = "NI_Scale[0]_"
 
 _LEAD = struct.Struct("<4sL4xQ8x")
@@ -23,71 +25,59 @@ _BIG_ENDIAN = 1 << 6
 _UNFINISHED = 2**64 - 1
 
 
-class TdmsFile(SeriesFile):
-    """A name is group and channel; time of its own is that of the waveform properties."""
+def tdms_file(path: Path) -> SeriesFile:
+    """Open a file: a name is group and channel; its own time is that of the waveform properties."""
+    stream = path.open("rb")  # not a path: npTDMS would use an index file beside it
+    _require_whole(stream)
+    file = library("nptdms", "TDMS").TdmsFile.open(stream, raw_timestamps=True)
 
-    def __init__(self, path: Path) -> None:
-        super().__init__()
-        # an open file, not a path: npTDMS would use an index file beside it
-        self._stream = path.open("rb")
-        _require_whole(self._stream)
-        self._file = library("nptdms", "TDMS").TdmsFile.open(self._stream, raw_timestamps=True)
-
-    def _find(self, place: ColumnName) -> "_TdmsSeries":
+    def find(place: ColumnName) -> Series:
         channels = [
             channel
-            for group in self._file.groups()
+            for group in file.groups()
             if place.group in ("", group.name)
             for channel in group.channels()
             if channel.name == place.name
         ]
-        return _TdmsSeries(require_one(channels, place, self._names()), place)
+        known = [f"{g.name}/{c.name}" for g in file.groups() for c in g.channels()[:12]]
+        return _series(require_one(channels, place, known))
 
-    def _names(self) -> list[str]:
-        return [f"{g.name}/{c.name}" for g in self._file.groups() for c in g.channels()[:12]][:12]
+    return SeriesFile(find)
 
 
-class _TdmsSeries:
-    def __init__(self, channel: Any, place: ColumnName) -> None:
-        self._channel, self._place = channel, place
-        self._properties = channel.properties
-        self.n_samples = len(channel)
-        found = (self._properties.get(name) for name in _UNIT_PROPERTIES)
-        self.unit: str | None = next((str(unit) for unit in found if unit), None)
-        self.per_count: float | None = self._per_count()
-        waveform = ("wf_start_time", "wf_increment", "wf_start_offset")
-        self.time_key: object = tuple(str(self._properties.get(name)) for name in waveform)
+def _series(channel: Any) -> Series:
+    properties, per_count = channel.properties, _per_count(channel)
 
-    def values(self, start: int, stop: int) -> npt.NDArray[Any]:
-        raw = self.per_count is not None
-        found = self._channel.read_data(start, stop - start, scaled=not raw)
-        if getattr(found, "dtype", None) is not None and found.dtype.names:
-            return _stamps_ns(found)
-        return np.asarray(found)
+    def values(start: int, stop: int) -> npt.NDArray[Any]:
+        found = np.asarray(channel.read_data(start, stop - start, scaled=per_count is None))
+        return _stamps_ns(found) if found.dtype.names else found
 
-    def times_ns(self, start: int, stop: int) -> TimeArray:
-        begin, increment = (
-            self._properties.get("wf_start_time"),
-            self._properties.get("wf_increment"),
-        )
-        if begin is None or not increment:
-            raise ConfigError(
-                f"channel {str(self._place)[:200]!r} has no wf_start_time and wf_increment: name a"
-                " time column or a start"
-            )
-        offset_s = float(self._properties.get("wf_start_offset") or 0.0)
-        start_ns = _stamp_ns(begin.seconds, begin.second_fractions) + round(offset_s * 1e9)
+    begin, increment = properties.get("wf_start_time"), properties.get("wf_increment")
+
+    def times_ns(start: int, stop: int) -> TimeArray:
+        offset_s = float(properties.get("wf_start_offset") or 0.0)
+        start_ns = _stamp_ns(begin.seconds, begin.second_fractions) + round(offset_s * NS_PER_S)
         return from_start(start_ns, start, stop, 1.0 / float(increment))
 
-    def _per_count(self) -> float | None:
-        """Of counts with one linear scale through zero, which is all that a converter needs."""
-        get = self._properties.get
-        linear = get("NI_Number_Of_Scales") == 1 and get(_SCALE + "Scale_Type") == "Linear"
-        if not linear or get(_SCALE + "Linear_Y_Intercept") != 0.0:
-            return None
-        raw = self._channel.read_data(0, 1, scaled=False)
-        slope = get(_SCALE + "Linear_Slope")
-        return float(slope) if getattr(raw, "dtype", None) == np.int16 and slope else None
+    return Series(
+        n_samples=len(channel),
+        unit=next((str(properties[p]) for p in _UNIT_PROPERTIES if properties.get(p)), None),
+        values=values,
+        per_count=per_count,
+        times_ns=None if begin is None or not increment else times_ns,
+        time_key=tuple(str(properties.get(name)) for name in _WAVEFORM_PROPERTIES),
+    )
+
+
+def _per_count(channel: Any) -> float | None:
+    """Of counts with one linear scale through zero, which is all that a converter needs."""
+    get = channel.properties.get
+    linear = get("NI_Number_Of_Scales") == 1 and get(_SCALE + "Scale_Type") == "Linear"
+    if not linear or get(_SCALE + "Linear_Y_Intercept") != 0.0:
+        return None
+    raw = channel.read_data(0, 1, scaled=False)
+    slope = get(_SCALE + "Linear_Slope")
+    return float(slope) if getattr(raw, "dtype", None) == np.int16 and slope else None
 
 
 def _require_whole(stream: BinaryIO) -> None:
@@ -118,9 +108,9 @@ def _stamps_ns(stamps: Any) -> npt.NDArray[np.int64]:
         raise ConfigError("a time stamp beyond the year 2242")
     # the upper 53 bits of 64 are exact in a double, and a thousand times finer than is needed
     us = np.rint((np.asarray(stamps["second_fractions"]) >> np.uint64(11)) * 2.0**-53 * 1e6)
-    found: npt.NDArray[np.int64] = seconds * 1_000_000_000 + us.astype(np.int64) * 1000
+    found: npt.NDArray[np.int64] = seconds * NS_PER_S + us.astype(np.int64) * 1000
     return found
 
 
 def _stamp_ns(seconds: int, fractions: int) -> int:
-    return (seconds + _EPOCH_1904_S) * 1_000_000_000 + round((fractions >> 11) * 2.0**-53 * 1e9)
+    return (seconds + _EPOCH_1904_S) * NS_PER_S + round((fractions >> 11) * 2.0**-53 * NS_PER_S)

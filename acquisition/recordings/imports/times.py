@@ -1,6 +1,7 @@
 """Times of files to UTC nanoseconds in whole microseconds; libraries that are optional."""
 
 import importlib
+from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta, timezone
 from typing import Any
 
@@ -71,7 +72,7 @@ def _whole_us(values: npt.NDArray[Any], us_per_unit: float) -> TimeArray:
     return exact.astype(np.int64)
 
 
-def text_to_ns(texts: list[str], axis: TimeAxis) -> TimeArray:
+def text_to_ns(texts: Sequence[str], axis: TimeAxis) -> TimeArray:
     """Turn ISO 8601 texts into UTC; one without a time zone has that of the mapping.
 
     Raises

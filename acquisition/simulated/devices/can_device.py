@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.simulated.devices.can_frames import FrameEncoder, FrameKind, WireFrame, shortened
 from acquisition.simulated.devices.can_shape import CanShape

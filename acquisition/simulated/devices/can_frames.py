@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
+from can.util import CAN_FD_DLC
 
-from acquisition.delivery.calibration import RawBlock
-from acquisition.simulated.devices.can_shape import FD_LENGTHS, CanShape, MessageShape
+from acquisition.delivery.blocks import RawBlock
+from acquisition.simulated.devices.can_shape import CanShape, MessageShape
 
 _NS_PER_US = 1000
 _US_PER_S = 1_000_000
@@ -103,5 +104,5 @@ class FrameEncoder:
 
 def shortened(frame: WireFrame) -> WireFrame:
     """The frame cut to the next shorter length."""
-    length = max(n for n in FD_LENGTHS if n < len(frame.data))
+    length = max(n for n in CAN_FD_DLC if n < len(frame.data))
     return replace(frame, data=frame.data[:length])

@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from can.util import CAN_FD_DLC
 
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings, CanSlowChannel
 from acquisition.errors import ConfigError
-
-FD_LENGTHS = (0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64)
-"""Lengths of a frame in bytes; classic frames have up to eight."""
 
 _FD_SAMPLES = 5
 _FD_WAVE_HEAD, _FD_HEAD, _CLASSIC_HEAD = 4, 24, 2
@@ -230,7 +228,7 @@ def _floats(slow: tuple[DaqSignal, ...], offset: int) -> list[Field]:
 
 def _wire_length(fields: list[Field], fd: bool) -> int:
     end = max(field.offset + field.kind.n_bytes for field in fields)
-    return next(n for n in FD_LENGTHS if n >= max(end, 8)) if fd else end
+    return next(n for n in CAN_FD_DLC if n >= max(end, 8)) if fd else end
 
 
 _NODE = "DAQ"

@@ -11,12 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from can.util import dlc2len, len2dlc
+
 from acquisition.clock import Clock
 from acquisition.errors import LinkError
 from acquisition.simulated.devices.can_device import CanDevice, Item
 from acquisition.simulated.devices.can_frames import FrameKind, WireFrame
 from acquisition.simulated.devices.can_server import CanDaqServer
-from acquisition.simulated.devices.can_shape import FD_LENGTHS
 from acquisition.simulated.devices.server import PseudoTerminal
 
 _MAX_COMMAND = 64
@@ -32,15 +33,11 @@ def slcan_line(frame: WireFrame) -> bytes:
     if frame.kind is FrameKind.ERROR:
         return _ERROR_LINE
     letter = "r" if frame.kind is FrameKind.REMOTE else "b" if frame.fd else "t"
-    code = FD_LENGTHS.index(_padded(len(frame.data)))
-    data = frame.data.ljust(FD_LENGTHS[code], b"\0").hex().upper()
+    code = len2dlc(len(frame.data))
+    data = frame.data.ljust(dlc2len(code), b"\0").hex().upper()
     if frame.extended:
         return f"{letter.upper()}{frame.frame_id:08X}{code:X}{data}\r".encode()
     return f"{letter}{frame.frame_id:03X}{code:X}{data}\r".encode()
-
-
-def _padded(length: int) -> int:
-    return next(n for n in FD_LENGTHS if n >= length)
 
 
 class _SlcanServer(CanDaqServer):

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.simulated.devices.modbus_device import ModbusDevice

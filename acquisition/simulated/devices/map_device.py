@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.modbus.read_plan import plan_reads
 from acquisition.modbus.register_map import MapValue, RegisterMap
@@ -14,6 +14,7 @@ from acquisition.simulated.devices.modbus_device import ModbusDevice
 from acquisition.simulated.devices.register_image import RegisterImage, no_value
 from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import FloatArray
+from core.samples.calibration import UnitCalibration
 from core.spectra.lines import exact_phasors, tapered
 from core.spectra.polls import VectorPart, VectorRow
 from core.units import hz_from_rpm

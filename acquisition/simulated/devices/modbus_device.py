@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.simulated.feed import Ledger, SampleFeed, SlotFeed
 
 _ADDRESS_AND_COUNT = struct.Struct(">HH")

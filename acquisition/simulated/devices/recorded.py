@@ -1,12 +1,13 @@
 """`RecordedFeed`: a recording as the feed of a simulated DAQ."""
 
 from collections import deque
+from collections.abc import Iterable
 
-from acquisition.delivery.blocks import BlockGrid
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import BlockJoiner, RawBlock, cells_of, sample_block
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.source import Selection, all_of
 from acquisition.simulated.feed import FeedEndedError
+from core.samples.blocks import SampleBlock
 
 
 class RecordedFeed:
@@ -24,9 +25,9 @@ class RecordedFeed:
     """
 
     def __init__(self, recording: Recording, selection: Selection | None = None) -> None:
-        self._blocks = recording.raw_blocks()
+        self._runs = recording.runs()
         self._selection = selection or all_of(recording.manifest)
-        self._grid = BlockGrid(self._selection.calibration.block_samples)
+        self._joiner = BlockJoiner(self._selection.calibration.block_samples)
         self._length = 0
         self._ready: deque[RawBlock] = deque()
 
@@ -47,20 +48,26 @@ class RecordedFeed:
         if n_samples != self._length:
             self._cut_to(n_samples)
         while not self._ready:
-            block = next(self._blocks, None)
-            self._ready.extend(self._grid.flush() if block is None else self._put(block))
-            if block is None and not self._ready:
+            run = next(self._runs, None)
+            self._extend(self._joiner.flush() if run is None else self._put(run))
+            if run is None and not self._ready:
                 raise FeedEndedError
         return self._ready.popleft()
 
     def close(self) -> None:
         """Close the recording's files."""
-        self._blocks.close()
+        self._runs.close()
 
-    def _put(self, block: RawBlock) -> list[RawBlock]:
-        return self._grid.put(self._selection.of(block))
+    def _put(self, run: SampleBlock) -> list[SampleBlock]:
+        return self._joiner.put(self._selection.of(run))
 
     def _cut_to(self, n_samples: int) -> None:
-        held = [*self._ready, *self._grid.flush()]
-        self._grid, self._length = BlockGrid(n_samples), n_samples
-        self._ready = deque(piece for block in held for piece in self._grid.put(block))
+        calibration = self._selection.calibration
+        held = [sample_block([raw], calibration) for raw in self._ready] + self._joiner.flush()
+        self._joiner, self._length = BlockJoiner(n_samples), n_samples
+        self._ready = deque()
+        for block in held:
+            self._extend(self._joiner.put(block))
+
+    def _extend(self, blocks: Iterable[SampleBlock]) -> None:
+        self._ready.extend(raw for block in blocks for raw in cells_of(block))

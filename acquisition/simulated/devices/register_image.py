@@ -1,8 +1,9 @@
-"""`RegisterImage`: registers of a simulated device, written through its register map."""
+"""Registers of simulated devices: `RegisterImage` of a register map, and those of a block ring."""
 
 import math
 import struct
-from collections.abc import Mapping
+import zlib
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 
 import numpy as np
@@ -12,6 +13,7 @@ from acquisition.modbus.decoding import byte_permutation
 from acquisition.modbus.device_time import EpochTime
 from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap
 from acquisition.modbus.requests import BIT_FUNCTIONS
+from acquisition.modbus.ring_profile import HEADER, MAGIC, VERSION, RingHeader, Slot
 from core.units import NS_PER_S
 
 _DEFAULT_RANGE = (-1000.0, 1000.0)
@@ -34,7 +36,7 @@ class RegisterImage:
         self._ranges = ranges or {}
         self._words: dict[tuple[int, int], int] = {}
         self._bits: dict[tuple[int, int], bool] = {}
-        for cell, _ in registers.cells():
+        for cell in registers.cells():
             self._create(cell.function, cell.start(self._base), cell.stop(self._base))
         for block in registers.together:
             start = block.address - self._base
@@ -165,3 +167,31 @@ def no_value(value: MapValue) -> float:
     if math.isfinite(value.invalid_below):
         return value.invalid_below - 1.0
     return value.invalid_above + 1.0 if math.isfinite(value.invalid_above) else 0.0
+
+
+def encode_header(header: RingHeader) -> bytes:
+    """Header registers of a block ring, without the slow values."""
+    ring = header.layout
+    data = HEADER.pack(
+        *(MAGIC, VERSION, ring.n_channels, ring.samples_per_slot, ring.n_slots),
+        *(ring.rate_mhz, header.epoch, header.newest),
+        *(ring.n_slow, ring.ring_address, ring.slot_stride),
+    )
+    return data + zlib.crc32(data).to_bytes(4, "big")
+
+
+def encode_slot(slot: Slot) -> bytes:
+    """Registers of one slot of a block ring."""
+    head = struct.pack(
+        ">6I",
+        *(slot.sequence, slot.first_index, slot.seconds, slot.microseconds),
+        *(slot.ok_bits, slot.epoch),
+    )
+    samples = slot.counts.astype(">i2").tobytes() + slot.trailer.to_bytes(2, "big")
+    data = head + encode_slow(slot.slow) + samples
+    return data + (zlib.crc32(data) ^ slot.damage).to_bytes(4, "big")
+
+
+def encode_slow(values: Sequence[float]) -> bytes:
+    """Slow values of a block ring as registers, NaN where there is none."""
+    return np.asarray(values, dtype=">f4").tobytes()

@@ -7,19 +7,11 @@ from functools import partial
 
 import numpy as np
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
-from acquisition.modbus.ring_profile import (
-    HEADER_REGISTERS,
-    U32,
-    RingHeader,
-    RingLayout,
-    Slot,
-    encode_header,
-    encode_slot,
-    encode_slow,
-)
+from acquisition.modbus.ring_profile import HEADER_REGISTERS, U32, RingHeader, RingLayout, Slot
 from acquisition.simulated.devices.modbus_device import ModbusDevice, RegisterMemory
+from acquisition.simulated.devices.register_image import encode_header, encode_slot, encode_slow
 from acquisition.simulated.devices.ring_faults import SLOT_FAULTS, ReadingWatch, SlotFault
 from acquisition.simulated.feed import Ledger, SampleFeed
 

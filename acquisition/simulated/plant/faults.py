@@ -7,8 +7,9 @@ from enum import StrEnum
 import numpy as np
 import numpy.typing as npt
 
-from acquisition.delivery.calibration import COUNTS_FULL_SCALE, UnitCalibration
 from core.arrays import CountArray, FloatArray
+from core.checks.channels import COUNTS_FULL_SCALE
+from core.samples.calibration import UnitCalibration
 
 RAIL_HIT_SPACING = 997
 """Samples between two hits; a prime, so that hits fall anywhere in blocks."""

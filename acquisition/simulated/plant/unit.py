@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.conditions import Conditions, between
 from acquisition.simulated.plant.faults import FaultInjector, to_counts
@@ -15,6 +15,7 @@ from acquisition.simulated.plant.plant import CHUNK_SAMPLES, SimulatedPlant
 from acquisition.simulated.plant.probes import probes
 from acquisition.simulated.plant.scenario import Course, Scenario
 from core.machine.unit import Unit
+from core.samples.calibration import UnitCalibration
 from core.units import NS_PER_S, rad_s_from_rpm
 
 

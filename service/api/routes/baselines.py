@@ -9,7 +9,6 @@ from fastapi import APIRouter, Path, Response
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
-from core.baseline.history import Watched
 from core.condition.cells import CellGrid
 from core.machine.unit import Estimator
 from service.api.answers import rendered, worked
@@ -114,7 +113,7 @@ def learning_model(progress: LearningProgress, n_days_wanted: int) -> LearningMo
 
 def baseline_model(baseline: BearingBaseline, about: BaselineVersionModel) -> BaselineModel:
     """Return the model of a baseline with its cells."""
-    x, y = (baseline.of(Watched.STIFFNESS, direction) for direction in ("x", "y"))
+    x, y = (baseline.of(direction) for direction in ("x", "y"))
     grid = next((found.grid for found in (x, y) if found), None)
     return BaselineModel(
         unit=baseline.origin.unit,

@@ -8,12 +8,11 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
-from core.baseline.history import DIRECTIONS, Watched
+from core.baseline.history import DIRECTIONS
 from core.change.decision import Decision, Verdict
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
 from core.change.settings import FilmRules
-from core.condition.cells import FilmConditions
 from service.api.answers import rendered
 from service.api.auth.declared import needs
 from service.api.context import BearingId, Context, UnitId
@@ -376,9 +375,7 @@ def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionMode
 def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: int) -> str:
     match finding.verdict:
         case Verdict.NO_BASELINE:
-            learned = (
-                seen.baseline.of(Watched.STIFFNESS, DIRECTIONS[row]) if seen.baseline else None
-            )
+            learned = seen.baseline.of(DIRECTIONS[row]) if seen.baseline else None
             return NONE_IN_FORCE if learned is None else _unseen(learned, reading)
         case Verdict.TRANSIENT:
             return "not_settled"
@@ -388,10 +385,7 @@ def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: 
 
 def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
     """Return what was not learned: the cell, or only the attitude angle within it."""
-    here = FilmConditions.one(
-        reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
-    )
-    is_seen = learned.table.find(learned.grid.cells(here))[0] >= 0
+    is_seen = learned.table.find(learned.grid.cells(reading.conditions))[0] >= 0
     return ATTITUDE_NOT_LEARNED if is_seen else NOT_LEARNED
 
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from core.arrays import TimeArray
 from core.baseline.agreement import far_readings
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
-from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import (
@@ -17,7 +17,6 @@ from core.change.backtest import (
     OperationHistory,
     decide_all,
     operation_history,
-    operation_of_states,
 )
 from core.change.decision import WatchedReadings
 from core.change.settings import ChangeLimits
@@ -162,7 +161,7 @@ class PeriodRun:
 
     def stiffness(self, direction: str) -> QuantityBaseline | None:
         """What was learned of a film."""
-        return self.baseline.of(Watched.STIFFNESS, direction) if self.baseline else None
+        return self.baseline.of(direction) if self.baseline else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,8 +191,9 @@ def run_bearing(place: Place, rows: BearingRows, rules: BackTestRules) -> Bearin
 
 def _operation(place: Place, rows: BearingRows, rules: BackTestRules) -> OperationHistory:
     history, oil_c = rows.history, rows.history.oil_temperature_c
+    columns = (history.time_ns, history.speed_rpm, history.power_mw)
     if rows.state is not None:
-        return operation_of_states(history.time_ns, rows.state, rules.operating, oil_c)
+        return operation_history(*columns, rules.operating, oil_c, rows.state)
     if place[0] not in rules.rated:
         raise ReadingsError(
             f"unit {place[0]}: operating states are not known: give a column state, or columns"
@@ -201,7 +201,7 @@ def _operation(place: Place, rows: BearingRows, rules: BackTestRules) -> Operati
         )
     speed_rpm, power_mw = rules.rated[place[0]]
     limits = replace(rules.operating, rated_speed_rpm=speed_rpm, rated_power_mw=power_mw)
-    return operation_history(history.time_ns, history.speed_rpm, history.power_mw, limits, oil_c)
+    return operation_history(*columns, limits, oil_c)
 
 
 def _run(

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
-from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched, watched_values
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
 from core.change.shaft_response import MEAN_READINGS, ShaftResponse, film_columns, learn_response
 from service.cli.offline.backtest_bearing import BackTestRules, BearingRun, Period, periods_of
@@ -98,10 +98,8 @@ def _compared_places(run: BearingRun, direction: str) -> tuple[FloatArray, Float
             continue
         rows = slice(period.period.learned, period.period.end)
         history = run.rows.history.rows(rows.start, rows.stop)
-        value, u_random = watched_values(history, Watched.STIFFNESS, direction)
-        conditions = history.conditions
-        deviation[rows] = baseline.compare(conditions, value, u_random).deviation
-        rise[rows] = baseline.eccentricity_rise(conditions)
+        deviation[rows] = baseline.compare_history(history).deviation
+        rise[rows] = baseline.eccentricity_rise(history.conditions)
     return np.where(run.operation.is_settled, deviation, np.nan), rise
 
 

@@ -16,16 +16,13 @@ from service.cli.offline.backtest_cells import MAX_ROWS, ReadingsError
 from service.cli.offline.backtest_tables import MAGIC, csv_batches, parquet_batches
 
 MEMORY_BYTES = 3 * 2**30
-CPU_S = 3600
 WRONG_FILE = 3
 """Exit code that comes with a sentence for the user."""
-
-_LOG_BYTES = 100_000
 
 
 def main() -> None:
     """Read one file."""
-    confine(MEMORY_BYTES, CPU_S, _LOG_BYTES)
+    confine(MEMORY_BYTES)
     try:
         with Path(sys.argv[1]).open("rb") as stream:
             _send(_batches(stream), sys.stdout.buffer)

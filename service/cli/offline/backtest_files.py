@@ -38,9 +38,6 @@ MAX_NAMES = 2000
 IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 """Name of a unit or bearing, as in plant files."""
 
-_ENVIRONMENT = {"ARROW_DEFAULT_MEMORY_POOL": "system", "OPENBLAS_NUM_THREADS": "1"}
-"""Others take much address space, which is limited."""
-
 
 def read_histories(
     path: Path,
@@ -75,7 +72,7 @@ def read_histories(
 
 def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mapping[str, Any]:
     module, file = "service.cli.offline.backtest_child", str(path.absolute())
-    with closing(ConfinedProcess(module, file, environment=_ENVIRONMENT)) as process:
+    with closing(ConfinedProcess(module, file)) as process:
         try:
             gathered = _gathered(process, word, advanced)
         except (pa.ArrowException, OSError):

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
-from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.baseline.learning import learn
 from core.change.backtest import DecisionHistory, OperationHistory, decide_all, operation_history
 from core.change.decision import WatchedReadings
@@ -104,7 +104,7 @@ def judged(
     rules: FilmRules,
 ) -> FilmHistory:
     """A history with what would have been said of it under its own baseline."""
-    found = [learned.of(Watched.STIFFNESS, direction) for direction in DIRECTIONS]
+    found = [learned.of(direction) for direction in DIRECTIONS]
     quantities = [quantity for quantity in found if quantity is not None]
     if len(quantities) < len(DIRECTIONS):
         raise ValueError(f"nothing was learned of {learned.origin.bearing}: too few readings")

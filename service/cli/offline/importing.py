@@ -14,8 +14,7 @@ from acquisition.can.assembly import FrameAssembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanSettings
-from acquisition.delivery.blocks import BlockGrid
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.blocks import BlockJoiner, RawBlock, sample_block
 from acquisition.delivery.units import slow_conversion, waveform_factor
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import (
@@ -30,6 +29,7 @@ from acquisition.recordings.manifest import Manifest, read_manifest
 from acquisition.recordings.messages import MAX_DATA, Frames
 from acquisition.recordings.reading import imported_blocks, imported_frames
 from acquisition.recordings.writer import RecordingWriter
+from core.samples.calibration import UnitCalibration
 from service.settings.adapter_values import can_settings_of, recorded_unit
 from service.settings.core_values import calibration_of
 from service.settings.sources.can import CanSettings as CanSourceSettings
@@ -55,13 +55,7 @@ class CanLogDecoder:
 
     def __init__(self, settings: CanSettings, calibration: UnitCalibration) -> None:
         plan = compile_plan(settings, calibration)
-        self._assembler = FrameAssembler(
-            plan,
-            n_channels=len(calibration.channels),
-            n_slow=len(calibration.slow),
-            rate_hz=calibration.rate_hz,
-            hold_s=settings.hold_s,
-        )
+        self._assembler = FrameAssembler(plan)
         self._gate = FrameGate(plan, self._assembler.refused)
 
     def take(self, frames: Frames) -> list[RawBlock]:
@@ -170,31 +164,34 @@ def import_recording(
     if not job.channels and decoder is None:
         raise ConfigError(f'unit {unit.id} has no source of kind "can", whose DBC file is needed')
     read = _decoded(path, job, decoder) if decoder else imported_blocks(path, job)
-    with closing(read) as blocks:
-        first = next(blocks, None)
+    recorded = recorded_unit(unit)
+    joiner = BlockJoiner(job.block_samples)
+    with closing(read) as raws:
+        first = next(raws, None)
         if first is None:
             raise ConfigError(f"{path}: has no samples of unit {unit.id}")
-        with RecordingWriter(folder, recorded_unit(unit), made_by, first_decides=True) as writer:
-            for block, done in chain([first], blocks):
-                writer.write(block if decoder else _with_all_slow(block, job, unit))
+        with RecordingWriter(folder, recorded, made_by, first_decides=True) as writer:
+            for raw, done in chain([first], raws):
+                whole = raw if decoder else _with_all_slow(raw, job, unit)
+                for block in joiner.put(sample_block([whole], recorded.calibration)):
+                    writer.write_block(block)
                 advanced(done)
+            for block in joiner.flush():
+                writer.write_block(block)
     return read_manifest(folder)
 
 
 def _decoded(
     path: Path, job: ImportJob, decoder: CanLogDecoder
 ) -> Generator[tuple[RawBlock, float]]:
-    grid, done = BlockGrid(job.block_samples), 0.0
     for frames, done in imported_frames(path, job):
-        for raw in decoder.take(frames):
-            yield from ((block, done) for block in grid.put(raw))
-    yield from ((block, done) for block in grid.flush())
+        yield from ((raw, done) for raw in decoder.take(frames))
 
 
-def _with_all_slow(block: RawBlock, job: ImportJob, unit: UnitSettings) -> RawBlock:
+def _with_all_slow(raw: RawBlock, job: ImportJob, unit: UnitSettings) -> RawBlock:
     """Slow channels that are not in the file have no value."""
-    found = dict(zip((column.id for column in job.slow), block.slow, strict=True))
-    return replace(block, slow=tuple(found.get(c.id, math.nan) for c in unit.slow_channel))
+    found = dict(zip((column.id for column in job.slow), raw.slow, strict=True))
+    return replace(raw, slow=tuple(found.get(c.id, math.nan) for c in unit.slow_channel))
 
 
 def _channels(mapped: Mapping[str, MappedChannel], unit: UnitSettings) -> tuple[ChannelColumn, ...]:

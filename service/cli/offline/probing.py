@@ -5,7 +5,6 @@ import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from acquisition.delivery.polling import wrong_replies_drop_the_link
 from acquisition.errors import AcquisitionError
 from acquisition.modbus.cells import N_BYTES, ByteOrder, Cell, NumberType
 from acquisition.modbus.client import ModbusClient
@@ -241,8 +240,7 @@ async def read_once(device: ModbusLinkSettings, function: int, address: int, cou
     """
     client = ModbusClient(link_settings_of(device))
     async with client.connected():
-        with wrong_replies_drop_the_link():
-            return await client.read(address, count, function)
+        return await client.read(address, count, function)
 
 
 async def read_map_once(
@@ -274,10 +272,9 @@ async def read_ring_once(
     client = ModbusClient(link_settings_of(device))
     reader = RingReader(client, base_address, function)
     async with client.connected():
-        with wrong_replies_drop_the_link():
-            header = await reader.header()
-            [slot] = await reader.slots(header.layout, [header.newest])
-            return header, slot
+        header = await reader.header()
+        [slot] = await reader.slots(header.layout, [header.newest])
+        return header, slot
 
 
 async def identify_once(device: ModbusLinkSettings) -> Identification:
@@ -290,8 +287,7 @@ async def identify_once(device: ModbusLinkSettings) -> Identification:
     """
     client = ModbusClient(link_settings_of(device))
     async with client.connected():
-        with wrong_replies_drop_the_link():
-            return await client.identify()
+        return await client.identify()
 
 
 async def measure_in_flight(
@@ -318,11 +314,10 @@ async def measure_in_flight(
     for n_requests in range(2, most + 1):
         client = ModbusClient(replace(link_settings_of(device), requests_in_flight=n_requests))
         spans = [Span(address, 1, function)] * n_requests
-        content = memoryview(bytearray(sum(span.n_bytes for span in spans)))
         try:
             async with client.connected():
                 for _ in range(_TRIES_IN_FLIGHT):
-                    await client.read_into(spans, content)
+                    await client.read_spans(spans)
         except AcquisitionError:
             break
         n_taken = n_requests

@@ -2,10 +2,10 @@
 
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 
-from acquisition.delivery.calibration import UnitCalibration
 from acquisition.source import SampleSource
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
+from core.samples.calibration import UnitCalibration
 from service.api.routes.bearings import estimator_names, runout_names
 from service.api.values import (
     ApiModel,

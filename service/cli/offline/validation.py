@@ -28,7 +28,7 @@ from acquisition.simulated.plant.rotor import (
     rotor_matrices,
     unbalance_force_n,
 )
-from core.stiffness.transfer import effective_stiffness_n_per_m
+from core.stiffness.stiffness_budget import effective_stiffness_n_per_m
 from core.units import hz_from_rpm, um_from_m
 
 SPEED_RPM: Final = 92.3

@@ -6,9 +6,9 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from acquisition.modbus.cells import MapError
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
 from acquisition.modbus.register_map import RegisterMap
+from acquisition.modbus.requests import MAX_FIFO_REGISTERS
 from core.spectra.polls import PollSettings, VectorPart, VectorRow
 from service.settings.base import MisfitError, Settings
 from service.settings.sources.can import CanSettings
@@ -230,6 +230,24 @@ class ModbusFifoSettings(ModbusLinkSettings):
     loss_tolerance_s: Annotated[float, Field(ge=0.01, le=10.0)] = 0.1
     """Without a counter: a loss shorter than this cannot be told from jitter."""
 
+    @model_validator(mode="after")
+    def _check_queues(self) -> Self:
+        if not self.has_counter and self.layout is FifoKind.PER_CHANNEL:
+            raise MisfitError(
+                "must be true with a queue for each channel: only a counter shows which samples"
+                " belong together",
+                "has_counter",
+            )
+        if not self.has_counter and self.reading == "keeps":
+            raise MisfitError(
+                "must be true if reading does not remove: only a counter shows which samples are"
+                " new",
+                "has_counter",
+            )
+        if len(set(self.addresses)) < len(self.addresses):
+            raise MisfitError("names a queue twice", "addresses")
+        return self
+
     def fifo_layout(self, n_channels: int) -> FifoLayout:
         """The queues as the adapter takes them.
 
@@ -238,16 +256,24 @@ class ModbusFifoSettings(ModbusLinkSettings):
         MisfitError
             If the channels do not fit into a FIFO read of 31 registers, or cannot be told apart.
         """
-        try:
-            return FifoLayout(
-                addresses=self.addresses,
-                n_channels=n_channels,
-                kind=self.layout,
-                has_counter=self.has_counter,
-                removes=self.reading == "removes",
+        n_queues = 1 if self.layout is FifoKind.INTERLEAVED else n_channels
+        if len(self.addresses) != n_queues:
+            words = f"must be {n_queues}, got {len(self.addresses)}"
+            raise MisfitError(words, "source", "addresses")
+        layout = FifoLayout(
+            addresses=self.addresses,
+            n_channels=n_channels,
+            kind=self.layout,
+            has_counter=self.has_counter,
+            removes=self.reading == "removes",
+        )
+        if layout.record_registers > MAX_FIFO_REGISTERS:
+            raise MisfitError(
+                f"makes records of {layout.record_registers} registers; a FIFO read has at most"
+                f" {MAX_FIFO_REGISTERS}: use a queue for each channel, or fewer channels",
+                *("source", "addresses"),
             )
-        except MapError as error:
-            raise MisfitError(str(error), "source", *error.at) from error
+        return layout
 
 
 def _require_all(

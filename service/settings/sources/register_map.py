@@ -5,17 +5,19 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from acquisition.modbus.cells import ByteOrder, Cell, MapError
+from acquisition.modbus.cells import ByteOrder, Cell
 from acquisition.modbus.decoding import MapDecoder
 from acquisition.modbus.device_time import CALENDAR_FIELDS, CalendarTime, EpochTime
+from acquisition.modbus.read_plan import MapError
 from acquisition.modbus.register_map import RegisterMap, Signature, Together
 from service.settings.base import MisfitError, Settings
 from service.settings.sources.registers import (
     Address,
-    CellDefaults,
     CellSettings,
     Function,
+    MapDefaults,
     ValueSettings,
+    require_apart,
 )
 from service.settings.toml_file import load_toml
 
@@ -48,7 +50,7 @@ class EpochTimeSettings(Settings):
     parts_per_s: Annotated[float, Field(ge=1.0, le=1e9)] = 1e6
     """How many of them make a second; example: 1000.0."""
 
-    def plain(self, default: CellDefaults) -> EpochTime:
+    def plain(self, default: MapDefaults) -> EpochTime:
         """As the adapters take it."""
         return EpochTime(
             seconds=default.cell(self.seconds, "time", "seconds"),
@@ -72,13 +74,17 @@ class CalendarTimeSettings(Settings):
     utc_offset_s: Annotated[float, Field(ge=-86400.0, le=86400.0)] = 0.0
     """What the device's clock is ahead of UTC; example: -10800."""
 
-    def plain(self, default: CellDefaults) -> CalendarTime:
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if sorted(self.fields) != sorted(CALENDAR_FIELDS):
+            raise MisfitError(f"must name each of {', '.join(CALENDAR_FIELDS)} once", "fields")
+        return self
+
+    def plain(self, default: MapDefaults) -> CalendarTime:
         """As the adapters take it."""
         first = default.cell(self.first, "time", "first")
-        try:
-            return CalendarTime(first=first, fields=self.fields, utc_offset_s=self.utc_offset_s)
-        except MapError as error:
-            raise MapError(str(error), "time", *error.at) from error
+        default.require_in_space(first.address, len(self.fields), "time", "first")
+        return CalendarTime(first=first, fields=self.fields, utc_offset_s=self.utc_offset_s)
 
 
 class SignatureSettings(CellSettings):
@@ -91,7 +97,7 @@ class SignatureSettings(CellSettings):
 class RegisterMapSettings(Settings):
     """What stands where in a device, as its manual says."""
 
-    base: int = 0
+    base: Literal[0, 1, 10001, 30001, 40001, 100001, 300001, 400001] = 0
     """Number that the manual gives to the first register: 0, 1, or 10001, 30001, 40001, 100001,
     300001, 400001."""
 
@@ -144,13 +150,20 @@ class RegisterMapSettings(Settings):
 
         Raises
         ------
-        MapError
-            If it cannot be used; says where.
+        MisfitError
+            If no device can have it; says where.
         """
-        default = CellDefaults(self.function, self.byte_order)
+        default = MapDefaults(self.base, self.function, self.byte_order)
         register = 4 if self.function == 4 else 3
+        for n, block in enumerate(self.together):
+            default.require_in_space(block.address, block.count, "together", n)
+            if block.count > self.max_registers:
+                limit = f"must not be above max_registers, {self.max_registers}"
+                raise MisfitError(limit, "together", n, "count")
+        values = tuple(default.value(value, "value", n) for n, value in enumerate(self.value))
+        require_apart(values, self.base)
         return RegisterMap(
-            values=tuple(default.value(n, value) for n, value in enumerate(self.value)),
+            values=values,
             base=self.base,
             together=tuple(
                 Together(address=t.address, count=t.count, function=t.function or register)
@@ -164,12 +177,10 @@ class RegisterMapSettings(Settings):
             ),
             max_registers=self.max_registers,
             max_gap=self.max_gap,
-            min_poll_period_s=self.min_poll_period_s,
-            min_timeout_s=self.min_timeout_s,
         )
 
 
-def _optional(default: CellDefaults, cell: CellSettings | None, *at: int | str) -> Cell | None:
+def _optional(default: MapDefaults, cell: CellSettings | None, *at: int | str) -> Cell | None:
     return None if cell is None else default.cell(cell, *at)
 
 

@@ -1,22 +1,34 @@
 """Values in Modbus registers: address, type, scale and flags, as cells of the adapter."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from acquisition.modbus.cells import ByteOrder, Cell, MapError, NumberType
+from acquisition.modbus.cells import FLOATS, INTEGERS, N_BYTES, ByteOrder, Cell, NumberType
 from acquisition.modbus.register_map import FlagCheck, FullScale, MapValue, Meaning, ScaleRegister
+from acquisition.modbus.requests import ADDRESS_SPACE, REGISTER_FUNCTIONS
 from core.spectra.polls import AMPLITUDE_PARTS, VectorPart, VectorRow
 from service.settings.base import Identifier, MisfitError, Settings
 
 Function = Literal[1, 2, 3, 4]
 Address = Annotated[int, Field(ge=0, le=465_535)]
+ALL_BITS = 0xFFFF
 PK_PER = {"pk": 1.0, "pp": 0.5, "rms": math.sqrt(2.0)}
 """Zero-to-peak amplitude of a sine per amplitude of each detector."""
 
 SIGN_OF = {"lead": 1.0, "lag": -1.0}
+
+
+def _refuse_zero(number: float) -> float:
+    if number == 0.0:
+        raise MisfitError("must not be 0")
+    return number
+
+
+NotZero = Annotated[float, AfterValidator(_refuse_zero)]
 
 
 class CellSettings(Settings):
@@ -41,7 +53,7 @@ class CellSettings(Settings):
 class ScaleRegisterSettings(CellSettings):
     """value = raw / divisor * this register; both must be read in one request."""
 
-    divisor: float = 32767.0
+    divisor: NotZero = 32767.0
     """What the raw number is divided by; not 0."""
 
 
@@ -71,13 +83,15 @@ class FullScaleSettings(Settings):
         for key in ("minimum", "maximum"):
             if (getattr(self, key) is None) == (getattr(self, f"{key}_register") is None):
                 raise MisfitError(f"give either this or {key}_register", key)
+        if not self.raw_minimum < self.raw_maximum:
+            raise MisfitError(f"must be below raw_maximum {self.raw_maximum:g}", "raw_minimum")
         return self
 
 
 class FlagSettings(CellSettings):
     """What a status register says of the value."""
 
-    mask: Annotated[int, Field(ge=1, le=0xFFFF)] = 0xFFFF
+    mask: Annotated[int, Field(ge=1, le=ALL_BITS)] = ALL_BITS
     """Bits of the register that count; example: 0x0020."""
 
     set_means: Meaning | None = None
@@ -88,6 +102,32 @@ class FlagSettings(CellSettings):
 
     clipped_values: Annotated[tuple[int, ...], Field(max_length=64)] = ()
     """With ``ok_values``: numbers that mean a clipped value."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.type in FLOATS:
+            raise MisfitError(
+                'must be "uint16" or other whole numbers: a float has no flags', "type"
+            )
+        if self.type is NumberType.BIT and self.mask not in (1, ALL_BITS):
+            raise MisfitError("must be left out: this is one bit already", "mask")
+        if (self.set_means is None) == (not self.ok_values):
+            words = "must be given unless ok_values are, and not with them"
+            raise MisfitError(words, "set_means")
+        if self.clipped_values and not self.ok_values:
+            raise MisfitError("can only be given with ok_values", "clipped_values")
+        highest = self.counted_bits // (self.counted_bits & -self.counted_bits)
+        for name in ("ok_values", "clipped_values"):
+            for number in getattr(self, name):
+                if not 0 <= number <= highest:
+                    words = f"must be numbers of the mask, 0 to {highest}, got {number}"
+                    raise MisfitError(words, name)
+        return self
+
+    @property
+    def counted_bits(self) -> int:
+        """The mask; 1 for a single bit."""
+        return 1 if self.type is NumberType.BIT else self.mask
 
 
 class ValueSettings(CellSettings):
@@ -106,7 +146,7 @@ class ValueSettings(CellSettings):
     phase: Literal["lag", "lead"] | None = None
     """Whether a growing phase in degrees means that the signal comes later or earlier."""
 
-    scale: float = 1.0
+    scale: NotZero = 1.0
     """Factor to the channel's unit; not 0; example: 25.4 from mil to µm."""
 
     offset: float = 0.0
@@ -139,6 +179,16 @@ class ValueSettings(CellSettings):
             )
         if (self.phase is not None) != (self.quantity == VectorPart.ORDER1_PHASE):
             raise MisfitError('must be "lag" or "lead" of phases, and of nothing else', "phase")
+        if self.scale_register is not None and self.full_scale is not None:
+            raise MisfitError("cannot be had together with full_scale", "scale_register")
+        low, high = self.invalid_below, self.invalid_above
+        if low is not None and high is not None and not low < high:
+            raise MisfitError(f"must be below invalid_above {high:g}", "invalid_below")
+        n_bits = 8 * N_BYTES[self.type]
+        for number in self.invalid_values if self.type in INTEGERS else ():
+            if number % 1 or not -(1 << n_bits - 1) <= number < 1 << n_bits:
+                words = f"must each be a whole number of {n_bits} bits, got {number:.12g}"
+                raise MisfitError(words, "invalid_values")
         return self
 
     @property
@@ -156,92 +206,112 @@ class ValueSettings(CellSettings):
 
 
 @dataclass(frozen=True)
-class CellDefaults:
-    """What a map says for all cells that do not say it themselves."""
+class MapDefaults:
+    """What a map says for all cells that do not say it themselves, and where it counts from.
 
+    All methods raise `MisfitError` with the place in the map.
+    """
+
+    base: int
     function: int
     byte_order: ByteOrder
 
-    def cell(self, cell: CellSettings, *at: int | str) -> Cell:
-        """Build a cell.
+    def require_in_space(self, address: int, count: int, *at: int | str) -> None:
+        """Refuse registers that no device can have, by their address."""
+        last = self.base + ADDRESS_SPACE - count
+        if not self.base <= address <= last:
+            words = f"must be {self.base} to {last}, since the map counts from {self.base}"
+            raise MisfitError(words, *at, "address")
 
-        Raises
-        ------
-        MapError
-            If there can be no such cell; says where in the map.
-        """
-        try:
-            return Cell(
-                address=cell.address,
-                function=cell.function or self.function,
-                type=cell.type,
-                byte_order=cell.byte_order or self.byte_order,
-                bit=cell.bit,
+    def cell(self, settings: CellSettings, *at: int | str) -> Cell:
+        """Build a cell."""
+        cell = Cell(
+            address=settings.address,
+            function=settings.function or self.function,
+            type=settings.type,
+            byte_order=settings.byte_order or self.byte_order,
+            bit=settings.bit,
+        )
+        is_bit, in_register = cell.type is NumberType.BIT, cell.function in REGISTER_FUNCTIONS
+        if not in_register and not is_bit:
+            words = 'must be "bit": functions 1 and 2 read single bits'
+            raise MisfitError(words, *at, "type")
+        if (cell.bit is not None) != (is_bit and in_register):
+            raise MisfitError(
+                'is the number of a bit in a register: give it with type "bit" and function 3 or 4,'
+                " and only then",
+                *(*at, "bit"),
             )
-        except MapError as error:
-            raise MapError(str(error), *at, *error.at) from error
+        self.require_in_space(cell.address, cell.n_places, *at)
+        return cell
 
-    def value(self, number: int, value: ValueSettings) -> MapValue:
-        """Build a value, in padwatch's conventions: zero-to-peak, degrees of lead.
+    def value(self, settings: ValueSettings, *at: int | str) -> MapValue:
+        """Build a value, in padwatch's conventions: zero-to-peak, degrees of lead."""
+        low, high = settings.invalid_below, settings.invalid_above
+        return MapValue(
+            id=settings.id,
+            cell=self.cell(settings, *at),
+            scale=settings.scale * settings.rim_factor,
+            offset=settings.offset * settings.rim_factor,
+            scale_register=self._scale_register(settings.scale_register, *at, "scale_register"),
+            full_scale=self._full_scale(settings.full_scale, *at, "full_scale"),
+            flags=tuple(self._flag(f, *at, "flag", n) for n, f in enumerate(settings.flag)),
+            invalid_values=settings.invalid_values,
+            invalid_below=-math.inf if low is None else low,
+            invalid_above=math.inf if high is None else high,
+        )
 
-        Raises
-        ------
-        MapError
-            If there can be no such value; says where in the map.
-        """
-        try:
-            return MapValue(
-                id=value.id,
-                cell=self.cell(value),
-                scale=value.scale * value.rim_factor,
-                offset=value.offset * value.rim_factor,
-                scale_register=self._scale_register(value.scale_register),
-                full_scale=self._full_scale(value.full_scale),
-                flags=tuple(self._flag(flag, n) for n, flag in enumerate(value.flag)),
-                invalid_values=value.invalid_values,
-                invalid_below=-math.inf if value.invalid_below is None else value.invalid_below,
-                invalid_above=math.inf if value.invalid_above is None else value.invalid_above,
-            )
-        except MapError as error:
-            raise MapError(str(error), "value", number, *error.at) from error
-
-    def _scale_register(self, scale: ScaleRegisterSettings | None) -> ScaleRegister | None:
+    def _scale_register(
+        self, scale: ScaleRegisterSettings | None, *at: int | str
+    ) -> ScaleRegister | None:
         if scale is None:
             return None
-        cell = self.cell(scale, "scale_register")
-        try:
-            return ScaleRegister(cell=cell, divisor=scale.divisor)
-        except MapError as error:
-            raise MapError(str(error), "scale_register", *error.at) from error
+        return ScaleRegister(cell=self.cell(scale, *at), divisor=scale.divisor)
 
-    def _full_scale(self, span: FullScaleSettings | None) -> FullScale | None:
+    def _full_scale(self, span: FullScaleSettings | None, *at: int | str) -> FullScale | None:
         if span is None:
             return None
-        try:
-            return FullScale(
-                minimum=self._end(span.minimum, span.minimum_register, "minimum_register"),
-                maximum=self._end(span.maximum, span.maximum_register, "maximum_register"),
-                raw_minimum=span.raw_minimum,
-                raw_maximum=span.raw_maximum,
-            )
-        except MapError as error:
-            raise MapError(str(error), "full_scale", *error.at) from error
+        ends = {}
+        for key in ("minimum", "maximum"):
+            cell = getattr(span, f"{key}_register")
+            number = getattr(span, key)
+            ends[key] = number if cell is None else self.cell(cell, *at, f"{key}_register")
+        if ends["minimum"] == ends["maximum"]:
+            raise MisfitError("must differ from maximum", *at, "minimum")
+        return FullScale(**ends, raw_minimum=span.raw_minimum, raw_maximum=span.raw_maximum)
 
-    def _end(self, number: float | None, cell: CellSettings | None, key: str) -> float | Cell:
-        if number is not None:
-            return number
-        if cell is None:
-            raise MapError("must be given", key)
-        return self.cell(cell, key)
+    def _flag(self, flag: FlagSettings, *at: int | str) -> FlagCheck:
+        return FlagCheck(
+            cell=self.cell(flag, *at),
+            mask=flag.counted_bits,
+            set_means=flag.set_means,
+            ok_values=flag.ok_values,
+            clipped_values=flag.clipped_values,
+        )
 
-    def _flag(self, flag: FlagSettings, number: int) -> FlagCheck:
-        try:
-            return FlagCheck(
-                cell=self.cell(flag),
-                mask=flag.mask,
-                set_means=flag.set_means,
-                ok_values=flag.ok_values,
-                clipped_values=flag.clipped_values,
-            )
-        except MapError as error:
-            raise MapError(str(error), "flag", number, *error.at) from error
+
+def require_apart(values: Sequence[MapValue], base: int) -> None:
+    """Refuse two values on the same register, unless they are different bits of it.
+
+    Raises
+    ------
+    MisfitError
+        With the place of the second one.
+    """
+    taken: dict[tuple[int, int], MapValue] = {}
+    for n, value in enumerate(values):
+        cell = value.cell
+        for place in range(cell.start(base), cell.stop(base)):
+            other = taken.setdefault((cell.function, place), value)
+            if other is not value and not _are_different_bits(cell, other.cell):
+                raise MisfitError(
+                    f"lies on a register of value {other.id!r} (address {other.cell.address},"
+                    f" {other.cell.type}); each register has one value",
+                    *("value", n, "address"),
+                )
+        if value.id in [other.id for other in values[:n]]:
+            raise MisfitError(f"has {value.id!r} twice; each value must be unique", "value")
+
+
+def _are_different_bits(one: Cell, other: Cell) -> bool:
+    return NumberType.BIT is one.type is other.type and None is not one.bit != other.bit

@@ -9,6 +9,8 @@ from dataclasses import astuple, dataclass, replace
 from enum import StrEnum
 from typing import TypeAlias
 
+from core.alarms.alarm import AlarmNews
+
 MAX_NAME = 300
 """Characters of an actor, a peer, an action and an object that are kept."""
 
@@ -167,6 +169,22 @@ class Acting:
     source: Source = Source.PADWATCH
     peer: str | None = None
     actor: str = ""
+    command: str | None = None
+
+
+@dataclass(frozen=True)
+class ActedNews(AlarmNews):
+    """News of an alarm that an action of a person has caused.
+
+    Parameters
+    ----------
+    peer
+        Network address of the client that asked for it, if known.
+    command
+        Id of the command that asked for it; it is answered by being stored with the news.
+    """
+
+    peer: str | None = None
     command: str | None = None
 
 

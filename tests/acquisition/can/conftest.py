@@ -11,7 +11,7 @@ from acquisition.can.compiler import compile_plan
 from acquisition.can.settings import CanChannel, CanLinkSettings, CanSettings
 from acquisition.can.source import CanSource
 from acquisition.clock import SystemClock
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_settings
 from acquisition.simulated.feed import FeedEndedError
@@ -120,8 +120,7 @@ def assembler_by(counts_calibration) -> Callable[..., FrameAssembler]:
     def build(settings: CanSettings, rate_hz: float = 600.0, begun_ns: int = 0) -> FrameAssembler:
         n_channels, n_slow = len(settings.channels), len(settings.slow)
         calibration = counts_calibration(n_channels=n_channels, n_slow=n_slow, rate_hz=rate_hz)
-        plan = compile_plan(settings, calibration)
-        return FrameAssembler(plan, n_channels, n_slow, rate_hz, settings.hold_s, begun_ns)
+        return FrameAssembler(compile_plan(settings, calibration), begun_ns)
 
     return build
 

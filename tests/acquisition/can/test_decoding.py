@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from acquisition.can.dbc import load_dbc
-from acquisition.can.layout import FrameLayout, byte_offset, scalar_reader
+from acquisition.can.layout import byte_offset, column_reader, scalar_reader
 from acquisition.errors import ConfigError, FrameError
 from core.samples.blocks import Rejection
 
@@ -54,15 +54,15 @@ def test_any_signal_in_any_place_is_read_as_cantools_reads_it(tmp_path):
     for name, message in messages.items():
         signals = list(message.signals.values())
         frames = [random.bytes(message.length) for _ in range(N_FRAMES)]
-        columns = FrameLayout(message, signals).columns(frames)
+        columns = [column_reader(signal)(b"".join(frames)) for signal in signals]
         for row, data in enumerate(frames):
             expected = reference.get_message_by_name(name).decode(
                 data, decode_choices=False, scaling=False
             )
-            for signal in signals:
-                found = columns[signal.name][row]
-                np.testing.assert_equal(found, np.array(expected[signal.name], found.dtype))
-                np.testing.assert_equal(scalar_reader(signal)(data), expected[signal.name])
+            for signal, column in zip(signals, columns, strict=True):
+                value = expected[signal.source.name]
+                np.testing.assert_equal(column[row], np.array(value, column.dtype))
+                np.testing.assert_equal(scalar_reader(signal)(data), value)
         n_aligned += sum(byte_offset(s) is not None for s in signals)
         n_other += sum(byte_offset(s) is None for s in signals)
     assert n_aligned > 100

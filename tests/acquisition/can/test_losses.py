@@ -15,7 +15,7 @@ from acquisition.can.assembly import FrameAssembler
 from acquisition.can.compiler import compile_plan
 from acquisition.can.gate import FrameGate
 from acquisition.can.settings import CanLinkSettings
-from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.blocks import sample_block
 from acquisition.simulated.devices.can_frames import FrameEncoder, shortened
 from acquisition.simulated.devices.can_server import can_message
 from acquisition.simulated.devices.can_shape import daq_settings
@@ -91,7 +91,7 @@ def assembler_of(counts_calibration):
             daq_settings(shape, link, ("um",) * n_channels, **settings),
             counts_calibration(n_channels=n_channels, n_slow=n_slow),
         )
-        assembler = FrameAssembler(plan, n_channels, n_slow, 600.0, 5.0)
+        assembler = FrameAssembler(plan)
         gate = FrameGate(plan, assembler.refused)
 
         def take(frames, arrived_ns):
@@ -215,7 +215,7 @@ def test_random_frames_of_a_mad_device_never_break_the_account(
             frames.append((frame.frame_id, random.bytes(len(frame.data)) if mad else frame.data))
         arrived_ns += int(random.integers(0, 200_000_000))
         for block in assembler.take(frames, arrived_ns):
-            ring.write(calibrate(block, calibration))
+            ring.write(sample_block([block], calibration))
         assert len(assembler._sets.pending) <= 65
     assert sum(map(len, assembler._builder.side._entries.values())) < 40_000
 

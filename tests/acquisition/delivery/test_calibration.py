@@ -5,13 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import (
-    ChannelCalibration,
-    RawBlock,
-    UnitCalibration,
-    calibrate,
-)
+from acquisition.delivery.blocks import RawBlock, sample_block
 from core.quality import GOOD, Quality, Reason, bad, uncertain
+from core.samples.calibration import ChannelCalibration, UnitCalibration
 
 PROBE = ChannelCalibration(10.0, -250.0, -9.0, 9.0)
 """10 V are 2500 µm; on average from -9 to 9 V, which is 29,491 counts or 2250 µm."""
@@ -19,7 +15,7 @@ PROBE = ChannelCalibration(10.0, -250.0, -9.0, 9.0)
 
 def judged(samples: np.ndarray, ok: bool = True) -> Quality:
     raw = RawBlock(1, 0, 0, 600.0, samples[np.newaxis], (ok,), ())
-    return calibrate(raw, UnitCalibration("U1", 600.0, (PROBE,), ())).channel_quality[0]
+    return sample_block([raw], UnitCalibration("U1", 600.0, (PROBE,), ())).channel_quality[0]
 
 
 @pytest.mark.parametrize(

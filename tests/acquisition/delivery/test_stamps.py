@@ -4,20 +4,21 @@ import numpy as np
 import pytest
 
 from acquisition.delivery.arrival import HostStamps
-from acquisition.delivery.blocks import StampCheck
-from acquisition.delivery.calibration import RawBlock
-from core.samples.blocks import StampFault
+from acquisition.delivery.blocks import RawBlock, StampCheck, sample_block
+from core.samples.blocks import SampleBlock, StampFault
+from core.samples.calibration import UNLIMITED, UnitCalibration
 
 NS = 1_000_000_000
 START_NS = 1_767_225_600 * NS
 RATE_HZ = 600.0
 
 
-def block(index: int, off_s: float = 0.0, epoch: int = 1) -> RawBlock:
+def block(index: int, off_s: float = 0.0, epoch: int = 1) -> SampleBlock:
     """A second of samples whose stamp is off by so much."""
     stamp_ns = START_NS + index * NS + round(off_s * NS)
     counts = np.zeros((1, 600), dtype=np.int16)
-    return RawBlock(epoch, 600 * index, stamp_ns, 600.0, counts, (True,), ())
+    raw = RawBlock(epoch, 600 * index, stamp_ns, 600.0, counts, (True,), ())
+    return sample_block([raw], UnitCalibration("U1", 600.0, (UNLIMITED,), ()))
 
 
 def test_stamps_that_fit_are_kept_to_the_nanosecond_and_a_restart_may_have_any_time() -> None:

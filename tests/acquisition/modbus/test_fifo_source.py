@@ -270,13 +270,6 @@ async def test_a_queue_of_other_records_or_none_is_refused(queues, reads, layout
                 await anext(stream)
 
 
-def test_a_source_needs_a_queue_of_its_channels(counts_calibration, stepped_clock) -> None:
-    settings = FifoSettings(transport=TcpTransport(host="127.0.0.1"))
-    three = FifoLayout(addresses=(1000,), n_channels=3)
-    with pytest.raises(ConfigError, match="FIFO of 3 channels for 2"):
-        FifoSource(settings, three, counts_calibration(), stepped_clock)
-
-
 N_READ = 7
 """Readings of each queue before the link is lost."""
 

@@ -33,7 +33,7 @@ on_both_wires = pytest.mark.parametrize(("framing", "frame"), WIRES.values(), id
 
 
 def asked(request: ReadRequest | None = None) -> PendingRequest:
-    return PendingRequest(request or span_requests(Span(100, 5), 125)[0], unit=1, transaction=7)
+    return PendingRequest(request or span_requests(Span(100, 5))[0], unit=1, transaction=7)
 
 
 def reply(framing, data: bytes, request: ReadRequest | None = None) -> bytes | None:
@@ -52,7 +52,7 @@ def believed(framing, data: bytes, request: ReadRequest | None = None) -> bytes 
 
 def test_a_read_leaves_as_in_the_specification():
     # the worked example of the Modbus specification, with the checksum of its address and function
-    example = asked(*span_requests(Span(0x006B, 3), 125))
+    example = asked(*span_requests(Span(0x006B, 3)))
     assert RtuFraming().frame(example).hex() == "0103006b00037417"
     assert TcpFraming().frame(example).hex() == "0007000000060103006b0003"
 

@@ -118,25 +118,6 @@ async def test_a_refusal_is_told_and_the_next_poll_is_its_own(plant, fault, erro
     assert float(after.samples[0, 0]) == 100.0 + after.first_index
 
 
-@pytest.mark.parametrize(
-    ("settings", "registers", "said"),
-    [
-        ({"poll_period_s": 0.0}, {}, "poll_period_s is 0.0"),
-        ({"poll_period_s": 40.0}, {}, "stale_after_s is 60.0, must be at least two"),
-        ({}, {"min_poll_period_s": 60.0}, "poll_period_s is 1.0, the map asks for 60.0"),
-        ({}, {"min_timeout_s": 6.0}, "timeout_s is 5.0, the map asks for 6.0"),
-        ({"max_registers": 60}, {}, "the map reads up to 125"),
-        ({}, {"values": map_of().values[1:]}, "no value for 'wave'"),
-    ],
-)
-async def test_what_cannot_work_is_refused_before_anything_is_sent(
-    plant, settings, registers, said: str
-) -> None:
-    with pytest.raises(ConfigError, match=said):
-        async with plant(map_of(), read_as=map_of(**registers), **settings):
-            pass
-
-
 async def test_the_first_poll_does_not_wait_and_the_others_come_at_multiples(stepped_clock) -> None:
     ticks = PollClock(stepped_clock, 60.0)
     stepped_clock.step(7.0)

@@ -16,9 +16,8 @@ from acquisition.modbus.ring_profile import (
     Slot,
     decode_header,
     decode_slots,
-    encode_header,
-    encode_slot,
 )
+from acquisition.simulated.devices.register_image import encode_header, encode_slot
 
 u16 = st.integers(0, 2**16 - 1)
 u32 = st.integers(0, 2**32 - 1)

@@ -4,32 +4,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.modbus.cells import Cell, MapError, NumberType
+from acquisition.modbus.cells import Cell, NumberType
 from acquisition.modbus.decoding import MapDecoder
-from acquisition.modbus.fifo_layout import FifoKind, FifoLayout
-from acquisition.modbus.read_plan import plan_reads
-from acquisition.modbus.register_map import (
-    FlagCheck,
-    FullScale,
-    MapValue,
-    Meaning,
-    RegisterMap,
-    ScaleRegister,
-    Together,
-)
+from acquisition.modbus.read_plan import MapError, plan_reads
+from acquisition.modbus.register_map import MapValue, RegisterMap, ScaleRegister, Together
 
 SCALE = ScaleRegister(cell=Cell(address=612))
-BIT_3 = Cell(address=0, type=NumberType.BIT, bit=3)
 
 
 def value(address: int, type_: str = "uint16", **settings) -> MapValue:
     cell = Cell(address=address, type=NumberType(type_))
     return MapValue(id=f"v{address}", cell=cell, **settings)
-
-
-def flag(mask: int = 0xFFFF, set_means=Meaning.BAD, ok_values=(), clipped_values=(), **cell):
-    values = {"ok_values": ok_values, "clipped_values": clipped_values}
-    return FlagCheck(cell=Cell(address=0, **cell), mask=mask, set_means=set_means, **values)
 
 
 def requests(values, **settings) -> list[tuple[int, int, int]]:
@@ -107,55 +92,8 @@ def test_every_cell_is_in_one_request_and_every_request_holds_cells(layout, most
 
 
 @pytest.mark.parametrize(
-    ("values", "said"),
-    [
-        ((value(0, "float32"), value(1)), "value 'v0'"),
-        ([MapValue(id=id_, cell=BIT_3) for id_ in "ab"], "value 'a'"),
-        ((value(0), value(0)), "register"),
-    ],
-)
-def test_two_values_on_one_register_are_refused(values, said: str) -> None:
-    with pytest.raises(MapError, match=said) as refusal:
-        RegisterMap(values=tuple(values))
-    assert refusal.value.at[:2] == ("value", 1)
-
-
-@pytest.mark.parametrize(
     ("build", "said"),
     [
-        (lambda: Cell(address=0, function=6), "must be 1, 2, 3 or 4, got 6"),
-        (lambda: Cell(address=0, function=1), "single bits"),
-        (lambda: Cell(address=0, type=NumberType.BIT), "number of a bit"),
-        (lambda: Cell(address=0, bit=2), "number of a bit"),
-        (lambda: Cell(address=0, type=NumberType.BIT, bit=16), "0 to 15, got 16"),
-        (lambda: FlagCheck(cell=Cell(address=0), mask=0, set_means=Meaning.BAD), "0x0001"),
-        (lambda: FlagCheck(cell=Cell(address=0)), "must be given"),
-        (lambda: flag(type=NumberType.FLOAT32), "whole numbers"),
-        (lambda: flag(type=NumberType.BIT, function=2, mask=2), "one bit"),
-        (lambda: flag(clipped_values=(1,)), "with ok_values"),
-        (lambda: flag(set_means=None, ok_values=(0, 16), mask=0x00F0), "0 to 15, got 16"),
-        (lambda: flag(set_means=None, ok_values=(0,), clipped_values=(-1,)), "got -1"),
-        (lambda: ScaleRegister(cell=Cell(address=0), divisor=0.0), "must not be 0"),
-        (lambda: FullScale(minimum=1.0, maximum=1.0), "must differ"),
-        (lambda: FullScale(minimum=0.0, maximum=1.0, raw_minimum=9, raw_maximum=9), "below raw"),
-        (lambda: value(0, scale=0.0), "must not be 0"),
-        (lambda: value(0, invalid_below=5.0, invalid_above=5.0), "below invalid_above"),
-        (lambda: value(0, invalid_values=(0.5,)), "whole number of 16 bits, got 0.5"),
-        (lambda: value(0, invalid_values=(0x18000,)), "whole number of 16 bits, got 98304"),
-        (lambda: value(0, "int32", invalid_values=(-(2**31) - 1,)), "whole number of 32 bits"),
-        (lambda: Together(address=0, count=126), "125"),
-        (lambda: Together(address=0, count=2, function=2), "3 or 4"),
-        (lambda: RegisterMap(values=(value(0),), base=2), "must be 0, 1"),
-        (lambda: RegisterMap(values=(value(0),), base=1), "must be 1 to 65536"),
-        (lambda: RegisterMap(values=(value(65535, "int32"),)), "must be 0 to 65534"),
-        (lambda: RegisterMap(values=(value(0),), max_registers=126), "1 to 125"),
-        (lambda: RegisterMap(values=(value(0),), max_gap=125), "0 to 124"),
-        (
-            lambda: RegisterMap(
-                values=(value(0),), max_registers=10, together=(Together(address=0, count=11),)
-            ),
-            "max_registers, 10",
-        ),
         (
             lambda: requests([value(9, "float32")], together=(Together(address=10, count=4),)),
             "cuts the number at 9 in two",
@@ -172,31 +110,6 @@ def test_two_values_on_one_register_are_refused(values, said: str) -> None:
         ),
     ],
 )
-def test_what_no_device_can_have_is_refused_with_what_is_allowed(build, said: str) -> None:
+def test_what_cannot_be_read_together_is_refused_with_the_registers(build, said: str) -> None:
     with pytest.raises(MapError, match=said):
         build()
-
-
-@pytest.mark.parametrize(
-    ("settings", "said"),
-    [
-        ({"addresses": (0,), "n_channels": 31}, "32 registers; a FIFO read has at most 31"),
-        ({"addresses": (0, 1), "n_channels": 2}, "must be 1, got 2"),
-        ({"addresses": (0,), "n_channels": 2, "kind": FifoKind.PER_CHANNEL}, "must be 2, got 1"),
-        ({"addresses": (5, 5), "n_channels": 2, "kind": FifoKind.PER_CHANNEL}, "names a queue"),
-        ({"addresses": (70_000,), "n_channels": 2}, "0 to 65535"),
-        ({"addresses": (0,), "n_channels": 2, "has_counter": False, "removes": False}, "are new"),
-        (
-            {
-                "addresses": (0, 1),
-                "n_channels": 2,
-                "has_counter": False,
-                "kind": FifoKind.PER_CHANNEL,
-            },
-            "belong together",
-        ),
-    ],
-)
-def test_a_queue_that_cannot_be_followed_is_refused_at_once(settings, said: str) -> None:
-    with pytest.raises(MapError, match=said):
-        FifoLayout(**settings)

@@ -63,10 +63,8 @@ async def test_a_device_without_a_ring_or_at_another_address_is_a_config_error(
                 pass
 
 
-async def test_input_registers_and_small_reads_bring_the_same_samples(
-    device, server, source_at, read_until
-):
-    source = source_at(server.port, function=4, max_registers=7)
+async def test_input_registers_bring_the_same_samples(device, server, source_at, read_until):
+    source = source_at(server.port, function=4)
     async with source.connect() as stream:
         await anext(stream)
         device.produce(2)

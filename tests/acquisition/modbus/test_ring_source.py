@@ -5,9 +5,10 @@ import pytest
 
 from acquisition.clock import SystemClock
 from acquisition.errors import LinkError
-from acquisition.modbus.ring_profile import RingHeader, encode_header, encode_slot
+from acquisition.modbus.ring_profile import RingHeader
 from acquisition.simulated.devices import ring_faults as faults
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
+from acquisition.simulated.devices.register_image import encode_header, encode_slot
 from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSettings
 from core.quality import Reason
 from core.samples.blocks import Rejection, StampFault

@@ -6,12 +6,12 @@ from contextlib import asynccontextmanager
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 from rigs.registers import SlowFeed
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.calibration import SlowCalibration, UnitCalibration
 from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
-from acquisition.errors import ConfigError, LinkError
+from acquisition.errors import LinkError
 from acquisition.modbus.cells import Cell, NumberType
 from acquisition.modbus.polled_source import PolledSettings
 from acquisition.modbus.register_map import MapValue, RegisterMap
@@ -22,9 +22,9 @@ from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.source import refused_frames_of
 from core.quality import GOOD, Level, Reading, Reason
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import SlowCalibration, UnitCalibration
 
 OIL = SlowCalibration("oil", 0.0, 100.0)
-POWER = SlowCalibration("power", 0.0, 1000.0)
 REGISTERS = RegisterMap(values=(MapValue(id="oil", cell=Cell(address=0, type=NumberType.FLOAT32)),))
 
 
@@ -40,7 +40,7 @@ class Waves:
     async def _blocks(self):
         n = 0
         while True:
-            yield SampleBlock(
+            yield given_block(
                 "U1", 1, n, n, 1.0, np.zeros((1, 1), np.float32), (GOOD,), {"power": Reading(600.0)}
             )
             n += 1
@@ -209,9 +209,3 @@ def test_a_calibration_is_divided_between_the_two_devices(counts_calibration) ->
     assert [c.id for c in only_slow(whole, ids).slow] == ["slow1"]
     assert only_slow(whole, ids).channels == ()
     assert [c.id for c in without_slow(whole, ids).slow] == ["slow0", "slow2"]
-
-
-def test_a_map_without_the_value_is_refused() -> None:
-    settings = PolledSettings(transport=TcpTransport(host="127.0.0.1"))
-    with pytest.raises(ConfigError, match="no value for 'power'"):
-        PolledSlowValues(settings, REGISTERS, (OIL, POWER), SystemClock())

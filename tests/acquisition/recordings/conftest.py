@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings import reader
 from acquisition.recordings.child import answer
@@ -88,7 +88,7 @@ def reads_here(monkeypatch: pytest.MonkeyPatch) -> None:
         answer({"path": str(path), "format": format_} | request, out)
         send(out, {"kind": "end"})
         out.seek(0)
-        while (message := receive(out.read))[0]["kind"] == "blocks":
+        while (message := receive(out))[0]["kind"] == "blocks":
             yield message
         if message[0]["kind"] == "error":
             raise ConfigError(message[0]["message"])

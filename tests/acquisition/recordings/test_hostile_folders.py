@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 from rigs.tiers import fast_and_long
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import checksum_of
 from acquisition.recordings.reader import open_recording

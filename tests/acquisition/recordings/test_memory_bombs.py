@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.recordings.manifest import RecordedUnit, checksum_of
 from acquisition.recordings.writer import RecordingWriter
 from core.samples.blocks import Rejection

@@ -4,7 +4,6 @@ from collections.abc import Callable
 
 import pytest
 
-from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.rotor import RotorParameters
 from acquisition.simulated.plant.scenario import (
@@ -17,6 +16,7 @@ from acquisition.simulated.plant.scenario import (
 from acquisition.simulated.plant.unit import SimulatedUnit
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
+from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 
 RATE_HZ = 600.0
 CLEARANCE_UM = {"UJB": 200.0, "LJB": 300.0, "TJB": 200.0}

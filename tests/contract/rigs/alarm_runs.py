@@ -10,6 +10,7 @@ import numpy as np
 from core.alarms.alarm import AlarmEvent
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
+from rigs.blocks import with_quality
 from service.store.port import AlarmQuery
 
 Make = Callable[..., Any]
@@ -22,12 +23,12 @@ T0 = 1_767_225_600_000_000_000
 
 def lost(block: SampleBlock) -> SampleBlock:
     """The block with its first probe lost."""
-    return replace(block, channel_quality=(bad(Reason.SENSOR_FAILURE), GOOD, GOOD, GOOD))
+    return with_quality(block, (bad(Reason.SENSOR_FAILURE), GOOD, GOOD, GOOD))
 
 
 def louder(block: SampleBlock, factor: float) -> SampleBlock:
     """The block with a larger vibration."""
-    return replace(block, samples=block.samples * np.float32(factor))
+    return replace(block, counts=block.counts * np.float32(factor))
 
 
 def events(plant: Any, **wanted: Any) -> list[AlarmEvent]:

@@ -17,6 +17,7 @@ from core.limits import AlarmLevel, Judgement
 from core.machine.channel import Measurand
 from core.quality import GOOD, Reason, bad
 from core.samples.blocks import SampleBlock
+from rigs.blocks import given_block
 from rigs.standing_clock import StandingClock
 from service.recordings.around_alarms import Captures, CaptureSettings
 
@@ -57,7 +58,7 @@ def block(
     """Block of a fifth of a second; channel a is the number of the sample, plus `by`."""
     first = number * BLOCK
     index = np.arange(first, first + BLOCK, dtype=np.float32) + np.float32(by)
-    return SampleBlock(
+    return given_block(
         unit=unit,
         epoch=epoch,
         first_index=first,
@@ -65,6 +66,7 @@ def block(
         rate_hz=RATE_HZ,
         samples=np.array([index, -index]),
         channel_quality=(bad(Reason.SENSOR_FAILURE) if lost else GOOD, GOOD),
+        calibration=recorded_unit(unit).calibration,
     )
 
 

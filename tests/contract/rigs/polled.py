@@ -2,17 +2,13 @@
 
 import numpy as np
 
-from acquisition.delivery.calibration import (
-    ChannelCalibration,
-    RawBlock,
-    SlowCalibration,
-    UnitCalibration,
-)
+from acquisition.delivery.blocks import RawBlock
 from acquisition.modbus.cells import Cell, NumberType
 from acquisition.modbus.polled_source import PolledSource
 from acquisition.modbus.register_map import FlagCheck, MapValue, Meaning, RegisterMap
 from acquisition.simulated.devices.map_device import MapDevice
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 
 STATUS = Cell(address=50)
 BAD_IF_SET = FlagCheck(cell=STATUS, mask=0x0008, set_means=Meaning.BAD)

@@ -9,7 +9,7 @@ import numpy as np
 
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reading, Reason, bad
-from core.samples.blocks import SampleBlock
+from rigs.blocks import given_block
 from service.measuring.recorder import Findings
 
 ALARMS = "/api/v1/alarms"
@@ -37,7 +37,7 @@ class Probes:
     def _take(self, first_probe: Any, results: Sequence[Assessment]) -> None:
         start = self.n_blocks
         self.n_blocks += 1
-        block = SampleBlock(
+        block = given_block(
             unit="U1",
             epoch=1,
             first_index=start * 600,

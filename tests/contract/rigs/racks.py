@@ -10,6 +10,7 @@ from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD, Quality, Reading
 from core.samples.blocks import SampleBlock
 from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow
+from rigs.blocks import given_block
 
 RATE_HZ = 0.2
 K_B = 1.18e9
@@ -49,7 +50,7 @@ def blocks_of(
 ) -> list[SampleBlock]:
     n_rows, n = values.shape
     return [
-        SampleBlock(
+        given_block(
             unit="U1",
             epoch=epoch,
             first_index=first_index + start,

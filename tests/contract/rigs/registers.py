@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.delivery.joined import JoinedSource, only_slow, without_slow
 from acquisition.modbus.cells import ByteOrder, Cell, NumberType
 from acquisition.modbus.fifo_layout import FifoKind, FifoLayout

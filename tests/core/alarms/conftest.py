@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmIdentity, AlarmRule
 from core.alarms.life_cycle import update
@@ -41,7 +42,7 @@ def block() -> BlockOf:
         samples = np.zeros((len(qualities), 100), dtype=np.float32)
         slow = {"oil": oil if isinstance(oil, Reading) else Reading(oil)}
         quality = tuple(qualities)
-        return SampleBlock("U1", 1, index, start_ns, 100.0, samples, quality, slow, **changes)
+        return given_block("U1", 1, index, start_ns, 100.0, samples, quality, slow, **changes)
 
     return build
 

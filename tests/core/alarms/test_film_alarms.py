@@ -5,10 +5,12 @@ from collections.abc import Mapping
 
 import pytest
 
-from core.alarms.alarm import AlarmState
+from core.alarms.alarm import AlarmIdentity, AlarmState
 from core.alarms.judgements import OrderVector, VectorReference, vector_judgement
-from core.alarms.rules import UnitRules, rule_of
+from core.alarms.kinds import Watch
+from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
+from core.condition.cells import NOWHERE_KNOWN
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement, Limits, unknown
 from core.machine.unit import Unit
@@ -80,18 +82,30 @@ WELL = VectorReference("U1", "UJB", OperatingState.FULL_LOAD, {"shaft_x": OrderV
 LENGTH = VectorReference("U1", "UJB", OperatingState.FULL_LOAD, {"shaft_x": OrderVector(60.0)})
 
 
+def judged(
+    found: Mapping[str, Reading],
+    reference: VectorReference | None,
+    held: AlarmLevel | None,
+    place: str = "shaft_x",
+) -> Judgement:
+    rule = LimitRule(LIMITS, rule_of(0.0, 0.0))
+    identity = AlarmIdentity("U1", "UJB", f"order1_change_{place}")
+    watch = Watch(identity, rule.rule, place, limits=rule)
+    return vector_judgement(found, watch, reference, NOWHERE_KNOWN, held)
+
+
 def readings(amplitude: Reading | float, phase: Reading | float) -> dict[str, Reading]:
     found = {"order1_shaft_x_um_pk": amplitude, "order1_shaft_x_phase_deg": phase}
     return {n: r if isinstance(r, Reading) else Reading(r) for n, r in found.items()}
 
 
 def test_a_vector_that_turns_either_way_is_noticed_though_its_length_stays() -> None:
-    found = vector_judgement(readings(60.0, 70.0), "shaft_x", WELL, LIMITS, None)
+    found = judged(readings(60.0, 70.0), WELL, None)
 
     assert found.value == pytest.approx(60.0)  # 60° of an equilateral triangle
     assert found.level is ALERT
     assert found.reason == "above_limit"
-    almost = vector_judgement(readings(60.0, 350.0), "shaft_x", WELL, LIMITS, None)
+    almost = judged(readings(60.0, 350.0), WELL, None)
 
     assert almost.value == pytest.approx(2 * 60.0 * math.sin(math.radians(10.0)))
 
@@ -101,26 +115,26 @@ def test_a_vector_that_turns_either_way_is_noticed_though_its_length_stays() -> 
 def test_without_a_phase_only_the_length_counts_and_that_is_said(
     reference: VectorReference, amplitude: float, level: AlarmLevel | None
 ) -> None:
-    found = vector_judgement(readings(amplitude, NO_PHASE), "shaft_x", reference, LIMITS, None)
+    found = judged(readings(amplitude, NO_PHASE), reference, None)
 
     assert (found.level, found.value) == (level, abs(amplitude - 60.0))
     assert found.reason.startswith("amplitude_change")
 
 
 def test_without_a_reference_or_its_phase_nothing_is_known_and_standstill_suppresses() -> None:
-    found = vector_judgement(readings(60.0, NO_PHASE), "shaft_x", WELL, LIMITS, ALERT)
+    found = judged(readings(60.0, NO_PHASE), WELL, ALERT)
 
     assert (found.is_known, found.reason) == (False, "no_phase")
 
     standing = readings(missing(Reason.STANDSTILL), NO_PHASE)
-    found = vector_judgement(standing, "shaft_x", WELL, LIMITS, ALERT)
+    found = judged(standing, WELL, ALERT)
 
     assert (found.is_known, found.suppressed_by) == (False, "standstill")
 
     for reference, place in ((None, "shaft_x"), (WELL, "bearing_y")):
         there = readings(60.0, 10.0)
         there |= {n.replace("shaft_x", place): r for n, r in there.items()}
-        found = vector_judgement(there, place, reference, LIMITS, None)
+        found = judged(there, reference, None, place)
         assert (found.is_known, found.reason, found.suppressed_by) == (False, "no_reference", None)
 
 

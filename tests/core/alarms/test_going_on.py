@@ -48,7 +48,7 @@ class Lives:
 
     def hear(self, is_connected: bool, *seconds: int) -> None:
         """Hear of the link, and let time pass; nothing is kept with that but events."""
-        self.store(self.alarms.link(is_connected, "why", seconds[0] * SECOND))
+        self.store(self.alarms.link(is_connected, None, seconds[0] * SECOND))
         self.wait(*seconds[1:])
 
     def wait(self, *seconds: int) -> None:
@@ -122,6 +122,7 @@ def test_a_link_that_was_lost_when_nothing_more_was_kept_stays_lost_until_sample
         lives.wait(20, 21, 99)
         assert lives.changes(LINK) == ["raised"]
         assert not lives.alarms.is_connected
+    assert lives.events == [(LINK, "raised", "not connected")]
     lives.hear(True, 100, 101)
     assert lives.changes(LINK) == ["raised", "returned"]
 

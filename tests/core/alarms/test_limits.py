@@ -8,10 +8,8 @@ from core.alarms.alarm import AlarmRule
 from core.alarms.judgements import (
     channel_judgement,
     drift_reading,
-    link_judgement,
+    fault_judgement,
     offset_reading,
-    slow_channel_judgement,
-    stamp_judgement,
 )
 from core.alarms.rules import LimitRule, Region
 from core.condition.cells import OperatingPoint
@@ -74,8 +72,6 @@ def test_a_channel_a_clock_and_a_link_are_judged_by_what_is_known_of_them() -> N
     assert channel_judgement(bad(Reason.CLIPPED), None).reason == "clipped"
     assert channel_judgement(GOOD, Reason.STUCK).reason == "stuck"
     assert channel_judgement(bad(Reason.SENSOR_FAILURE), Reason.STUCK).reason == "sensor_failure"
-    assert slow_channel_judgement(missing(Reason.OUT_OF_RANGE)).level is ALERT
-    assert slow_channel_judgement(Reading(45.0)).level is None
 
     unclear = DeviceClock(None, None, None)
     fast = DeviceClock(offset_s=-3.0, drift_ppm=-250.0, u_drift_ppm=10.0)
@@ -88,12 +84,9 @@ def test_a_channel_a_clock_and_a_link_are_judged_by_what_is_known_of_them() -> N
     assert drift_reading(unclear).quality.reason is Reason.WAITING_FOR_DATA
     assert drift_reading(fast).value == pytest.approx(230.4)
     assert drift_reading(maybe).value == pytest.approx(152.0)  # more is not sure
-    assert stamp_judgement(StampFault.JUMPED).reason == "stamp_jumped"
-    assert stamp_judgement(None).level is None
-
-    assert link_judgement(True, None).level is None
-    assert link_judgement(False, "refused").reason == "refused"
-    assert link_judgement(False, None).reason == "not connected"
+    jumped = fault_judgement(StampFault.JUMPED)
+    assert (jumped.level, jumped.reason) == (ALERT, "stamp_jumped")
+    assert fault_judgement(None).level is None
 
 
 FULL, PART, RUN_UP = OperatingState.FULL_LOAD, OperatingState.PART_LOAD, OperatingState.RUN_UP

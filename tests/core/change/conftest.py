@@ -8,7 +8,7 @@ import numpy.typing as npt
 import pytest
 
 from core.baseline.baseline import Origin, QuantityBaseline
-from core.baseline.history import StiffnessHistory, Watched
+from core.baseline.history import StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import DecisionHistory, decide_all, operation_history
@@ -67,11 +67,8 @@ def watch(film_life: Callable[..., StiffnessHistory]) -> Callable[..., Watch]:
         key = history.ln_k[:, :n].tobytes()
         if key not in learned:
             origin = Origin("U1", "UJB", "dynamic", 1, "Ada", int(until_ns))
-            of_all = learn(
-                *(history.rows(0, n), is_settled[:n], origin, BaselineSettings()),
-                (Watched.STIFFNESS,),
-            )
-            found = of_all.of(Watched.STIFFNESS, "x")
+            of_all = learn(history.rows(0, n), is_settled[:n], origin, BaselineSettings())
+            found = of_all.of("x")
             assert found is not None
             learned[key] = found
         return Watch(learned[key], history.rows(n, len(history)), is_settled[n:])

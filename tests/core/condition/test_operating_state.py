@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from core.change.backtest import operation_history, operation_of_states
+from core.change.backtest import operation_history
 from core.condition.cells import CellGrid, FilmConditions
 from core.condition.operating_state import (
     NOT_AT_SPEED,
@@ -125,7 +125,7 @@ def test_states_that_are_told_settle_as_those_that_are_followed() -> None:
     time_ns = 10 * MINUTE_NS * np.arange(n)
     limits = OperatingLimits(rated_speed_rpm=92.3, rated_power_mw=330.0)
     followed = operation_history(time_ns, speed_rpm, power_mw, limits)
-    told = operation_of_states(time_ns, followed.state, limits)
+    told = operation_history(time_ns, np.nan * speed_rpm, power_mw, limits, state=followed.state)
     assert told.is_settled.tolist() == followed.is_settled.tolist()
     assert 0 < np.sum(told.is_settled) < n
     assert set(followed.state.tolist()) > {OperatingState.PART_LOAD, OperatingState.STANDSTILL}

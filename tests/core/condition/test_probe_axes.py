@@ -2,12 +2,14 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from core.condition.probe_axes import Growth, ProbeAxis
-from core.condition.shaft_centre import ShaftCentre, locate_shaft
+from core.condition.shaft_centre import locate_shaft
 from core.machine.unit import GapAccuracy
 from core.quality import GOOD, Reading, Reason, bad, missing, uncertain
 
@@ -33,6 +35,11 @@ def gaps(
     )
 
 
+def located(*args: Any, **options: Any) -> Any:
+    readings, _ = locate_shaft(*args, **options)
+    return SimpleNamespace(**readings)
+
+
 def number(reading: Reading) -> float:
     assert reading.value is not None
     return reading.value
@@ -45,10 +52,10 @@ def standard(reading: Reading) -> float:
 
 
 def test_four_probes_tell_displacement_from_growth_and_two_say_what_they_take_for_it() -> None:
-    centre = locate_shaft(*gaps(60.0, -80.0, 35.0), CLEARANCE_UM)
+    centre = located(*gaps(60.0, -80.0, 35.0), CLEARANCE_UM)
 
-    assert number(centre.x_um) == pytest.approx(60.0)
-    assert number(centre.y_um) == pytest.approx(-80.0)
+    assert number(centre.shaft_centre_x_um) == pytest.approx(60.0)
+    assert number(centre.shaft_centre_y_um) == pytest.approx(-80.0)
     assert number(centre.gap_growth_um) == pytest.approx(35.0)
     assert number(centre.eccentricity_ratio) == pytest.approx(0.5)
     assert number(centre.attitude_angle_deg) == pytest.approx(-53.13, abs=0.01)
@@ -56,21 +63,21 @@ def test_four_probes_tell_displacement_from_growth_and_two_say_what_they_take_fo
 
     x, y = gaps(60.0, -80.0, 35.0)
     two = replace(x, far=None), replace(y, far=None)
-    centre = locate_shaft(*two, CLEARANCE_UM)
+    centre = located(*two, CLEARANCE_UM)
 
-    assert number(centre.x_um) == pytest.approx(60.0 - 35.0)
-    assert abs(number(centre.x_um) - 60.0) < 2.0 * standard(centre.x_um)
-    assert centre.x_um.quality == GOOD
+    assert number(centre.shaft_centre_x_um) == pytest.approx(60.0 - 35.0)
+    assert abs(number(centre.shaft_centre_x_um) - 60.0) < 2.0 * standard(centre.shaft_centre_x_um)
+    assert centre.shaft_centre_x_um.quality == GOOD
     assert centre.gap_growth_um.quality == bad(Reason.NOT_MEASURED)
 
 
 @pytest.mark.parametrize("lost", ["near_x", "far_x", "near_y", "far_y"])
 def test_a_lost_probe_of_four_costs_certainty_and_no_more(lost: str) -> None:
-    whole = locate_shaft(*gaps(60.0, -80.0, 35.0), CLEARANCE_UM)
-    fewer = locate_shaft(*gaps(60.0, -80.0, 35.0, (lost,)), CLEARANCE_UM)
+    whole = located(*gaps(60.0, -80.0, 35.0), CLEARANCE_UM)
+    fewer = located(*gaps(60.0, -80.0, 35.0, (lost,)), CLEARANCE_UM)
 
-    assert number(fewer.x_um) == pytest.approx(60.0)
-    assert number(fewer.y_um) == pytest.approx(-80.0)
+    assert number(fewer.shaft_centre_x_um) == pytest.approx(60.0)
+    assert number(fewer.shaft_centre_y_um) == pytest.approx(-80.0)
     assert number(fewer.gap_growth_um) == pytest.approx(35.0)
     assert fewer.eccentricity_ratio.quality == uncertain(Reason.REDUCED_PROBES)
     assert standard(fewer.eccentricity_ratio) > standard(whole.eccentricity_ratio)
@@ -78,35 +85,37 @@ def test_a_lost_probe_of_four_costs_certainty_and_no_more(lost: str) -> None:
 
 def test_without_any_pair_the_last_known_growth_stands_in_and_may_have_changed() -> None:
     axes = gaps(60.0, -80.0, 35.0, ("far_x", "near_y"))
-    never = locate_shaft(*axes, CLEARANCE_UM)
-    lately = locate_shaft(*axes, CLEARANCE_UM, last_growth=Growth(35.0, 5.0))
+    never = located(*axes, CLEARANCE_UM)
+    lately = located(*axes, CLEARANCE_UM, last_growth=Growth(35.0, 5.0))
 
-    assert number(lately.x_um) == pytest.approx(60.0)
-    assert number(lately.y_um) == pytest.approx(-80.0)
-    assert number(never.x_um) == pytest.approx(60.0 - 35.0)
-    assert number(never.y_um) == pytest.approx(-80.0 + 35.0)
-    assert standard(lately.x_um) < standard(never.x_um)
+    assert number(lately.shaft_centre_x_um) == pytest.approx(60.0)
+    assert number(lately.shaft_centre_y_um) == pytest.approx(-80.0)
+    assert number(never.shaft_centre_x_um) == pytest.approx(60.0 - 35.0)
+    assert number(never.shaft_centre_y_um) == pytest.approx(-80.0 + 35.0)
+    assert standard(lately.shaft_centre_x_um) < standard(never.shaft_centre_x_um)
     # gain 5 % of 25 µm, reference 5 µm, growth 5 + 20 µm, all uniform
-    assert standard(lately.x_um) == pytest.approx(math.hypot(1.25, 5.0, 25.0) / math.sqrt(3.0))
+    assert standard(lately.shaft_centre_x_um) == pytest.approx(
+        math.hypot(1.25, 5.0, 25.0) / math.sqrt(3.0)
+    )
 
 
 def test_a_doubtful_gap_or_an_axis_without_probes_leaves_what_is_known_without_it() -> None:
-    centre = locate_shaft(*gaps(60.0, -80.0, 0.0, ("near_x", "far_x")), CLEARANCE_UM)
+    centre = located(*gaps(60.0, -80.0, 0.0, ("near_x", "far_x")), CLEARANCE_UM)
 
-    assert number(centre.y_um) == pytest.approx(-80.0)
-    for reading in (centre.x_um, centre.eccentricity_ratio, centre.attitude_angle_deg):
+    assert number(centre.shaft_centre_y_um) == pytest.approx(-80.0)
+    for reading in (centre.shaft_centre_x_um, centre.eccentricity_ratio, centre.attitude_angle_deg):
         assert reading.quality == bad(Reason.SENSOR_FAILURE)
 
     x, y = gaps(30.0, -40.0)
     doubtful = replace(x.near, quality=uncertain(Reason.LOW_COVERAGE))
-    centre = locate_shaft(replace(x, near=doubtful, far=None), replace(y, far=None), CLEARANCE_UM)
+    centre = located(replace(x, near=doubtful, far=None), replace(y, far=None), CLEARANCE_UM)
 
     assert centre.eccentricity_ratio.quality == uncertain(Reason.LOW_COVERAGE)
-    assert centre.y_um.quality.reason is Reason.OK
+    assert centre.shaft_centre_y_um.quality.reason is Reason.OK
 
 
 def test_a_centred_shaft_has_an_eccentricity_of_zero_and_any_angle() -> None:
-    centre = locate_shaft(*gaps(0.0, 0.0), CLEARANCE_UM)
+    centre = located(*gaps(0.0, 0.0), CLEARANCE_UM)
 
     assert number(centre.eccentricity_ratio) == 0.0
     assert standard(centre.eccentricity_ratio) > 0.0
@@ -118,14 +127,17 @@ def test_a_centred_shaft_has_an_eccentricity_of_zero_and_any_angle() -> None:
 def test_scatter_of_a_gap_is_kept_apart_from_what_is_always_wrong() -> None:
     x, y = gaps(60.0, -80.0)
     noisy = replace(x, near=replace(x.near, u_random=4.0))
-    centre = locate_shaft(noisy, y, CLEARANCE_UM)
+    centre = located(noisy, y, CLEARANCE_UM)
 
-    assert centre.x_um.u_random == pytest.approx(2.0)
-    assert centre.y_um.u_random == 0.0
-    assert centre.x_um.u_systematic == locate_shaft(x, y, CLEARANCE_UM).x_um.u_systematic
+    assert centre.shaft_centre_x_um.u_random == pytest.approx(2.0)
+    assert centre.shaft_centre_y_um.u_random == 0.0
+    assert (
+        centre.shaft_centre_x_um.u_systematic
+        == located(x, y, CLEARANCE_UM).shaft_centre_x_um.u_systematic
+    )
 
 
-def drawn(random: np.random.Generator, lost: tuple[str, ...]) -> tuple[ShaftCentre, float, float]:
+def drawn(random: np.random.Generator, lost: tuple[str, ...]) -> tuple[Any, float, float]:
     """A bearing as limits allow it, what is found, and its true eccentricity and angle."""
     radius_um, angle_deg = random.uniform(60.0, 160.0), random.uniform(-180.0, 180.0)
     angle = math.radians(angle_deg)
@@ -146,7 +158,7 @@ def drawn(random: np.random.Generator, lost: tuple[str, ...]) -> tuple[ShaftCent
     # growth was last seen by four probes, and has changed since
     last = Growth(growth_um + ACCURACY.growth_change_um * random.uniform(-1.0, 1.0), 0.0)
     believed_um = CLEARANCE_UM * (1.0 + ACCURACY.clearance * random.uniform(-1.0, 1.0))
-    found = locate_shaft(x, y, believed_um, ACCURACY, last)
+    found = located(x, y, believed_um, ACCURACY, last)
     return found, radius_um / CLEARANCE_UM, angle_deg
 
 

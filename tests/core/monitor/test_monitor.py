@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rigs.blocks import of_unit, with_quality
 from rigs.tiers import fast_and_long
 
 from core.machine.unit import Unit
@@ -198,10 +199,9 @@ def test_a_lost_probe_is_never_shown_as_zero_micrometres(
     stream = list(blocks(rows))
     lost = rows.shape[1] // 120  # from half way on the x probe is dead
     dead = [
-        replace(
-            block,
-            samples=np.vstack([np.zeros((1, block.n_samples), np.float32), block.samples[1:]]),
-            channel_quality=(bad(Reason.SENSOR_FAILURE), *block.channel_quality[1:]),
+        with_quality(
+            replace(block, counts=block.counts * (np.arange(4) > 0)[:, np.newaxis]),
+            (bad(Reason.SENSOR_FAILURE), *block.channel_quality[1:]),
         )
         if number >= lost
         else block
@@ -240,9 +240,9 @@ def test_a_gap_voids_the_segment_it_touches_and_counts_it(
 def test_foreign_blocks_are_refused_naming_both(monitor: UnitMonitor, blocks, signals) -> None:
     block = next(blocks(signals(1.0)))
     with pytest.raises(ValueError, match="'U2' in the monitor of 'U1'"):
-        monitor.ingest(replace(block, unit="U2"))
+        monitor.ingest(of_unit(block, unit="U2"))
     with pytest.raises(ValueError, match=r"1000\.0 Hz, configured 600\.0 Hz"):
-        monitor.ingest(replace(block, rate_hz=1000.0))
+        monitor.ingest(of_unit(block, rate_hz=1000.0))
 
 
 @pytest.mark.parametrize(("reason", "is_estimated"), [("torn", False), (UNCOUNTED_LOSS, True)])

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rigs.blocks import with_quality
 
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
@@ -64,7 +65,7 @@ def test_growth_since_an_older_reference_is_forgotten(unit: Unit, blocks, signal
     rows = np.vstack([rows, 4000.0 + 2 * 35.0 - rows[0]])
     lost = (*(GOOD,) * 4, bad(Reason.SENSOR_FAILURE))
     stream = [
-        block if n < 4 else replace(block, channel_quality=lost)
+        block if n < 4 else with_quality(block, lost)
         for n, block in enumerate(blocks(rows, n_each=HOP))
     ]
     for reference in ((2000.0, 2000.0), (2035.0, 2035.0)):

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
@@ -43,7 +44,7 @@ def stream(n_blocks: int, gap: int = 500) -> list[SampleBlock]:
         start_ns = 1_767_225_600_000_000_000 + round(t[0] * 1e9)
         samples = samples.astype(np.float32)
         slow = {"speed": Reading(60.0 + 0.1 * np.sin(number / 9))}
-        block = SampleBlock("U1", epoch, first, start_ns, RATE_HZ, samples, quality, slow)
+        block = given_block("U1", epoch, first, start_ns, RATE_HZ, samples, quality, slow)
         found.append(block)
         first += BLOCK
     return found

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
@@ -22,7 +23,7 @@ def at(index: int, late_s: float = 0.0, epoch: int = 7, n: int = 60) -> SampleBl
     """Samples of a device that counts from T0 on, or by so much later."""
     start_ns = T0 + round((index / RATE_HZ + late_s) * NS_PER_S)
     samples = np.zeros((4, n), dtype=np.float32)
-    return SampleBlock("U1", epoch, index, start_ns, RATE_HZ, samples, (GOOD,) * 4)
+    return given_block("U1", epoch, index, start_ns, RATE_HZ, samples, (GOOD,) * 4)
 
 
 def place(block: SampleBlock) -> tuple[int, int, int]:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+from rigs.blocks import given_block
 
 from core.quality import GOOD
 from core.samples.blocks import SampleBlock
@@ -16,7 +17,7 @@ def at(index: int, epoch: int = 7, shift_s: float = 0.0) -> SampleBlock:
     """A block of a device that counts from T0 on."""
     start_ns = time_ns(index) + round(shift_s * 1e9)
     samples = np.zeros((1, 10), dtype=np.float32)
-    return SampleBlock("U1", epoch, index, start_ns, RATE_HZ, samples, (GOOD,))
+    return given_block("U1", epoch, index, start_ns, RATE_HZ, samples, (GOOD,))
 
 
 def time_ns(index: int) -> int:

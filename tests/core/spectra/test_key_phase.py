@@ -12,7 +12,6 @@ from core.monitor.assessment import AnalysisSettings
 from core.quality import Level, Reading, Reason, bad, missing
 from core.spectra.speed import (
     KeyPhase,
-    KeyPhaseFault,
     Speed,
     SpeedSource,
     read_key_phase,
@@ -101,45 +100,41 @@ def test_a_missing_pulse_or_a_pick_up_that_fails_is_no_phase_reference() -> None
     for dead in (*single, slice(0, N_SAMPLES // 2), slice(N_SAMPLES // 2, None)):
         signal = pulses(92.3, 0.9)
         signal[dead] = 0.2
-        assert read_key_phase(signal, RATE_HZ) is KeyPhaseFault.MISSING_PULSE, dead
+        assert read_key_phase(signal, RATE_HZ) is None, dead
 
 
 @pytest.mark.parametrize(
-    ("first", "last", "fault"),
-    [(-20, 0, KeyPhaseFault.IRREGULAR)]
-    + [(after, after + 6, KeyPhaseFault.EXTRA_PULSE) for after in (20, 80, 200, 350)],
+    ("first", "last"), [(-20, 0), *((after, after + 6) for after in (20, 80, 200, 350))]
 )
-def test_a_pulse_out_of_its_place_is_no_phase_reference(
-    first: int, last: int, fault: KeyPhaseFault
-) -> None:
+def test_a_pulse_out_of_its_place_is_no_phase_reference(first: int, last: int) -> None:
     signal = pulses(92.3, 0.9)
     begin = edges_of(signal)[7]
     signal[begin + first : begin + last] = 5.0
-    assert read_key_phase(signal, RATE_HZ) is fault
+    assert read_key_phase(signal, RATE_HZ) is None
 
 
 def test_doubled_pulses_and_fast_changes_of_speed_are_no_phase_reference() -> None:
     turns = 92.3 / 60 / RATE_HZ * np.arange(N_SAMPLES)
     twice = (turns % 1.0 < WIDTH_TURNS) | ((turns - 0.3) % 1.0 < WIDTH_TURNS)
     fault = read_key_phase(np.where(twice, 5.0, 0.0), RATE_HZ)
-    assert isinstance(fault, KeyPhaseFault)
+    assert fault is None
     time_s = np.arange(N_SAMPLES) / RATE_HZ
     running_up = 0.5 + 92.3 / 60 * time_s + 0.004 * time_s**2
     found = read_key_phase(np.where(running_up % 1.0 < WIDTH_TURNS, 5.0, 0.0), RATE_HZ)
-    assert found is KeyPhaseFault.IRREGULAR
+    assert found is None
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_without_pulses_noise_is_never_read_as_any(seed: int) -> None:
     noise = np.random.default_rng(seed).normal(size=N_SAMPLES)
-    assert isinstance(read_key_phase(noise, RATE_HZ), KeyPhaseFault)
+    assert read_key_phase(noise, RATE_HZ) is None
 
 
 @pytest.mark.parametrize(
     "signal", [*(np.full(N_SAMPLES, level_v) for level_v in (0.0, 0.2, 5.0)), pulses(8.0, 0.9)]
 )
 def test_a_shaft_that_stands_or_rolls_slowly_has_too_few_pulses(signal: FloatArray) -> None:
-    assert read_key_phase(signal, RATE_HZ) is KeyPhaseFault.TOO_FEW_PULSES
+    assert read_key_phase(signal, RATE_HZ) is None
 
 
 FREQUENCY_HZ = np.arange(1, 300) * 600.0 / 8192

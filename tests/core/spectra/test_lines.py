@@ -11,7 +11,7 @@ from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.quality import GOOD, Reading
-from core.samples.blocks import SampleBlock
+from core.samples.ring import Window
 from core.spectra.cross_spectrum import CrossSpectrum, average
 from core.spectra.lines import bin_phasors, exact_phasors, hann, peak_frequency_hz, tapered
 from core.spectra.segments import SegmentTransform
@@ -125,7 +125,7 @@ def test_samples_in_single_precision_cost_no_more_than_their_own_rounding(
     for start in range(0, N_SAMPLES - 8191, SETTINGS.hop_samples):
         piece = travelling[:, start : start + 8192]
         slow = {"speed": Reading(92.3)}
-        transform.add(SampleBlock("U1", 1, start, 0, RATE_HZ, piece, (GOOD,) * 4, slow))
+        transform.add(Window("U1", 1, start, 0, RATE_HZ, piece, (GOOD,) * 4, slow))
 
     segments = list(transform.segments)
     ours = average(

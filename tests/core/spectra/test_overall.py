@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 
 from core.arrays import FloatArray
 from core.machine.channel import Channel, Measurand
@@ -15,7 +16,6 @@ from core.machine.unit import Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD, Reading, Reason, bad
-from core.samples.blocks import SampleBlock
 
 RATE_HZ, N = 600.0, 2 * 8192
 TIME_S = np.arange(N) / RATE_HZ
@@ -40,7 +40,7 @@ def measure(unit: Unit) -> Measure:
         settings = AnalysisSettings(**other)
         rows = np.array([s + np.zeros(N) for s in signals], dtype=np.float32)
         slow = {"power": Reading(650.0), "oil": Reading(45.0), "speed": Reading(92.3)}
-        block = SampleBlock("U1", 1, 0, 0, RATE_HZ, rows, (GOOD,) * len(signals), slow)
+        block = given_block("U1", 1, 0, 0, RATE_HZ, rows, (GOOD,) * len(signals), slow)
         return UnitMonitor(there, settings).ingest(block)[-1].readings
 
     return read

@@ -21,7 +21,8 @@ from rigs.shaken_shaft import (
 from core.arrays import ComplexArray, FloatArray
 from core.quality import Reason
 from core.spectra.cross_spectrum import average, phasor_power_per_density
-from core.stiffness.dynamic import DynamicStiffness, dynamic_stiffness
+from core.stiffness.dynamic import DELAY, DynamicStiffness, dynamic_stiffness
+from core.stiffness.dynamic import STIFFNESS as STIFFENING
 from core.stiffness.dynamic_lines import DynamicSettings
 
 Recording = Callable[..., ComplexArray]
@@ -48,7 +49,7 @@ def test_exact_motion_gives_all_coefficients_whatever_its_axes_and_its_size(
     straight, swapped = found(phasors), found(phasors[:, [1, 0, 3, 2]])
 
     np.testing.assert_allclose(swapped.k_n_per_m, straight.k_n_per_m[::-1, ::-1], rtol=1e-8)
-    np.testing.assert_allclose(swapped.c_std_n_s_per_m, straight.c_std_n_s_per_m[::-1, ::-1])
+    np.testing.assert_allclose(swapped.std[:, 2:], straight.std[::-1, 3:1:-1])
     np.testing.assert_allclose(found(1e-3 * phasors).k_n_per_m, straight.k_n_per_m, rtol=1e-9)
 
 
@@ -72,14 +73,14 @@ def test_the_stated_change_with_the_bracket_is_the_change(recording: Recording) 
     assert isinstance(changed, DynamicStiffness)
     # Not to the last digit: with another bracket the fit is no longer perfect and the weights move.
     np.testing.assert_allclose(
-        changed.k_n_per_m - result.k_n_per_m, 0.01 * result.per_stiffness.k_n_per_m, rtol=0.02
+        changed.k_n_per_m - result.k_n_per_m, 0.01 * result.changes[STIFFENING, :, :2], rtol=0.02
     )
 
 
 def rms_z(results: list[DynamicStiffness]) -> FloatArray:
     """Root mean square of error over stated random uncertainty: (k, c) by (2, 2)."""
     errors = np.array([(r.k_n_per_m - STIFFNESS, r.c_n_s_per_m - DAMPING) for r in results])
-    stated = np.array([(r.k_std_n_per_m, r.c_std_n_s_per_m) for r in results])
+    stated = np.array([(r.std[:, :2], r.std[:, 2:]) for r in results])
     z: FloatArray = np.sqrt(((errors / stated) ** 2).mean(axis=0))
     return z
 
@@ -130,10 +131,10 @@ def test_channels_that_are_late_show_as_a_delay_and_are_put_right_by_it(
 
     assert result.delay_s == pytest.approx(1.0 / 600.0, abs=4.0 * result.delay_std_s)
     assert result.delay_std_s < 4e-4
-    change = result.delay_s * np.array([result.per_delay.k_n_per_m, result.per_delay.c_n_s_per_m])
+    change = result.delay_s * result.changes[DELAY, :, 2:]
     right = found(recording(bearing_um=0.05))
     np.testing.assert_allclose(
-        result.c_n_s_per_m + change[1], right.c_n_s_per_m, atol=0.06 * DAMPING[0, 0]
+        result.c_n_s_per_m + change, right.c_n_s_per_m, atol=0.06 * DAMPING[0, 0]
     )
 
 
@@ -181,7 +182,7 @@ def test_noise_share_is_the_part_of_the_shafts_motion_that_is_not_motion(
 
 def scatter_over_stated(results: list[DynamicStiffness]) -> FloatArray:
     k = np.array([result.k_n_per_m for result in results])
-    stated = np.array([result.k_std_n_per_m for result in results])
+    stated = np.array([result.std[:, :2] for result in results])
     ratio: FloatArray = k.std(axis=0) / np.sqrt((stated**2).mean(axis=0))
     return ratio
 
@@ -197,7 +198,7 @@ def test_the_stated_uncertainty_is_the_scatter_also_where_integration_alone_limi
     results = [found(integrated_at_the_bins(seed), n_integrations=(2, 2)) for seed in range(150)]
 
     damping = np.array([result.c_n_s_per_m for result in results]).std(axis=0)
-    stated = np.mean([result.c_std_n_s_per_m for result in results], axis=0)
+    stated = np.mean([result.std[:, 2:] for result in results], axis=0)
     # Edges between used and unused lines are not followed exactly: a fifth, beside 6 % by chance.
     assert np.diag(scatter_over_stated(results)) == pytest.approx(1.0, abs=0.25)
     assert np.diag(damping / stated) == pytest.approx(1.0, abs=0.25)
@@ -247,7 +248,7 @@ def test_loud_lines_and_runout_on_the_harmonics_do_not_spoil_what_quiet_lines_kn
     # Lines near the runout are left out, which costs precision but nothing else.
     assert runout.frequency_hz.size < clean.frequency_hz.size
     np.testing.assert_allclose(
-        runout.k_n_per_m, clean.k_n_per_m, atol=3.0 * float(clean.k_std_n_per_m.max())
+        runout.k_n_per_m, clean.k_n_per_m, atol=3.0 * float(clean.std[:, :2].max())
     )
 
     phasors = recording(bearing_um=0.01)

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from core.arrays import ComplexArray
-from core.machine.unit import BracketDynamics
+from core.machine.unit import BearingAccuracy, BracketDynamics
 from core.quality import Reason
 from core.spectra.cross_spectrum import BEARING_X, SHAFT_X, CrossSpectrum, average
-from core.stiffness.evidence import LineLimits, line_excitation
-from core.stiffness.transfer import LineTransfer, effective_stiffness_n_per_m, line_transfer
+from core.stiffness.evidence import line_excitation
+from core.stiffness.stiffness_budget import effective_stiffness_n_per_m, transfer_budgets
+from core.uncertainty import Budget
 
 FREQUENCY_HZ = np.array([1.54])
 OMEGA = 2.0 * math.pi * 1.54
@@ -35,44 +36,48 @@ def motion(
     return np.concatenate([shaft + probe_um * noise[1], bearing], axis=1)
 
 
-def found(phasors: ComplexArray, bracket: BracketDynamics = BRACKET) -> LineTransfer:
-    result = line_transfer(spectrum(phasors), 0, SHAFT_X, BEARING_X, bracket)
+def transfer(
+    phasors: ComplexArray, bracket: BracketDynamics = BRACKET
+) -> tuple[Budget, Budget] | None:
+    return transfer_budgets(spectrum(phasors), 0, SHAFT_X, BEARING_X, bracket, BearingAccuracy())
+
+
+def found(phasors: ComplexArray, bracket: BracketDynamics = BRACKET) -> tuple[Budget, Budget]:
+    result = transfer(phasors, bracket)
     assert result is not None
     return result
 
 
 def test_stiffness_is_the_real_part_and_damping_the_imaginary_part_if_there_is_motion() -> None:
-    result = found(motion())
+    k, c = found(motion())
 
-    assert result.k_n_per_m == pytest.approx(K_N_PER_M, rel=1e-12)
-    assert result.c_n_s_per_m == pytest.approx(C_N_S_PER_M, rel=1e-12)
-    assert result.coherence == pytest.approx(1.0)
-    assert result.k_std_n_per_m == pytest.approx(0.0, abs=1e3)
-    assert result.shaft_um_pk == pytest.approx(10.0)
+    assert k.value == pytest.approx(K_N_PER_M, rel=1e-12)
+    assert c.value == pytest.approx(C_N_S_PER_M, rel=1e-12)
+    assert k.random == pytest.approx(0.0, abs=1e3)
 
     still = motion()
     still[:, 0] = 0.0
-    assert line_transfer(spectrum(still), 0, SHAFT_X, BEARING_X, BRACKET) is None
-    assert line_transfer(spectrum(motion(n_segments=1)), 0, SHAFT_X, BEARING_X, BRACKET) is None
+    assert transfer(still) is None
+    assert transfer(motion(n_segments=1)) is None
 
 
 def test_leaving_the_brackets_inertia_out_reads_what_equation_5_reads_and_is_stated() -> None:
-    result = found(motion(), BracketDynamics(BRACKET.stiffness_n_per_m))
+    massless, _ = found(motion(), BracketDynamics(BRACKET.stiffness_n_per_m))
 
     # m_b ω² / k_b = 0.36 % at rated speed (UJB)
-    assert result.k_n_per_m / K_N_PER_M == pytest.approx(1.0036, abs=0.0003)
+    assert massless.value / K_N_PER_M == pytest.approx(1.0036, abs=0.0003)
 
-    before = found(motion())
-    after = found(motion(), BracketDynamics(1.01 * 1.18e9, 0.45e5, 2.0e5))
+    before, _ = found(motion())
+    after, _ = found(motion(), BracketDynamics(1.01 * 1.18e9, 0.45e5, 2.0e5))
 
-    change = 0.01 * BRACKET.stiffness_n_per_m * before.ratio.real
-    assert after.k_n_per_m - before.k_n_per_m == pytest.approx(change, rel=1e-9)
+    [of_bracket] = (line for line in before.lines if line.name == "bracket stiffness")
+    assert after.value - before.value == pytest.approx(0.01 * of_bracket.sensitivity, rel=1e-9)
 
 
 def test_bearing_noise_does_not_raise_the_stiffness_as_it_raises_an_amplitude() -> None:
     many = motion(n_segments=20_000, noise_um=2.0)
 
-    assert found(many).k_n_per_m == pytest.approx(K_N_PER_M, rel=0.01)
+    assert found(many)[0].value == pytest.approx(K_N_PER_M, rel=0.01)
     ratio = spectrum(many).amplitude_ratio(BEARING_X, SHAFT_X)[0] * BRACKET.stiffness_n_per_m
     assert ratio > 1.1 * K_N_PER_M
 
@@ -81,9 +86,9 @@ def test_bearing_noise_does_not_raise_the_stiffness_as_it_raises_an_amplitude() 
 def test_the_stated_uncertainty_is_the_scatter(n_segments: int) -> None:
     results = [found(motion(seed, n_segments, noise_um=0.5)) for seed in range(400)]
 
-    for value, stated in (("k_n_per_m", "k_std_n_per_m"), ("c_n_s_per_m", "c_std_n_s_per_m")):
-        scatter = np.std([getattr(result, value) for result in results])
-        mean_stated = math.sqrt(np.mean([getattr(result, stated) ** 2 for result in results]))
+    for budgets in zip(*results, strict=True):
+        scatter = np.std([budget.value for budget in budgets])
+        mean_stated = math.sqrt(np.mean([budget.random**2 for budget in budgets]))
         # The scatter of 400 runs is known to 3.5 %.
         assert scatter == pytest.approx(mean_stated, rel=0.1)
 
@@ -92,7 +97,7 @@ def test_a_line_is_believed_if_it_is_coherent_and_larger_than_runout() -> None:
     clear, noisy = spectrum(motion()), spectrum(motion(noise_um=20.0))
 
     def excitation(of: CrossSpectrum, **limits: float) -> Reason:
-        return line_excitation(of, 0, SHAFT_X, BEARING_X, LineLimits(**limits))
+        return line_excitation(of, 0, SHAFT_X, BEARING_X, **limits)
 
     assert excitation(clear) is Reason.OK
     assert excitation(noisy) is Reason.INSUFFICIENT_EXCITATION

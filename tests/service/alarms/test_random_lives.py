@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 from rigs.tiers import fast_and_long
 
 from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmState
@@ -35,7 +36,6 @@ from core.alarms.rules import UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel, Judgement, unknown
 from core.quality import GOOD, Reason, bad
-from core.samples.blocks import SampleBlock
 from service.live.live_view import LiveView
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.recorder import FILE, Findings, ParkedRows, Recorder
@@ -129,7 +129,7 @@ class Life:
         self.n_blocks += self.random.choice([1, 1, 1, 2])  # some get lost
         is_bad = self.random.random() < 0.4
         probe = bad(Reason.SENSOR_FAILURE) if is_bad else GOOD
-        block = SampleBlock(
+        block = given_block(
             unit="U1",
             epoch=1,
             first_index=self.n_blocks * 100,

@@ -18,7 +18,7 @@ from rigs.described import described_app
 from rigs.probes import Probes
 from rigs.standing_clock import SetClock
 
-from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.blocks import sample_block
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmRule
 from core.alarms.life_cycle import update
 from core.monitor.assessment import Assessment
@@ -65,7 +65,7 @@ def assessments(plant: PlantFile) -> list[Assessment]:
     settings = analysis_of(plant.analysis)
     monitor = UnitMonitor(machine_of(unit), settings)
     n_samples = settings.segment_samples + (N_RESULTS - 1) * settings.hop_samples
-    return monitor.ingest(calibrate(feed.advance(n_samples), calibration_of(unit)))
+    return monitor.ingest(sample_block([feed.advance(n_samples)], calibration_of(unit)))
 
 
 @dataclass

@@ -1,11 +1,11 @@
 """What the API says of channels: their settings, their state and their newest samples."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block, with_quality
 
 from core.quality import GOOD, Reading, Reason, bad, missing
 from core.samples.blocks import SampleBlock
@@ -28,7 +28,7 @@ def make_block(plant: PlantFile) -> MakeBlock:
     def make(first: int, n: int = N, epoch: int = 1, **slow: Reading) -> SampleBlock:
         index = np.arange(first, first + n, dtype=np.float32)
         offset = 1000.0 * np.arange(n_channels, dtype=np.float32)[:, np.newaxis]
-        return SampleBlock(
+        return given_block(
             unit="U1",
             epoch=epoch,
             first_index=first,
@@ -50,7 +50,7 @@ def receive(running: Any) -> Callable[[SampleBlock], None]:
 def with_bad(block: SampleBlock, row: int) -> SampleBlock:
     quality = list(block.channel_quality)
     quality[row] = bad(Reason.SENSOR_FAILURE)
-    return replace(block, channel_quality=tuple(quality))
+    return with_quality(block, tuple(quality))
 
 
 async def test_every_channel_is_listed_with_its_settings_in_wire_order(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import RawBlock, calibrate
+from acquisition.delivery.blocks import RawBlock, sample_block
 from core.quality import Reason, bad, missing
 from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount
@@ -66,7 +66,7 @@ def blocks_of(plant: PlantFile) -> Make:
             )
             for at in range(0, index.size, N)
         ]
-        return [calibrate(raw, calibration) for raw in raws]
+        return [sample_block([raw], calibration) for raw in raws]
 
     return make
 

@@ -4,10 +4,11 @@ import json
 from typing import Any
 
 import numpy as np
+from rigs.blocks import given_block
 
 from core.monitor.catalogue import CATALOGUE
 from core.quality import GOOD
-from core.samples.blocks import DeviceClock, SampleBlock, StampFault
+from core.samples.blocks import DeviceClock, StampFault
 from core.samples.gaps import Gap, SampleAccount
 from service.live.live_view import LinkState
 from service.settings.configuration import Configuration
@@ -38,7 +39,7 @@ async def test_gaps_are_listed_with_their_exact_length(running: Any) -> None:
 async def test_units_say_how_their_samples_arrive(running: Any) -> None:
     account = SampleAccount(8000, 100, 50, 7, 1, {"torn": 25})
     clock = DeviceClock(offset_s=-0.25, drift_ppm=12.0, u_drift_ppm=1.5, n_faults=3)
-    block = SampleBlock(
+    block = given_block(
         unit="U1",
         epoch=1,
         first_index=0,

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.quality import GOOD, Reading
-from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import CrossSpectrum
 from service.api.routes.spectra import MAX_NUMBERS
 from service.settings.core_values import analysis_of, machine_of
@@ -40,7 +40,7 @@ def toned(plant: PlantFile) -> list[Assessment]:
     )
     monitor = UnitMonitor(unit, settings)
     return monitor.ingest(
-        SampleBlock(
+        given_block(
             unit=unit.id,
             epoch=1,
             first_index=0,

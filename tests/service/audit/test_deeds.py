@@ -16,7 +16,7 @@ from core.alarms.operation import Acknowledge, Action, Comment, Shelve, TakeOutO
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
 from service.app.service_audit import Release, start_deeds, stop_deed
-from service.store.access.audit_entries import Acting, AuditEntry, Source, acting_as
+from service.store.access.audit_entries import ActedNews, Acting, AuditEntry, Source, acting_as
 from service.store.audit_port import AuditQuery
 from service.store.film_port import BaselineStep, StoredStep
 from service.store.gap_reference import GapReference, ReferenceSource
@@ -56,7 +56,7 @@ def test_what_people_do_to_alarms_is_told_with_before_and_after(
     store: SqliteStore, action: Action, change: str, after: str
 ) -> None:
     news = raised()
-    done = AlarmNews(*operate(news.alarm, action, T0 + 5), peer="192.0.2.7")
+    done = ActedNews(*operate(news.alarm, action, T0 + 5), peer="192.0.2.7")
     store.append([], [], [news])
     n_before = count(store)
     store.append([], [], [done])

@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.simulated.life.truth import UnitLife
 from core.baseline.baseline import Origin
-from core.baseline.history import DIRECTIONS, Watched, watched_values
+from core.baseline.history import DIRECTIONS
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import decide_all, operation_history
@@ -85,7 +85,7 @@ def test_alarms_are_those_that_core_decides(two_units: Any, found: Found) -> Non
             origin = Origin(unit, bearing, "not told", 1, "back-test", 0)
             baseline = learn(history.rows(0, n), is_settled[:n], origin, BaselineSettings())
             for direction in DIRECTIONS:
-                film = baseline.of(Watched.STIFFNESS, direction)
+                film = baseline.of(direction)
                 assert film is not None
                 later = history.rows(n, len(history))
                 readings = WatchedReadings.of(later, is_settled[n:], direction)
@@ -163,12 +163,12 @@ def test_causes_are_told_by_the_newest_readings_of_all_bearings(
 
 def _film(baselines: Any, bearing: str, direction: str) -> Any:
     (baseline,) = (b for b in baselines if b.origin.bearing == bearing)
-    return baseline.of(Watched.STIFFNESS, direction)
+    return baseline.of(direction)
 
 
 def _deviation(history: Any, film: Any, direction: str) -> Any:
-    value, u_random = watched_values(history, Watched.STIFFNESS, direction)
-    return film.compare(history.conditions, value, u_random).deviation
+    assert film.direction == direction
+    return film.compare_history(history).deviation
 
 
 def test_every_reading_is_counted_once(two_units: Any, histories: Histories, found: Found) -> None:

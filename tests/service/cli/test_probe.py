@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from acquisition.delivery.calibration import RawBlock, SlowCalibration, UnitCalibration
+from acquisition.delivery.blocks import RawBlock
 from acquisition.simulated.devices.map_device import MapDevice
 from acquisition.simulated.devices.modbus_links import ModbusTcpServer
 from acquisition.simulated.devices.ring_device import RingDevice
+from core.samples.calibration import SlowCalibration, UnitCalibration
 from service.cli.probe import app
 from service.settings.sources.register_map import load_map_file
 

@@ -11,7 +11,7 @@ import pytest
 from rigs.command_line import padwatch
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
 from service.app.storage import open_store, waveform_keeper

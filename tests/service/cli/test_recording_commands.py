@@ -12,7 +12,7 @@ import pytest
 from rigs.command_line import padwatch, padwatch_program
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.blocks import sample_block
 from acquisition.errors import LinkError
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
@@ -86,7 +86,7 @@ class Interrupted:
     async def _blocks(self) -> AsyncGenerator[SampleBlock]:
         for _ in range(self._n_blocks):
             await asyncio.sleep(0)
-            yield calibrate(self._feed.advance(50), self._calibration)
+            yield sample_block([self._feed.advance(50)], self._calibration)
         self._feed.advance(100)
         self._event()
         await asyncio.Event().wait()

@@ -8,7 +8,7 @@ import pytest
 from click.testing import Result
 from rigs.command_line import padwatch
 
-from acquisition.delivery.calibration import RawBlock, calibrate
+from acquisition.delivery.blocks import RawBlock, sample_block
 from core.samples.blocks import Rejection
 from service.app.recordings import recording_of, recording_writer
 from service.settings.core_values import calibration_of
@@ -151,8 +151,10 @@ def test_what_is_exported_can_be_imported_again(
     told = json.loads(result.stdout)
     assert (told["samples"], told["gap_samples"], told["sample_type"]) == (200, 200, "float32")
     calibration = calibration_of(unit)
-    before = [calibrate(raw, calibration) for raw in recording_of(folder).raw_blocks()]
-    after = [calibrate(raw, calibration) for raw in recording_of(tmp_path / "again").raw_blocks()]
+    before = [sample_block([raw], calibration) for raw in recording_of(folder).raw_blocks()]
+    after = [
+        sample_block([raw], calibration) for raw in recording_of(tmp_path / "again").raw_blocks()
+    ]
     for first, second in zip(before, after, strict=True):
         assert (first.start_ns, first.first_index) == (second.start_ns, second.first_index)
         assert first.slow == second.slow

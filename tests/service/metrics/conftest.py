@@ -11,9 +11,10 @@ import httpx2
 import pytest
 from prometheus_client import Metric
 from prometheus_client.parser import text_string_to_metric_families
+from rigs.blocks import with_quality
 
 from acquisition.clock import Clock, SystemClock
-from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.blocks import sample_block
 from acquisition.errors import LinkError
 from acquisition.source import SampleSource
 from core.quality import Reason, bad
@@ -83,10 +84,10 @@ def scripted_blocks() -> list[SampleBlock]:
     """What unit U1 delivers: one block missing, one refused in part, one not good."""
     unit = load_plant_file(DEMO).unit[0]
     feed, calibration = simulated_feed(unit, SystemClock()), calibration_of(unit)
-    found = [calibrate(feed.advance(BLOCK), calibration) for _ in range(N_BLOCKS)]
+    found = [sample_block([feed.advance(BLOCK)], calibration) for _ in range(N_BLOCKS)]
     found[5] = replace(found[5], rejected=(Rejection("checksum", 100), Rejection("ÄÖÜ {}", 7)))
     flagged = (bad(Reason.SENSOR_FAILURE), *found[7].channel_quality[1:])
-    found[7] = replace(found[7], channel_quality=flagged)
+    found[7] = with_quality(found[7], flagged)
     found[-1] = replace(found[-1], clock=DeviceClock(0.25, None, None))
     return [block for number, block in enumerate(found) if number != 4]
 

@@ -21,7 +21,7 @@ def make(folder: Path) -> None:
     unit = folder.name[:2]
     folder.parent.mkdir(exist_ok=True)
     with RecordingWriter(folder, recorded_unit(unit), "a test") as writer:
-        writer.write_calibrated(block(0, unit))
+        writer.write_block(block(0, unit))
 
 
 @pytest.fixture

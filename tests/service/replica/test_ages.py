@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 
 from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reason
-from core.samples.blocks import SampleBlock
 from core.samples.gaps import SampleAccount
 from service.cluster.replica_state import SILENT_AFTER_S, ReplicaLive
 from service.live.live_view import LinkState, LiveView, UnitStatus
@@ -21,7 +21,7 @@ from service.settings.loading import load_plant_file
 STALE_AFTER_S = 30.0
 UNIT = load_plant_file(Path(__file__).parents[3] / "deploy" / "demo.toml").unit[0]
 BEARING = UNIT.bearing[0].id
-BLOCK = SampleBlock(UNIT.id, 1, 0, 0, 600.0, np.zeros((1, 60), dtype=np.float32), (GOOD,), {})
+BLOCK = given_block(UNIT.id, 1, 0, 0, 600.0, np.zeros((1, 60), dtype=np.float32), (GOOD,), {})
 
 
 @pytest.mark.parametrize(("behind_s", "is_current"), [(0.0, True), (29.0, True), (31.0, False)])

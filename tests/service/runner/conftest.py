@@ -3,10 +3,12 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rigs.blocks import given_block
 from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
@@ -125,7 +127,7 @@ def block_number(number: int, unit: str = "U1", rate_hz: float = RATE_HZ) -> Sam
     first = number * BLOCK
     angle = 2 * np.pi * np.arange(first, first + BLOCK) / RATE_HZ
     turning = np.array([50 * np.cos(angle), 50 * np.sin(angle)])
-    return SampleBlock(
+    return given_block(
         unit=unit,
         epoch=1,
         first_index=first,
@@ -133,6 +135,7 @@ def block_number(number: int, unit: str = "U1", rate_hz: float = RATE_HZ) -> Sam
         rate_hz=rate_hz,
         samples=np.concatenate([turning, turning / 5]).astype(np.float32),
         channel_quality=(GOOD,) * 4,
+        calibration=replace(recorded_unit(unit).calibration, rate_hz=rate_hz),
     )
 
 

@@ -30,7 +30,7 @@ def stream(block: Block, loud: Sequence[int] = LOUD) -> list[SampleBlock]:
     """All blocks of a machine that shakes for a while."""
     blocks = [block(number) for number in range(N_BLOCKS)]
     return [
-        replace(one, samples=one.samples * 1.5) if number in loud else one
+        replace(one, counts=one.counts * 1.5) if number in loud else one
         for number, one in enumerate(blocks)
     ]
 

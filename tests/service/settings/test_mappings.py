@@ -152,6 +152,20 @@ def test_an_skf_like_rack_is_read_as_its_manual_demands() -> None:
     assert registers.values[1].scale == -0.1, "lag becomes lead"
 
 
+FLAGGED = """
+[[value]]
+channel = "a"
+address = 10
+flag = [{ address = 11, type = "bit", bit = 7, set_means = "ok" }]
+"""
+
+
+def test_a_status_of_a_single_bit_needs_no_mask(tmp_path: Path) -> None:
+    (tmp_path / "map.toml").write_text(FLAGGED)
+    [value] = load_map_file(tmp_path / "map.toml").register_map().values
+    assert [flag.mask for flag in value.flags] == [1]
+
+
 MINIMAL = """
 base = 1
 [[value]]
@@ -167,7 +181,7 @@ FLAG = "[[value.flag]]\naddress = 30\n"
 FIELDS = '["day", "day", "year", "hour", "minute", "second"]'
 CALENDAR = f'[time]\nkind = "calendar"\nfirst = {{ address = 50 }}\nfields = {FIELDS}\n'
 BEHIND = [
-    ("scale = 0.0", "value[2].scale: must not be 0"),
+    ("scale = 0.0", "value[2].scale = 0.0: must not be 0"),
     ('detector = "pp"', "value[2].detector"),
     ('quantity = "order1_amplitude"', 'value[2].detector: must be "pk", "pp" or "rms"'),
     ('quantity = "order1_phase"', 'value[2].phase: must be "lag" or "lead"'),
@@ -178,12 +192,35 @@ BEHIND = [
     ("invalid_below = nan", "invalid_below"),
     ("[[together]]\naddress = 11\ncount = 5", "together: the block from 11 cuts"),
     ("[[together]]\naddress = 40\ncount = 126", "together[1].count = 126"),
-    ('[time]\nkind = "epoch"\nseconds = { address = 0 }', "time.address: must be 1"),
+    ('[time]\nkind = "epoch"\nseconds = { address = 0 }', "time.seconds.address = 0: must be 1"),
+    (CALENDAR.replace("50", "65532").replace('"day", "day"', '"month", "day"'), "1 to 65531"),
     (CALENDAR, "time.fields: must name each of year, month"),
     ('"\\n" = 1', "value[2].\\n = 1: Extra inputs"),
     (FLAG + "mask = 0\nset_means = 'bad'", ":12: value[2].flag[1].mask = 0: Input"),
     (FLAG, "value[2].flag[1].set_means: must be given"),
-    (FLAG + "type = 'float32'\nset_means = 'bad'", ":12: value[2].flag[1].type: mu"),
+    (FLAG + "type = 'float32'\nset_means = 'bad'", ":12: value[2].flag[1].type = 'float32': mu"),
+    (FLAG + "type = 'bit'\nfunction = 2\nmask = 2", "flag[1].mask = 2: must be left out"),
+    (FLAG + "set_means = 'bad'\nclipped_values = [1]", "can only be given with ok_values"),
+    (
+        FLAG + "ok_values = [0, 16]\nmask = 0x00F0",
+        "ok_values: must be numbers of the mask, 0 to 15",
+    ),
+    (FLAG + "ok_values = [0]\nclipped_values = [-1]", "0 to 65535, got -1"),
+    ("function = 1", 'value[2].type: must be "bit": functions 1 and 2'),
+    ("type = 'bit'", "value[2].bit: is the number of a bit"),
+    ("scale_register = { address = 21, divisor = 0.0 }", "scale_register.divisor"),
+    ("full_scale = { minimum = 1.0, maximum = 1.0 }", "full_scale.minimum: must differ"),
+    (
+        "full_scale = { minimum = 0.0, maximum = 1.0, raw_minimum = 9.0, raw_maximum = 9.0 }",
+        "must be below raw_maximum 9",
+    ),
+    ("invalid_below = 5.0\ninvalid_above = 5.0", "must be below invalid_above 5"),
+    ("invalid_values = [98304.0]", "whole number of 16 bits, got 98304"),
+    ("type = 'int32'\ninvalid_values = [-2147483649.0]", "whole number of 32 bits"),
+    (
+        "type = 'bit'\nbit = 3\n[[value]]\nchannel = 'c'\naddress = 20\ntype = 'bit'\nbit = 3",
+        "value[3].address: lies on a register of value 'b'",
+    ),
     ("base = ", "not TOML"),
 ]
 
@@ -194,7 +231,14 @@ BEHIND = [
         ("address = 20", "address = 11", ":9: value[2].address: lies on a"),
         ('"float32"', '"float16"', ":6: value[1].type = 'float16'"),
         ("address = 10", "address = 0", "value[1].address: must be 1 to 65535"),
-        ("base = 1", "base = 2", ":2: base = 2: must be 0, 1, 10001"),
+        ("address = 10", "address = 65536", "value[1].address: must be 1 to 65535"),
+        ('"b"', '"a"', "value: has 'a' twice"),
+        ("base = 1", "base = 2", ":2: base = 2: Input should be 0, 1, 10001"),
+        (
+            "base = 1",
+            "base = 1\nmax_registers = 10\n[[together]]\naddress = 40\ncount = 11",
+            "together[1].count: must not be above max_registers, 10",
+        ),
         ("base = 1", "bass = 1", ":2: bass = 1: Extra inputs"),
         *((END, f"{END}{text}\n", said) for text, said in BEHIND),
     ],

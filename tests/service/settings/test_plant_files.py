@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.calibration import calibrate
+from acquisition.delivery.blocks import sample_block
 from core.machine.channel import Measurand
 from core.monitor.monitor import UnitMonitor
 from service.measuring.simulated_sources import simulated_feed
@@ -92,7 +92,7 @@ def test_the_shortest_segment_a_file_may_ask_for_gives_results(plant_text: str) 
     feed = simulated_feed(unit, SystemClock())
     monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
 
-    results = monitor.ingest(calibrate(feed.advance(3200), calibration_of(unit)))
+    results = monitor.ingest(sample_block([feed.advance(3200)], calibration_of(unit)))
 
     assert {r.bearing for r in results} == {"UJB", "LJB", "TJB"}
     assert all(r.readings["order1_shaft_x_um_pk"].value for r in results)
@@ -157,7 +157,7 @@ def test_scaled_counts_are_the_same_channel_without_volts(plant_text: str) -> No
     assert counts.channels[0].ok_limits == pytest.approx(volts.channels[0].ok_limits)
     feeds = [simulated_feed(plant.unit[0], SystemClock()) for plant in plants]
     first, second = (
-        calibrate(feed.advance(50), calibration)
+        sample_block([feed.advance(50)], calibration)
         for feed, calibration in zip(feeds, (volts, counts), strict=True)
     )
     assert [q.level for q in first.channel_quality] == [q.level for q in second.channel_quality]

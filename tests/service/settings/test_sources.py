@@ -101,6 +101,11 @@ def test_a_rack_that_can_never_work_is_refused(settings: dict[str, Any], said: s
     assert said in str(refusal.value)
 
 
+def test_a_device_is_not_given_less_time_than_its_map_asks() -> None:
+    with pytest.raises(ValidationError, match="must be 1 or more, as the register map asks"):
+        polled(map=WAVES | {"min_timeout_s": 1.0}, timeout_s=0.9)
+
+
 def test_a_serial_line_cannot_be_connected_for_each_reply() -> None:
     with pytest.raises(ValidationError, match='must be "kept" on a serial line'):
         polled(host=None, device="/dev/ttyUSB0", connection="per_reply")
@@ -138,14 +143,31 @@ def test_a_queue_of_twelve_channels_fits_into_a_reading() -> None:
     ("settings", "n_channels", "said"),
     [
         ({}, 31, "at most 31"),
+        ({"addresses": [0, 1]}, 2, "must be 1, got 2"),
         ({"layout": "per_channel"}, 2, "must be 2, got 1"),
-        ({"has_counter": False, "reading": "keeps"}, 2, "which samples are new"),
     ],
 )
-def test_a_queue_that_cannot_be_followed_is_refused(settings, n_channels: int, said: str) -> None:
+def test_queues_that_do_not_fit_the_channels_are_refused(settings, n_channels: int, said) -> None:
     with pytest.raises(MisfitError, match=said) as refusal:
         fifo(**settings).fifo_layout(n_channels)
     assert refusal.value.at[0] == "source"
+
+
+TWO = {"layout": "per_channel", "addresses": [0, 1]}
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"has_counter": False, "reading": "keeps"}, "which samples are new"),
+        (TWO | {"has_counter": False}, "belong together"),
+        (TWO | {"addresses": [5, 5]}, "names a queue twice"),
+        ({"addresses": [70_000]}, "less than or equal to 65535"),
+    ],
+)
+def test_a_queue_that_cannot_be_followed_is_refused(settings, said: str) -> None:
+    with pytest.raises(ValidationError, match=said):
+        fifo(**settings)
 
 
 IDENTITY: TypeAdapter[IdentitySettings] = TypeAdapter(IdentitySettings)
@@ -243,6 +265,8 @@ CAN_OWN = ({"signals": {"x": "A.b"}}, {"counters": ["A.b"]}, {"epoch": "A.b"})
         (CAN | {"bitrate": 7}, "greater than or equal"),
         (CAN | {"receive_buffer": 1}, "greater than or equal"),
         (CAN | {"hold_samples": 0}, "greater than or equal"),
+        (CAN | {"hold_s": 0.0}, "greater than or equal"),
+        (CAN | {"stale_after_s": float("nan")}, "finite"),
         (CAN | {"when_full": "block"}, "drop"),
         (CAN | {"options": {"a b": 1}}, "pattern"),
         (CAN | {"stale_after": 3.0}, "Extra inputs"),

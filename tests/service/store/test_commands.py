@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, changed
+from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, changed
+from service.store.access.audit_entries import ActedNews
 from service.store.sharing import DONE, KEPT_NS, Answer, Command, CommandState, OpenCommand
 from service.store.sqlite import SqliteStore
 
@@ -54,7 +55,7 @@ def test_a_command_is_answered_with_the_events_that_it_has_caused_or_not_at_all(
     store.commands.ask(COMMAND)
     before = Alarm(AlarmIdentity("U1", "link", "link_lost"))
     after, event = changed(before, before, AlarmChange.COMMENTED, NOW_NS, "vera", "seen")
-    news = AlarmNews(after, (event,), "10.0.0.9", "c1")
+    news = ActedNews(after, (event,), "10.0.0.9", "c1")
     with monkeypatch.context() as broken:
         broken.setattr("service.store.alarms.answer_command", _fails)
         with pytest.raises(ZeroDivisionError):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from core.baseline.baseline import BearingBaseline, Origin
-from core.baseline.history import StiffnessHistory, Watched
+from core.baseline.history import StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.shaft_response import ShaftResponse
@@ -18,7 +18,7 @@ def baseline(film_life: Callable[..., StiffnessHistory]) -> BearingBaseline:
     history = film_life(4, days=60)
     origin = Origin("U1", "LJB", "transfer_order1", 3, "Ada", 1_700_000_000_123_456_789, "overhaul")
     settled = np.ones(len(history), np.bool_)
-    return learn(history, settled, origin, BaselineSettings(), (Watched.STIFFNESS,))
+    return learn(history, settled, origin, BaselineSettings())
 
 
 def test_a_baseline_comes_back_as_it_was(baseline: BearingBaseline) -> None:

@@ -9,6 +9,7 @@ from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import MovingUnit
 from harness.nats_server import NatsServer, nats_server, nats_server_command
 from nats import connect
+from rigs.blocks import given_block
 from rigs.memory_folder import memory_folder, path_in_memory  # noqa: F401 - a fixture
 
 from core.quality import GOOD, Reading, Reason, missing, uncertain
@@ -28,7 +29,7 @@ def identity() -> UnitIdentity:
 def block() -> SampleBlock:
     samples = np.random.default_rng(7).normal(2000.0, 50.0, (2, 60)).astype(np.float32)
     samples[0, 3], samples[1, 4], samples[0, 5] = np.nan, np.inf, -0.0
-    return SampleBlock(
+    return given_block(
         unit="U1",
         epoch=4_000_000_000,
         first_index=2**40 + 1,

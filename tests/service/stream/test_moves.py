@@ -15,12 +15,14 @@ import pytest
 from harness.ledger_plant import LedgerPlant
 from harness.moving_unit import Message, MovingUnit
 from harness.stream_rig import found_in
+from rigs.blocks import given_block, of_unit, starting_at
 from rigs.tiers import fast_and_long
 
 from core.arrays import FloatArray, SampleArray
 from core.quality import GOOD, Quality, Reading, Reason, bad, uncertain
 from core.samples.axis import RECOUNTED_EPOCHS
 from core.samples.blocks import Rejection, SampleBlock
+from core.samples.calibration import UNLIMITED
 from core.units import NS_PER_S
 from service.cluster.frames import encoded_block, encoded_link
 from service.live.live_view import LinkState
@@ -59,7 +61,7 @@ class Device:
         seconds = t_s[0] + (self._begin_ns - T0) / NS_PER_S
         turn_hz = TURN_HZ * (1.0 + 0.01 * np.sin(seconds / 9.0))
         vortex_hz = turn_hz * (0.29 + 0.05 * np.sin(seconds / 7.0))
-        return SampleBlock(
+        return given_block(
             unit=self._unit.id,
             epoch=self._epoch,
             first_index=int(index[0]),
@@ -290,16 +292,15 @@ async def test_blocks_that_no_device_can_have_given_are_refused_and_nothing_dies
     once = blocks(clean)
     await clean.live(numbered(clean, once), None, rng)
     one = once[10]
-    n_channels = one.samples.shape[0]
     wrong = [
-        replace(one, samples=one.samples[:, :0]),
-        replace(one, samples=np.full_like(one.samples, np.nan)),
-        replace(one, samples=one.samples[1:], channel_quality=(GOOD,) * (n_channels - 1)),
-        replace(one, rate_hz=2 * one.rate_hz),
+        replace(one, counts=one.counts[:, :0]),
+        of_unit(one, channels=(replace(UNLIMITED, unit_per_v=np.inf),) * len(one.counts)),
+        given_block("U1", 3, 0, T0, one.rate_hz, one.counts[1:], one.channel_quality[1:]),
+        of_unit(one, rate_hz=2 * one.rate_hz),
         replace(one, rejected=(Rejection("torn", -5),)),
-        replace(one, slow={"speed": Reading(float("inf"))}),
+        replace(one, elsewhere={"speed": Reading(float("inf"))}),
         replace(one, first_index=2**60),
-        replace(one, start_ns=2**63 - 1),
+        starting_at(one, 2**63 - 1),
     ]
     refused = await spoilt.live(numbered(spoilt, [*once[:10], *wrong, *once[10:]]), None, rng)
     assert refused == Counter({"impossible": 4, "misfit": 2, "not_understood": 2})
@@ -311,6 +312,6 @@ async def test_a_block_that_says_nothing_of_a_slow_channel_is_analysed_without_i
 ) -> None:
     unit = moving_unit("unit")
     sent = blocks(unit)
-    sent = [*sent[:15], *(replace(block, slow={}) for block in sent[15:])]
+    sent = [*sent[:15], *(replace(block, elsewhere={}) for block in sent[15:])]
     assert not await unit.live(numbered(unit, sent), None, rng)
     assert windows(unit)

@@ -1,7 +1,6 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import nats
@@ -11,6 +10,7 @@ from harness.nats_server import NatsServer, nats_server
 from harness.waiting import at_work, until
 from nats.errors import ConnectionClosedError
 from nats.js.client import JetStreamContext
+from rigs.blocks import given_block, starting_at
 
 from acquisition.clock import SystemClock
 from core.quality import GOOD
@@ -38,7 +38,7 @@ def block(plant: PlantFile, number: int, n_samples: int = 60) -> SampleBlock:
     samples = np.full((len(unit.channel), n_samples), number, np.float32)
     quality = (GOOD,) * len(unit.channel)
     first = number * n_samples
-    return SampleBlock(unit.id, 1, first, first, unit.sampling_hz, samples, quality)
+    return given_block(unit.id, 1, first, first, unit.sampling_hz, samples, quality)
 
 
 def publisher(plant: PlantFile, url: str, **settings: object) -> Publisher:
@@ -110,7 +110,7 @@ async def test_blocks_and_news_of_a_link_arrive_in_the_order_in_which_they_came(
 async def test_a_block_that_counts_the_same_samples_at_another_time_is_another_block(
     plant: PlantFile, server: NatsServer
 ) -> None:
-    anew = [replace(block(plant, n), start_ns=10**9 + n) for n in (0, 1)]
+    anew = [starting_at(block(plant, n), 10**9 + n) for n in (0, 1)]
     async with running(publisher(plant, server.url)) as out:
         await published(out, block(plant, 0), block(plant, 1), *anew)
     assert numbers(await kept(plant, server)) == [0, 1, 0, 1]

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rigs.blocks import with_quality
 
 from core.quality import GOOD, Reason, bad
-from core.samples.blocks import SampleBlock
+from core.samples.blocks import SampleBlock, joined
 from service.cluster.frames import (
     Taken,
     UnitIdentity,
@@ -29,11 +30,9 @@ TAKEN_NS = 1_767_225_600_000_000_007
 def assert_same(found: object, sent: SampleBlock) -> None:
     assert isinstance(found, SampleBlock)
     for field in fields(SampleBlock):
-        if field.name != "samples":
+        if field.name not in ("counts", "side"):
             assert getattr(found, field.name) == getattr(sent, field.name), field.name
-    assert found.samples.dtype == sent.samples.dtype
-    assert found.samples.shape == sent.samples.shape
-    assert found.samples.tobytes() == sent.samples.tobytes()
+    assert found == sent
 
 
 def with_crc(body: bytes) -> bytes:
@@ -41,8 +40,14 @@ def with_crc(body: bytes) -> bytes:
 
 
 def test_a_block_comes_back_bit_for_bit(block: SampleBlock, identity: UnitIdentity) -> None:
-    bad_block = replace(block, channel_quality=(bad(Reason.DEAD), GOOD), slow={}, clock=None)
-    for sent in (block, bad_block, block.from_sample(7, 9), block.from_sample(60)):
+    bad_block = replace(with_quality(block, (bad(Reason.DEAD), GOOD)), elsewhere={}, clock=None)
+    pieces = [block.from_sample(7, 20), block.from_sample(20, 33)]
+    counts = [
+        replace(one, counts=one.first_index % 2**15 + np.arange(26, dtype=np.int16).reshape(2, 13))
+        for one in pieces
+    ]
+    in_cells = joined(counts)
+    for sent in (block, bad_block, block.from_sample(7, 9), block.from_sample(60), in_cells):
         found = decoded(encoded_block(sent, identity, TAKEN_NS), identity)
         assert isinstance(found, Taken)
         assert found.taken_ns == TAKEN_NS
@@ -109,7 +114,7 @@ def test_a_message_of_a_later_version_asks_for_an_upgrade_and_an_unknown_kind_is
 
 def forged(head: bytes, samples: bytes, kind: int = 1) -> bytes:
     start = struct.pack(
-        "<4sHH16s16sII", b"PWSM", 1, kind, OWN.plant, OWN.make, len(head), len(samples)
+        "<4sHH16s16sII", b"PWSM", 2, kind, OWN.plant, OWN.make, len(head), len(samples)
     )
     return with_crc(start + head + samples)
 
@@ -131,11 +136,11 @@ def test_hostile_bytes_are_refused(message: bytes) -> None:
 
 
 def test_a_message_that_claims_much_takes_little_memory(block: SampleBlock) -> None:
-    whole = encoded_block(replace(block, channel_quality=(GOOD, GOOD)), OWN, TAKEN_NS)
+    whole = encoded_block(with_quality(block, (GOOD, GOOD)), OWN, TAKEN_NS)
     (n_head,) = struct.unpack_from("<I", whole, 40)
     head = whole[48 : 48 + n_head].replace(b'"n_samples":60', b'"n_samples":9223372036854775807')
     deep = b"[" * 100_000
-    lying = struct.pack("<4sHH16s16sII", b"PWSM", 1, 1, OWN.plant, OWN.make, 2**32 - 1, 2**32 - 1)
+    lying = struct.pack("<4sHH16s16sII", b"PWSM", 2, 1, OWN.plant, OWN.make, 2**32 - 1, 2**32 - 1)
     tracemalloc.start()
     try:
         for hurt in (forged(head, b"\0" * 480), forged(deep, b""), with_crc(lying)):
@@ -146,8 +151,8 @@ def test_a_message_that_claims_much_takes_little_memory(block: SampleBlock) -> N
         tracemalloc.stop()
 
 
-def test_samples_are_float32_little_endian_whatever_they_were(
+def test_samples_travel_little_endian_and_row_by_row_however_they_lie(
     block: SampleBlock, identity: UnitIdentity
 ) -> None:
-    turned = replace(block, samples=np.asfortranarray(block.samples))
+    turned = replace(block, counts=np.asfortranarray(block.counts))
     assert encoded_block(turned, identity, TAKEN_NS) == encoded_block(block, identity, TAKEN_NS)

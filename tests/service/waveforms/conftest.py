@@ -9,7 +9,7 @@ import pytest
 from rigs.memory_folder import path_in_memory  # noqa: F401 - a fixture
 from rigs.standing_clock import StandingClock
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand

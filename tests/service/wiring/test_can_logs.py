@@ -5,12 +5,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import can
-import numpy as np
 import pytest
 
 from acquisition.can.settings import CanLinkSettings, CanSettings
-from acquisition.delivery.blocks import BlockGrid
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.blocks import BlockJoiner, RawBlock, sample_block
 from acquisition.errors import ConfigError
 from acquisition.recordings.imports.job import ImportJob, TimeAxis
 from acquisition.recordings.reading import imported_frames
@@ -18,6 +16,8 @@ from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_frames import WireFrame
 from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_dbc, daq_settings
 from acquisition.simulated.feed import FeedEndedError
+from core.samples.blocks import SampleBlock
+from core.samples.calibration import UnitCalibration
 from service.cli.offline.importing import CanLogDecoder
 
 START_S = 1_767_225_600
@@ -66,7 +66,7 @@ def test_every_sample_flag_and_stamp_comes_back(
     job = ImportJob(format=kind, rate_hz=600.0, time=TimeAxis("file", 0))
     read = imported_frames(tmp_path / "log", job)
     raws = [raw for frames, _ in read for raw in decoder.take(frames)]
-    assert on_grid(raws) == on_grid(feed.sent)
+    assert on_grid(raws, counts_calibration()) == on_grid(feed.sent, counts_calibration())
 
 
 def test_a_log_of_two_devices_under_the_same_ids_is_refused(
@@ -113,7 +113,7 @@ def as_message(frame: WireFrame, number: int) -> can.Message:
     )
 
 
-def on_grid(raws: list[RawBlock]) -> list[str]:
-    grid = BlockGrid(50)
-    blocks = [block for raw in raws for block in grid.put(raw)] + grid.flush()
-    return [repr(replace(b, counts=np.array(b.counts).tobytes())) for b in blocks]
+def on_grid(raws: list[RawBlock], calibration: UnitCalibration) -> list[SampleBlock]:
+    joiner = BlockJoiner(50)
+    blocks = [b for raw in raws for b in joiner.put(sample_block([raw], calibration))]
+    return blocks + joiner.flush()

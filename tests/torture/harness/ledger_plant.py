@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from acquisition.delivery.calibration import RawBlock
+from acquisition.delivery.blocks import RawBlock
 from core.units import NS_PER_S
 from harness.truth import BEARINGS, N_CHANNELS, SPEED_RPM, Truth
 

@@ -8,10 +8,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from acquisition.delivery.calibration import RawBlock, UnitCalibration, calibrate
+from acquisition.delivery.blocks import RawBlock, sample_block
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.monitor.monitor import UnitMonitor
+from core.samples.calibration import UnitCalibration
 from core.samples.gaps import Gap
 from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.truth import BEARINGS
@@ -112,7 +113,7 @@ class Replay:
             if monitor is None or run.life != life:
                 monitor, life = UnitMonitor(self._machine, self._analysis), run.life
             for raw in self._slots(run, epoch):
-                yield from monitor.steps(calibrate(raw, self._calibration))
+                yield from monitor.steps(sample_block([raw], self._calibration))
 
     def _slots(self, run: Run, epoch: int) -> Iterator[RawBlock]:
         slot = self._plant.slot_samples

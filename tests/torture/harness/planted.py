@@ -182,10 +182,10 @@ def sample_altered() -> None:
     write = Stretch.write
 
     def altered(self: Stretch, block: SampleBlock, now_s: float) -> None:
-        samples = block.samples.copy()
-        samples[3, 0] = samples[3, 1]
-        samples[4, 0] = samples[4, 1]
-        write(self, replace(block, samples=samples), now_s)
+        counts = block.counts.copy()
+        counts[3, 0] = counts[3, 1]
+        counts[4, 0] = counts[4, 1]
+        write(self, replace(block, counts=counts), now_s)
 
     Stretch.write = altered  # type: ignore[method-assign]
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import nats
 import numpy as np
+from rigs.blocks import given_block
 
 from acquisition.clock import Clock, SystemClock
 from core.monitor.monitor import UnitMonitor
@@ -73,7 +74,7 @@ def blocks(plant: PlantFile, unit: str, n_blocks: int, seed: int) -> Iterator[Sa
         turning = size * np.cos(2 * np.pi * turn_hz * t_s - phase[:, np.newaxis])
         noise = rng.normal(0.0, 0.5, (n_channels, N_SAMPLES))
         samples = turning + noise + np.where(shaft, 2000.0, 0.0)[:, np.newaxis]
-        yield SampleBlock(
+        yield given_block(
             unit=unit,
             epoch=epoch,
             first_index=first,

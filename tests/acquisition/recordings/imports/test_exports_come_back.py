@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import RawBlock, calibrate
+from acquisition.delivery.blocks import BlockJoiner, RawBlock, cells_of, sample_block
 from acquisition.recordings.export import ExportFormat, export_recording
 from acquisition.recordings.imports.job import (
     ChannelColumn,
@@ -99,12 +99,15 @@ def test_every_block_is_the_same_to_the_last_bit(
     export_recording(recording, ExportFormat.CSV, tmp_path / "run.csv")
     found = read(tmp_path / "run.csv", JOB)
     calibration = recording.manifest.calibration
-    for again, before in itertools.zip_longest(found.blocks, recording.raw_blocks()):
+    joiner = BlockJoiner(50)
+    joined = [b for raw in found.blocks for b in joiner.put(sample_block([raw], calibration))]
+    cells = [cell for block in joined + joiner.flush() for cell in cells_of(block)]
+    for again, before in itertools.zip_longest(cells, recording.raw_blocks()):
         assert again.epoch == before.epoch - 1
         assert replace(again, epoch=0, counts=None, slow=()) == replace(
             before, epoch=0, counts=None, slow=()
         )
         np.testing.assert_array_equal(again.slow, before.slow)
-        first, second = calibrate(before, calibration), calibrate(again, calibration)
+        first, second = sample_block([before], calibration), sample_block([again], calibration)
         assert first.samples.tobytes() == second.samples.tobytes()
         assert first.channel_quality == second.channel_quality

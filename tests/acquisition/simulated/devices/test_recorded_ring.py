@@ -9,7 +9,7 @@ import pytest
 from rigs.modbus import transport_of
 
 from acquisition.clock import SystemClock
-from acquisition.delivery.calibration import RawBlock, UnitCalibration
+from acquisition.delivery.blocks import RawBlock, cells_of
 from acquisition.errors import ConfigError, LinkError
 from acquisition.modbus.ring_profile import RingLayout
 from acquisition.modbus.ring_source import RingSettings, RingSource
@@ -18,6 +18,7 @@ from acquisition.simulated.devices.ring_device import RingDevice, RingDeviceSett
 from acquisition.simulated.devices.ring_faults import ReadingWatch
 from acquisition.simulated.feed import FeedEndedError
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import UnitCalibration
 
 START_NS = 1_767_225_600 * 10**9
 
@@ -85,14 +86,15 @@ def assert_recorded(blocks: list[SampleBlock], found: dict[tuple[int, int], int]
     slots = [
         (epoch, first + 50 * n) for (epoch, first), n_slots in found.items() for n in range(n_slots)
     ]
-    assert [(block.epoch, block.first_index) for block in blocks] == slots
-    for block in blocks:
-        index = np.arange(block.first_index, block.stop_index)
-        np.testing.assert_array_equal(block.samples[0], index % 2**15)
-        passed_us = round(block.first_index * 1e9 / 600) // 1000
-        assert block.start_ns == START_NS + block.epoch * 10**12 + passed_us * 1000
-        assert (block.rejected, block.stamp_fault) == ((), None)
-        assert block.slow["slow0"].value == block.first_index // 50
+    assert all((block.rejected, block.stamp_fault) == ((), None) for block in blocks)
+    cells = [cell for block in blocks for cell in cells_of(block)]
+    assert [(cell.epoch, cell.first_index) for cell in cells] == slots
+    for cell in cells:
+        index = np.arange(cell.first_index, cell.stop_index)
+        np.testing.assert_array_equal(cell.counts[0], index % 2**15)
+        passed_us = round(cell.first_index * 1e9 / 600) // 1000
+        assert cell.start_ns == START_NS + cell.epoch * 10**12 + passed_us * 1000
+        assert cell.slow[0] == cell.first_index // 50
 
 
 @pytest.mark.parametrize("kind", [ModbusTcpServer, ModbusRtuServer, "patient"])

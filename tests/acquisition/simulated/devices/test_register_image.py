@@ -111,14 +111,18 @@ FLAGS = (
     {"ok_values": (1,), "clipped_values": (2,)},
     {"mask": 0xFF00, "ok_values": (0, 1, 2)},
 )
-FLAGS_OF_ONE_BIT = ({"set_means": Meaning.OK}, {"set_means": Meaning.BAD}, {"ok_values": (0,)})
+ONE_BIT = (
+    {"mask": 1, "set_means": Meaning.OK},
+    {"mask": 1, "set_means": Meaning.BAD},
+    {"mask": 1, "ok_values": (0,)},
+)
 BIT = {"type": NumberType.BIT}
 
 
 @pytest.mark.parametrize(
     ("flag", "cell"),
     [(flag, {"byte_order": o}) for flag in FLAGS for o in (ByteOrder.ABCD, ByteOrder.DCBA)]
-    + [(flag, BIT | at) for flag in FLAGS_OF_ONE_BIT for at in ({"bit": 3}, {"function": 2})],
+    + [(flag, BIT | at) for flag in ONE_BIT for at in ({"bit": 3}, {"function": 2})],
 )
 @pytest.mark.parametrize("good", [True, False])
 def test_a_flag_says_what_it_is_told_to_say(flag, cell, good: bool) -> None:

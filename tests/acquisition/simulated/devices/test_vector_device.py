@@ -5,12 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import (
-    ChannelCalibration,
-    RawBlock,
-    SlowCalibration,
-    UnitCalibration,
-)
+from acquisition.delivery.blocks import RawBlock
 from acquisition.modbus.decoding import MapDecoder
 from acquisition.modbus.polled_source import PolledSettings, PolledSource, vector_calibration
 from acquisition.modbus.transport import TcpTransport
@@ -20,6 +15,7 @@ from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
+from core.samples.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.spectra.polls import PollSettings, PollTransform, VectorPart, VectorRow
 from service.settings.sources.register_map import load_map_file
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from acquisition.delivery.calibration import COUNTS_FULL_SCALE, UnitCalibration
 from acquisition.errors import ConfigError
 from acquisition.simulated.plant.chain import KeyPhasePulses
 from acquisition.simulated.plant.faults import to_counts
@@ -13,8 +12,10 @@ from acquisition.simulated.plant.films import Film
 from acquisition.simulated.plant.plant import SimulatedPlant
 from acquisition.simulated.plant.scenario import KeyPhasePulse, Scenario, TransducerNoise
 from core.arrays import FloatArray
+from core.checks.channels import COUNTS_FULL_SCALE
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
+from core.samples.calibration import UnitCalibration
 from core.spectra.lines import exact_phasors, tapered
 from core.spectra.speed import KeyPhase, read_key_phase
 

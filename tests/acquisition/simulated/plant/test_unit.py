@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from acquisition.delivery.calibration import UnitCalibration, calibrate
+from acquisition.delivery.blocks import sample_block
 from acquisition.errors import ConfigError
 from acquisition.simulated.feed import SimulatedSource
 from acquisition.simulated.plant.films import Film
@@ -20,6 +20,7 @@ from core.arrays import FloatArray
 from core.machine.unit import Unit
 from core.quality import Level
 from core.samples.blocks import SampleBlock
+from core.samples.calibration import UnitCalibration
 
 BuildUnit = Callable[..., SimulatedUnit]
 
@@ -52,7 +53,7 @@ def test_a_healthy_unit_is_read_without_a_flag(
     build_unit: BuildUnit, calibration: UnitCalibration, full_load: Scenario, part_load: Scenario
 ) -> None:
     for scenario in (full_load, part_load):
-        block = calibrate(build_unit(scenario).advance(60 * 600), calibration)
+        block = sample_block([build_unit(scenario).advance(60 * 600)], calibration)
 
         assert all(quality.level is Level.GOOD for quality in block.channel_quality)
 
@@ -62,7 +63,7 @@ def test_slow_channels_agree_with_the_waveforms_and_the_truth(
 ) -> None:
     unit = build_unit(full_load)
     truth = unit.truth()
-    block = calibrate(unit.advance(390), calibration)
+    block = sample_block([unit.advance(390)], calibration)
     slow = {name: reading.value for name, reading in block.slow.items()}
 
     assert slow["speed"] == 92.3
@@ -163,7 +164,7 @@ async def test_an_unpaced_source_goes_on_where_it_was_left(
 
     assert [block.first_index for block in blocks] == [0, 500, 1000, 1500, 2000]
     assert stepped_clock.monotonic_s() == 3600.0
-    expected = calibrate(build_unit(full_load).advance(2500), calibration)
+    expected = sample_block([build_unit(full_load).advance(2500)], calibration)
     assert np.array_equal(np.concatenate([b.samples for b in blocks], axis=1), expected.samples)
 
 

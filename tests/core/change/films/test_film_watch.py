@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.baseline.history import ReadingOutcome, Watched
+from core.baseline.history import ReadingOutcome
 from core.change.backtest import decide_all, last_decision, last_operation, operation_history
 from core.change.decision import JUDGED, Verdict, WatchedReadings
 from core.change.film_judge import FilmFinding, alarm_condition
@@ -37,7 +37,7 @@ def test_results_one_by_one_are_judged_as_their_whole_history_is(
     assert [n.reading.time_ns for n in news] == said.time_ns.tolist()
     assert [n.reading.condition.is_settled for n in news] == settled.tolist()
     for row, direction in enumerate("xy"):
-        learned = films.baseline.of(Watched.STIFFNESS, direction)
+        learned = films.baseline.of(direction)
         whole = decide_all(WatchedReadings.of(said, settled, direction), learned, rules.change)
         findings = [n.findings[row] for n in news]
         assert [f.verdict for f in findings] == whole.verdict.tolist()
@@ -70,7 +70,7 @@ def test_decisions_caught_up_with_are_those_that_would_have_been_made(
     made = films.watched(history)
     settled = np.array([n.reading.condition.is_settled for n in made])
     for row, direction in enumerate("xy"):
-        learned = films.baseline.of(Watched.STIFFNESS, direction)
+        learned = films.baseline.of(direction)
         caught = last_decision(history.rows(1, len(history)), settled, learned, rules)
         through = made[-1].decisions[row]
         assert (caught.verdict, caught.level) == (through.verdict, through.level)

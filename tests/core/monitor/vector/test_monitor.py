@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from rigs.blocks import of_unit
 from rigs.racks import AMPLITUDES, GAPS, K_B, RATE_HZ, SLOW, VORTEX, blocks_of, polls, watch
 
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
@@ -204,9 +205,9 @@ def test_a_restart_begins_a_new_average(rack) -> None:
 def test_a_block_of_something_else_is_refused(rack) -> None:
     [block] = polls(60.0, 50.0, 20.0, 10.0, n=1)
     with pytest.raises(ValueError, match="block of unit 'U2'"):
-        rack().ingest(replace(block, unit="U2"))
+        rack().ingest(of_unit(block, unit="U2"))
     with pytest.raises(ValueError, match=r"1\.0 Hz, configured 0\.2 Hz"):
-        rack().ingest(replace(block, rate_hz=1.0))
+        rack().ingest(of_unit(block, rate_hz=1.0))
     with pytest.raises(ValueError, match="4 channels offered to a ring of 6"):
         rack(AMPLITUDES + GAPS).ingest(block)
     with pytest.raises(ValueError, match="no channel of unit"):

@@ -1,9 +1,8 @@
 """What phases and uncertainty add to the amplitudes of a rack."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from rigs.blocks import with_quality
 from rigs.racks import AMPLITUDES, K_B, PHASES, blocks_of, polls, watch
 
 from core.machine.unit import BearingAccuracy
@@ -116,10 +115,7 @@ def test_vectors_that_do_not_hang_together_or_are_exchanged_are_doubted(rack) ->
 
 
 def test_a_phase_that_is_bad_is_no_phase(rack) -> None:
-    blocks = [
-        replace(b, channel_quality=(GOOD,) * 6 + (bad(Reason.SENSOR_FAILURE),) * 2)
-        for b in vectors()
-    ]
+    blocks = [with_quality(b, (GOOD,) * 6 + (bad(Reason.SENSOR_FAILURE),) * 2) for b in vectors()]
     newest = watch(rack(AMPLITUDES + PHASES), blocks)[-1]
 
     assert newest.readings["order1_transfer_k_xx_n_per_m"] == missing(Reason.NOT_MEASURED)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from core.baseline.history import DIRECTIONS, StiffnessHistory, Watched
+from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.change.film_judge import FilmNews
 from core.machine.unit import Estimator
 from core.monitor.assessment import Assessment
@@ -107,7 +107,7 @@ class Machine:
 
     def _learned(self, direction: str) -> float:
         """What was learned of the upper bearing under that condition, in ln."""
-        learned = self._service.films.baseline("U1", "UJB").of(Watched.STIFFNESS, direction)
+        learned = self._service.films.baseline("U1", "UJB").of(direction)
         newest = self._lived.conditions.rows(np.array([len(self._lived) - 1]))
         return float(learned.surface.at(newest)[0])
 

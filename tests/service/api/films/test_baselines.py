@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rigs.probes import post
 
-from core.baseline.history import StiffnessHistory, Watched
+from core.baseline.history import StiffnessHistory
 from service.runtime.times import rfc3339
 from service.store.documents import baseline_from_json
 
@@ -58,7 +58,7 @@ async def test_a_bearing_without_a_baseline_says_how_far_learning_is(
 async def test_cells_and_export_are_what_was_learned(learned: Any) -> None:
     found = await learned.json(f"{BASELINES}/1")
 
-    baseline = learned.store.films.baseline("U1", "UJB", 1).of(Watched.STIFFNESS, "x")
+    baseline = learned.store.films.baseline("U1", "UJB", 1).of("x")
     cells, stored = found["x"]["cells"], baseline.table.cells
     assert {len(column) for column in cells.values() if column} == {len(stored)}
     assert cells["stiffness_n_per_m"] == pytest.approx([np.exp(c.location) for c in stored])
