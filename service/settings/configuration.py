@@ -1,4 +1,4 @@
-"""`Configuration`: the settings of the plant file under a name that changes with each of them."""
+"""`Configuration`: the settings of the plant file without secrets, named by their hash."""
 
 import hashlib
 import json
@@ -14,12 +14,12 @@ FORMAT = "padwatch-configuration"
 LEFT_OUT = "left out"
 
 SECRETS = ("secret", "authorization", "password", "username")
-"""Keys whose values do not leave the plant file, wherever they stand."""
+"""Keys whose values are secret, in any table."""
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """A configuration in full, and its version: the SHA-256 of that.
+    """A configuration and its version, the SHA-256 of its text.
 
     Parameters
     ----------
@@ -31,12 +31,12 @@ class Configuration:
 
     @property
     def version(self) -> str:
-        """Its name."""
+        """SHA-256 of the text."""
         return hashlib.sha256(self.text).hexdigest()
 
 
 def configuration_of(plant: PlantFile, program: str, commit: str | None) -> Configuration:
-    """The configuration of a plant file, without its secrets.
+    """Return the configuration of a plant file without its secrets.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def configuration_of(plant: PlantFile, program: str, commit: str | None) -> Conf
 
 
 def canonical(document: object) -> bytes:
-    """One and the same text for one and the same document."""
+    """Return the canonical text of a document."""
     text = json.dumps(
         document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
     )
@@ -57,7 +57,7 @@ def canonical(document: object) -> bytes:
 
 
 def without_secrets(value: Any) -> Any:
-    """The same settings without what only the plant should know."""
+    """Return the settings without secrets."""
     if isinstance(value, dict):
         return {key: _shown(key, each) for key, each in value.items()}
     if isinstance(value, list | tuple):
@@ -66,7 +66,7 @@ def without_secrets(value: Any) -> Any:
 
 
 def built_from() -> str | None:
-    """The commit that padwatch was installed from; None if it was not installed from one."""
+    """Return the commit that padwatch was installed from, if known."""
     try:
         text = distribution("padwatch").read_text("direct_url.json")
     except PackageNotFoundError:
@@ -79,6 +79,6 @@ def _shown(key: str, value: Any) -> Any:
     if key in SECRETS and value is not None:
         return LEFT_OUT
     if key == "url" and isinstance(value, str):
-        parts = urlsplit(value)  # its path may be as good as a password
+        parts = urlsplit(value)  # its path may contain a token
         return f"{parts.scheme}://{parts.hostname}/ ({LEFT_OUT})"
     return without_secrets(value)

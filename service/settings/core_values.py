@@ -41,11 +41,11 @@ ACCURACY_KEYS = {
     "thermal_growth_change_um",
     "clearance_uncertainty",
 }
-"""Keys of a bearing that say how well something is known."""
+"""Keys of a bearing that state uncertainties."""
 
 
 def machine_of(settings: UnitSettings) -> Unit:
-    """The unit as the numerics see it."""
+    """Return the unit in core's terms."""
     return Unit(
         id=settings.id,
         rated_speed_rpm=settings.rated_speed_rpm,
@@ -105,7 +105,7 @@ def _gains(unit: UnitSettings) -> dict[str, float]:
 
 
 def _accuracy(settings: BearingSettings, unit: UnitSettings) -> BearingAccuracy:
-    """The worse of two transducers stands for both directions."""
+    """Return the worse of two transducers, for both directions."""
     gain = _gains(unit)
     return BearingAccuracy(
         shaft_gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
@@ -119,7 +119,7 @@ def _accuracy(settings: BearingSettings, unit: UnitSettings) -> BearingAccuracy:
 
 
 def calibration_of(settings: UnitSettings) -> UnitCalibration:
-    """How the counts of the unit's device become engineering units."""
+    """Return the calibration from the device's counts to engineering units."""
     return UnitCalibration(
         unit=settings.id,
         rate_hz=settings.rate_hz,
@@ -130,7 +130,7 @@ def calibration_of(settings: UnitSettings) -> UnitCalibration:
 
 
 def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
-    """How samples are segmented, averaged and judged."""
+    """Return the settings of segments, averaging and assessment."""
     dynamic = settings.dynamic
     noise = dynamic.probe_noise_um2_per_hz
     return AnalysisSettings(
@@ -151,11 +151,11 @@ def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
 
 
 ZONE_DEADBAND = 0.05
-"""Of the boundary between A and B, where no deadband is given."""
+"""Default deadband as a share of the boundary between A and B."""
 
 
 def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitRules:
-    """What is watched on a unit; of a replay neither the link nor the clock."""
+    """Return the alarm rules of a unit; a replay has no rules of link and clock."""
     is_live = origin is Origin.LIVE
     is_judged = is_live and alarms.clock == "judged"
     return UnitRules(
@@ -170,12 +170,12 @@ def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitR
 
 
 def chatter_rule_of(alarms: AlarmSettings) -> ChatterRule:
-    """What counts as chattering."""
+    """Return the rule of chattering alarms."""
     return ChatterRule(alarms.chattering_activations, ns_from_s(alarms.chattering_window_s))
 
 
 def references_of(unit: UnitSettings) -> list[VectorReference]:
-    """Vectors of the plant file that 1× is compared with."""
+    """Return the 1× reference vectors of the plant file."""
     return [
         VectorReference(unit.id, bearing.id, state, _vectors(reference))
         for bearing in unit.bearing
@@ -238,12 +238,12 @@ def _table(table: ZoneTableSettings) -> ZoneLimits:
 
 
 def _clock_limit(limit: float, delay_s: float) -> LimitRule:
-    """A tenth of the limit is its deadband."""
+    """Return a limit of the clock with a deadband of a tenth."""
     return LimitRule(Limits(limit, deadband=limit / 10), rule_of(delay_s, delay_s))
 
 
 def film_rules_of(unit: UnitSettings, settings: FilmAlarmSettings) -> FilmRules | str:
-    """How the films of a unit are watched, or why they cannot be."""
+    """Return the film rules of a unit, or why its films cannot be watched."""
     if unit.power_channel is None or unit.rated_power_mw is None:
         return "operating states need power_channel and rated_power_mw"
     estimators = {
@@ -264,9 +264,9 @@ def film_rules_of(unit: UnitSettings, settings: FilmAlarmSettings) -> FilmRules 
 
 
 def watched_estimator(unit: UnitSettings, bearing: BearingSettings) -> Estimator:
-    """Whose stiffness is compared: one and the same, so that like meets like."""
+    """Return the estimator whose stiffness is compared; one estimator makes it comparable."""
     if bearing.watched_estimator is not None:
         return bearing.watched_estimator
     if isinstance(unit.source, ModbusVectorSettings):
-        return Estimator.RATIO_ORDER1  # all that amplitudes alone can give
+        return Estimator.RATIO_ORDER1  # the only estimator from amplitudes alone
     return bearing.preference[0]

@@ -1,4 +1,4 @@
-"""How films are compared with what they were like: conditions, baselines, limits of change."""
+"""Monitoring of film stiffness: conditions, baselines and limits of change."""
 
 from typing import Annotated, Literal, Self
 
@@ -51,12 +51,12 @@ class ChangeLimitSettings(Settings):
         return self
 
     def limits(self) -> ChangeLimits:
-        """As the decision takes them; the latch is the alarm's."""
+        """Return the limits of core's decision; latching belongs to the alarm."""
         return ChangeLimits(**self.model_dump())
 
 
 class BaselineModel(Settings):
-    """What a baseline needs to be learned."""
+    """Requirements for learning a baseline."""
 
     eccentricity_width: Annotated[float, Field(ge=0.005, le=0.5)] = CellGrid.eccentricity_width
     """Width of a cell in eccentricity ratio; example: 0.05."""
@@ -91,7 +91,7 @@ class BaselineModel(Settings):
         return self
 
     def settings(self, reading_h: float = BaselineSettings.reading_h) -> BaselineSettings:
-        """As learning takes them, for readings that stand for so many running hours."""
+        """Return the settings of core's learning, for readings of this many running hours."""
         rest = self.model_dump(exclude=set(GRID_KEYS))
         grid = CellGrid(*(getattr(self, key) for key in GRID_KEYS))
         return BaselineSettings(grid=grid, reading_h=reading_h, **rest)
@@ -150,7 +150,7 @@ class OperatingModel(Settings):
         return self
 
     def limits(self, rated_speed_rpm: float, rated_power_mw: float) -> OperatingLimits:
-        """Limits of a machine."""
+        """Return the operating limits of a machine."""
         return OperatingLimits(rated_speed_rpm, rated_power_mw, **self.model_dump())
 
 
@@ -203,5 +203,5 @@ class FilmAlarmSettings(Settings):
 
     @property
     def reading_h(self) -> float:
-        """Running hours that a reading stands for."""
+        """Running hours per reading."""
         return self.reading_period_s * self.time_lapse / 3600.0

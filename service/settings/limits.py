@@ -53,7 +53,7 @@ class RegionSettings(Settings):
         return self
 
     def region(self, states: StateNames) -> Region:
-        """The region as alarms know it; in these states where it gives none."""
+        """Return the region in core's terms; these states apply if it names none."""
         return Region(states_of(self.states or states), *(getattr(self, key) for key in RANGES))
 
 
@@ -66,7 +66,7 @@ RANGES = {
 
 
 def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None:
-    """Refuse tables of which two may hold at once; those without states hold in these."""
+    """Refuse overlapping tables; a table without states holds in these."""
     regions = [table.region(states) for table in tables]
     for n, m in combinations(range(len(tables)), 2):
         if regions[n].overlaps(regions[m]):
@@ -145,7 +145,7 @@ class LimitSettings(WatchSettings):
         return self
 
     def within(self, table: LimitTableSettings) -> Self:
-        """The limits in the region of a table: its own, and for the rest these."""
+        """Return the limits in the region of a table; missing ones are taken from here."""
         own = {key: getattr(self, key) for key in LIMITS if hasattr(self, key)}
         given = {key: getattr(table, key) for key in LIMITS if getattr(table, key) is not None}
         return type(self).model_validate(own | given)
@@ -381,6 +381,6 @@ class VectorReferenceSettings(Settings):
         return self
 
     def vectors(self) -> dict[str, Vector]:
-        """Those that are given, by place."""
+        """Return the given vectors by place."""
         found = {place: getattr(self, place) for place in PLACES}
         return {place: vector for place, vector in found.items() if vector is not None}

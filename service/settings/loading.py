@@ -26,7 +26,7 @@ def plant_file_schema() -> dict[str, Any]:
 
 
 def description(location: Sequence[int | str]) -> str:
-    """Meaning of a key, in one line; empty if it is unknown."""
+    """Return the meaning of a key in one line; empty if the key is unknown."""
     node: dict[str, Any] = plant_file_schema()
     text = ""
     for part in location:
@@ -39,7 +39,7 @@ def description(location: Sequence[int | str]) -> str:
 
 
 def known_keys(location: Sequence[int | str]) -> list[str]:
-    """Keys that a table of the plant file may have."""
+    """Return the keys that a table of the plant file may have."""
     node: dict[str, Any] | None = plant_file_schema()
     for part in location:
         node = _step(node, part) if node is not None else None
@@ -58,7 +58,7 @@ def _step(node: dict[str, Any], part: int | str) -> dict[str, Any] | None:
 
 
 def _options(node: dict[str, Any]) -> list[dict[str, Any]]:
-    """Follow references and alternatives down to schemas that say something themselves."""
+    """Resolve references and alternatives to the schemas behind them."""
     if "$ref" in node:
         name = str(node["$ref"]).rsplit("/", 1)[-1]
         return _options(plant_file_schema()["$defs"][name])
@@ -75,12 +75,12 @@ UNION_ERRORS = ("union_tag_invalid", "union_tag_not_found")
 
 
 def is_echo(error: ErrorDetails) -> bool:
-    """Whether a list is only called too short because its elements are wrong, as said elsewhere."""
+    """Return whether a list is too short only because its elements are reported as wrong."""
     return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
 
 
 def located(error: ErrorDetails, data: Mapping[str, Any]) -> Location:
-    """Where in the file a mistake is."""
+    """Return the place of a mistake in the file."""
     location = _without_tags(error["loc"], data)
     reason = error.get("ctx", {}).get("error")
     if isinstance(reason, MisfitError):
@@ -89,7 +89,7 @@ def located(error: ErrorDetails, data: Mapping[str, Any]) -> Location:
 
 
 def sentence(error: ErrorDetails, location: Location, data: Mapping[str, Any]) -> str:
-    """The mistake in words."""
+    """Return the message of a mistake."""
     key = "".join(_entry(part) for part in location).lstrip(".")
     found, value = _value(data, location)
     shown = f"{key} = {_shown(value)}"
@@ -111,7 +111,7 @@ def sentence(error: ErrorDetails, location: Location, data: Mapping[str, Any]) -
 
 
 def _entry(part: int | str) -> str:
-    """One step of a place; a key may be any text, but a message stays one line."""
+    """Format one step of a place on one line; a key may be any text."""
     if isinstance(part, int):
         return f"[{part + 1}]"
     return f".{part}" if part.isprintable() else f".{part!r}"
@@ -124,7 +124,7 @@ def _shown(value: Any) -> str:
 
 
 def _value(data: Any, location: Location) -> tuple[bool, Any]:
-    """Whether the file has something there, and what."""
+    """Return whether the file has a value at a place, and the value."""
     for part in location:
         inside = isinstance(data, dict) and part in data
         listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
@@ -135,7 +135,7 @@ def _value(data: Any, location: Location) -> tuple[bool, Any]:
 
 
 def _without_tags(location: Location, data: Any) -> Location:
-    """Drop what pydantic puts into a location beside the file's own keys: union tags."""
+    """Remove the union tags that pydantic adds to the keys of the file."""
     kept: Location = ()
     for part in location:
         _, table = _value(data, kept)
@@ -145,7 +145,7 @@ def _without_tags(location: Location, data: Any) -> Location:
 
 
 MAX_FILE_BYTES = 4_000_000
-"""Far above any plant; keeps a wrong path (a device, a recording) from filling the memory."""
+"""Far above any plant file; limits memory when the path is wrong (a device, a recording)."""
 
 TOO_DEEP = "nested too deeply for a plant file"
 
@@ -162,16 +162,16 @@ def load_plant_file(path: Path) -> PlantFile:
     Raises
     ------
     PlantFileError
-        If it cannot be read or anything in it is wrong; every mistake is named, not only the first.
+        If the file cannot be read or is wrong; the message names every mistake.
     """
     text = _read(path)
     data = _parsed(path, text)
     try:
-        # JSON, because only there strict (no text or truth for a number) lets a list be a tuple
+        # only in JSON does strict mode (no text or boolean for a number) accept a list as a tuple
         return PlantFile.model_validate_json(
             json.dumps(data, default=str), strict=True, context={FOLDER: path.parent}
         )
-    except RecursionError as error:  # of dotted keys, which TOML reads without going deep
+    except RecursionError as error:  # from dotted keys, which TOML parses without recursion
         raise PlantFileError(f"{path}: {TOO_DEEP}") from error
     except ValidationError as error:
         if error.errors()[0]["type"] == "json_invalid":

@@ -1,4 +1,4 @@
-"""Who is told of alarms: webhooks and e-mail in the plant file."""
+"""Receivers of notifications in the plant file: webhooks and mail servers."""
 
 import re
 from typing import Annotated, Literal, Self
@@ -32,7 +32,7 @@ TOLD = (AlarmChange.RAISED, AlarmChange.ESCALATED, AlarmChange.EASED, AlarmChang
 
 
 class SecretSettings(Settings):
-    """Where a secret is: it never stands in the plant file itself."""
+    """Place of a secret outside the plant file."""
 
     file: Annotated[str, StringConstraints(min_length=1)] | None = None
     """File that holds it and nothing else; read before every message, so that a new one is taken
@@ -49,7 +49,7 @@ class SecretSettings(Settings):
 
 
 class QuietSettings(Settings):
-    """Hours in which what is no danger waits, every day; from start to end over midnight too."""
+    """Daily quiet hours, in which only danger is sent; they may span midnight."""
 
     start: TimeOfDay
     """When they begin; example: "22:00"."""
@@ -58,7 +58,7 @@ class QuietSettings(Settings):
     """When they end; example: "06:00"."""
 
     time_zone: Annotated[str, StringConstraints(min_length=1, max_length=64)]
-    """Whose hours these are, by the IANA's name; example: "America/Asuncion"."""
+    """IANA name of the time zone of the hours; example: "America/Asuncion"."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -72,41 +72,41 @@ class QuietSettings(Settings):
 
 
 class _ReceiverSettings(Settings):
-    """What every receiver has."""
+    """Settings that all receivers share."""
 
     id: Identifier
     """Shown with its backlog; what waits for it is kept under this name."""
 
     units: tuple[str, ...] | None = None
-    """Units whose alarms it is told of; all unless given; example: ["U1"]."""
+    """Units whose alarms it receives; all unless given; example: ["U1"]."""
 
     kinds: tuple[AlarmKindName, ...] | None = None
-    """Kinds of alarms that it is told of; all unless given. Example: ["link_lost"]."""
+    """Kinds of alarms that it receives; all unless given. Example: ["link_lost"]."""
 
     changes: Annotated[tuple[AlarmChange, ...], Field(min_length=1)] = TOLD
-    """What must happen to an alarm for it to be told."""
+    """Changes of an alarm that are sent."""
 
     lowest_priority: Literal["alert", "danger"] = "alert"
-    """"alert" tells of everything, "danger" only of alarms that are, or have ceased to be, one."""
+    """"alert" sends all alarms, "danger" only alarms that are, or were, a danger."""
 
     quiet: QuietSettings | None = None
-    """Hours in which what is no danger waits."""
+    """Quiet hours, in which only danger is sent."""
 
     connect_timeout_s: TimeoutS = 10.0
-    """Longest time to look its name up and reach it, s."""
+    """Longest time to resolve the name and connect, s."""
 
     answer_timeout_s: TimeoutS = 30.0
-    """Longest silence while it is talked to, s."""
+    """Longest wait for an answer, s."""
 
     total_timeout_s: TimeoutS = 60.0
-    """Longest time that one attempt may take in all, s."""
+    """Longest duration of one attempt, s."""
 
     max_retry_s: Annotated[float, Field(ge=1.0, le=86_400.0)] = 900.0
     """Longest wait between two attempts, s; the first is after about one second, then twice as long
-    each time. A receiver that asks for a longer one does not get it."""
+    each time. A longer wait requested by the receiver is ignored."""
 
     max_age_h: Annotated[float, Field(ge=0.1, le=8760.0)] = 72.0
-    """What is older than this when an attempt fails is given up, hours."""
+    """Age of a message above which a failed attempt is the last, hours."""
 
     ca_file: Annotated[str, StringConstraints(min_length=1)] | None = None
     """Certificates (PEM) to trust instead of the system's; for a plant with a CA of its own;
@@ -120,7 +120,7 @@ class WebhookSettings(_ReceiverSettings):
     """"webhook": an HTTP address that takes JSON."""
 
     url: Annotated[str, StringConstraints(min_length=1, max_length=2000)]
-    """Where to; redirects are not followed. Example: "https://alarms.example/padwatch"."""
+    """URL; redirects are not followed. Example: "https://alarms.example/padwatch"."""
 
     secret: SecretSettings | None = None
     """Key that signs each message (HMAC-SHA-256); unsigned without."""
@@ -154,16 +154,16 @@ class SmtpSettings(_ReceiverSettings):
     """"starttls" (refused if the server does not offer it), "implicit" from the start, "none"."""
 
     username: Annotated[str, StringConstraints(min_length=1, max_length=200)] | None = None
-    """To log in with; no login without."""
+    """Name for the login; no login unless given."""
 
     password: SecretSettings | None = None
-    """Password that goes with it."""
+    """Password for the login."""
 
     sender: MailAddress
-    """Who the mails are from; example: "padwatch@plant.example"."""
+    """Sender of the mails; example: "padwatch@plant.example"."""
 
     recipients: Annotated[tuple[MailAddress, ...], Field(min_length=1, max_length=50)]
-    """Who gets them; each is served apart, so that no mailbox waits for another."""
+    """Recipients; each has its own queue, so that no mailbox delays another."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -179,11 +179,11 @@ ReceiverSettings = Annotated[WebhookSettings | SmtpSettings, Field(discriminator
 
 
 class DeliverySettings(Settings):
-    """Who is told of alarms, beside the dashboard."""
+    """Receivers of notifications."""
 
     dashboard_url: Annotated[str, StringConstraints(max_length=2000)] | None = None
-    """Where people reach the dashboard, for the link in each message; the service's own host and
-    port unless given. Example: "https://padwatch.plant.example/"."""
+    """URL of the dashboard for the link in each message; the service's own host and port unless
+    given. Example: "https://padwatch.plant.example/"."""
 
     receiver: Annotated[tuple[ReceiverSettings, ...], Field(max_length=50)] = ()
     """Receivers."""
@@ -197,7 +197,7 @@ class DeliverySettings(Settings):
         return self
 
     def require_units(self, known: tuple[str, ...]) -> None:
-        """Refuse a receiver that wants to be told of a unit that there is not."""
+        """Refuse a receiver of an unknown unit."""
         for number, receiver in enumerate(self.receiver):
             for place, unit in enumerate(receiver.units or ()):
                 if unit not in known:
@@ -206,7 +206,7 @@ class DeliverySettings(Settings):
 
 
 def url_fault(url: str) -> str | None:
-    """What is wrong with an address; None if it can be used."""
+    """Return why an address cannot be used, or None."""
     try:
         parts = urlsplit(url)
         port = parts.port

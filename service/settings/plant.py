@@ -70,7 +70,7 @@ MIN_SPECTRUM_ORDERS = 2
 
 
 class PlantSettings(Settings):
-    """The plant as people know it."""
+    """Name of the plant."""
 
     name: Annotated[str, StringConstraints(min_length=1, max_length=80)]
     """Shown on every page; example: "Itaipu"."""
@@ -103,7 +103,7 @@ class ServiceSettings(Settings):
     ["padwatch.plant.example"]."""
 
     limits: HttpLimitSettings = HttpLimitSettings()
-    """What one client may cost."""
+    """Limits of the requests of one client."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

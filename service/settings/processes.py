@@ -154,18 +154,18 @@ class StreamSettings(Settings):
 
 @dataclass(frozen=True)
 class Doorway:
-    """How the service would be reached.
+    """Address and protection of the service.
 
     Parameters
     ----------
     host
-        Address that it listens on.
+        Address that the service listens on.
     is_unix_socket
-        Whether it listens on a unix socket instead, which only a trusted proxy can open.
+        Whether it listens on a Unix socket, which only a trusted proxy can open.
     has_tls
         Whether it has a certificate and its key.
     has_account
-        Whether anybody could log in.
+        Whether an account exists.
     """
 
     host: str
@@ -175,9 +175,9 @@ class Doorway:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether an address is reached from its own host alone.
+    """Return whether an address is reachable from its own host only.
 
-    Of names only `localhost` is: what another one means is not padwatch's to say.
+    Of names only `localhost` counts; padwatch does not resolve others.
     """
     if host == "localhost":
         return True
@@ -189,7 +189,7 @@ def is_loopback(host: str) -> bool:
 
 
 def why_closed(doorway: Doorway) -> str | None:
-    """Why the service does not start at an address, in one sentence; None if it may."""
+    """Return why the service must not start at an address, or None."""
     if doorway.is_unix_socket or is_loopback(doorway.host):
         return None
     missing = [

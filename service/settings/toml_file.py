@@ -21,14 +21,14 @@ KEY = re.compile(r"^\s*([A-Za-z0-9_.-]+)\s*=")
 
 
 def line_of(location: Location, text: str) -> int:
-    """Line of a key, or of the innermost table around it that stands on a line of its own."""
+    """Return the line of a key, or of the innermost table around it with its own line."""
     lines = dict(_lines(text))
     starts = (location[:n] for n in range(len(location), 0, -1))
     return next((lines[start] for start in starts if start in lines), 1)
 
 
 def _lines(text: str) -> Iterator[tuple[Location, int]]:
-    """Line numbers of tables and keys, as far as they stand at the start of a line."""
+    """Yield the line numbers of the tables and keys at the start of a line."""
     table: Location = ()
     counts: dict[Location, int] = {}
     for number, line in enumerate(text.split("\n"), start=1):
@@ -42,7 +42,7 @@ def _lines(text: str) -> Iterator[tuple[Location, int]]:
 
 
 def _table_location(names: list[str], is_array: bool, counts: dict[Location, int]) -> Location:
-    """Where a header leads: names, and after each array of tables the number of its element."""
+    """Return the location of a header: names, and the element number after array tables."""
     location: Location = ()
     for position, name in enumerate(names):
         location = (*location, name.strip('"'))
@@ -69,12 +69,12 @@ def load_toml(path: Path, model: type[Model], tags: Sequence[str] = ()) -> Model
     Parameters
     ----------
     tags
-        What pydantic puts into a place for the kinds of a union, and the file does not have.
+        Union tags that pydantic adds to a location and the file does not have.
 
     Raises
     ------
     TomlFileError
-        If it cannot be read or anything in it is wrong.
+        If the file cannot be read or is wrong.
     """
     text = _read(path)
     try:
@@ -82,9 +82,9 @@ def load_toml(path: Path, model: type[Model], tags: Sequence[str] = ()) -> Model
     except (ValueError, RecursionError) as error:
         raise TomlFileError(f"{path}: not TOML: {error}") from error
     try:
-        # JSON, because only there strict (no text for a number) lets a list be a tuple
+        # only in JSON does strict mode (no text for a number) accept a list as a tuple
         return model.model_validate_json(json.dumps(data, default=str), strict=True)
-    except RecursionError as error:  # of dotted keys, which TOML reads without going deep
+    except RecursionError as error:  # from dotted keys, which TOML parses without recursion
         raise TomlFileError(f"{path}: nested too deeply") from error
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
@@ -112,5 +112,5 @@ def _line(path: Path, text: str, error: ErrorDetails, tags: Sequence[str]) -> st
     for part in reason.at if isinstance(reason, MisfitError) else ():
         value = value.get(part) if isinstance(value, dict) else None
     shown = f" = {value!r}"[:_MAX_SHOWN] if isinstance(value, int | float | str) else ""
-    said = f"{key}{shown}: {words}".replace("\n", "\\n")  # a key may hold anything
+    said = f"{key}{shown}: {words}".replace("\n", "\\n")  # a key may contain line breaks
     return f"{path}:{line_of(at, text)}: {said}"

@@ -30,13 +30,13 @@ class SheetError(Exception):
 def read_calibration_sheet(path: Path) -> ResponseTable:
     """Read a sheet whose first line names its columns and whose others are points.
 
-    Lines that begin with # and empty lines at the end count for nothing.
+    Lines that begin with # and empty lines at the end are ignored.
 
     Raises
     ------
     SheetError
-        If the file cannot be read, a column or a value is missing, a number is none or not finite,
-        frequencies do not rise from above zero, or a magnitude is not above zero.
+        If the file cannot be read, a column or a value is missing, a value is not a finite number,
+        frequencies do not increase from above zero, or a magnitude is not above zero.
     """
     rows = _rows(path, _read(path))
     number, header = next(rows, (1, []))
@@ -67,7 +67,7 @@ def _read(path: Path) -> str:
 
 
 def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
-    """Line numbers and cells."""
+    """Yield line numbers and cells."""
     for number, line in enumerate(text.splitlines(), start=1):
         if line.startswith("#"):
             continue
@@ -130,7 +130,7 @@ class HighPassSettings(Settings):
     """Share of critical damping, of order 2 alone; default: -3 dB at the natural frequency."""
 
     def response(self) -> Response:
-        """Describe the part as the numerics see it."""
+        """Return the part in core's terms."""
         return HighPass(self.corner_hz, self.order, self.damping)
 
 
@@ -147,7 +147,7 @@ class ResonanceSettings(Settings):
     """Share of critical damping; example: 0.02."""
 
     def response(self) -> Response:
-        """Describe the part as the numerics see it."""
+        """Return the part in core's terms."""
         return Resonance(self.natural_hz, self.damping)
 
 
@@ -174,7 +174,7 @@ class SheetSettings(Settings):
         return self
 
     def response(self) -> Response:
-        """Describe the part as the numerics see it."""
+        """Return the part in core's terms."""
         return self._table
 
 
@@ -185,7 +185,7 @@ ResponseSettings: TypeAlias = Annotated[
 
 
 def response_of(parts: Sequence[ResponseSettings]) -> Response | None:
-    """Describe all parts together as the numerics see them; none is a flat response."""
+    """Return all parts in core's terms; an empty tuple is a flat response."""
     if not parts:
         return None
     return ResponseChain(tuple(part.response() for part in parts))

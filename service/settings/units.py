@@ -34,14 +34,14 @@ def require_source_fit(
     Parameters
     ----------
     beside
-        The device that slow channels are polled from, if there is one.
+        Device that slow channels are polled from, if there is one.
     channels, slow
         Ids of the unit's waveform and slow channels.
 
     Raises
     ------
     MisfitError
-        Saying which, and what is needed.
+        Names the channel and the requirement.
     """
     if beside is not None:
         beside.require_fit(slow)
@@ -56,17 +56,17 @@ def require_source_fit(
 
 
 def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]]) -> None:
-    """Refuse a serial line that two devices of the plant file are read on: it has one master.
+    """Refuse a serial line that two devices of the plant file share: a line has one master.
 
     Parameters
     ----------
     readers
-        Where in the file each device stands, and its settings.
+        Place of each device in the file, and its settings.
 
     Raises
     ------
     MisfitError
-        Naming who reads it already.
+        Names the device that uses the line already.
     """
     taken: dict[str, tuple[int | str, ...]] = {}
     for at, device in readers:
@@ -85,7 +85,7 @@ def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]])
 
 
 FROM_WAVEFORMS = ("shaft_overall_um_pp", "bearing_overall_mm_s_rms")
-"""Limits of what a rack that gives amplitudes does not give."""
+"""Limits of quantities that a vector rack does not measure."""
 
 ZONES = ("shaft_um_pp", "shaft_max_um_pk", "bearing_mm_s_rms")
 
@@ -97,12 +97,12 @@ def require_alarm_fit(
     channels: Iterable[ChannelSettings],
     bearings: Sequence[BearingSettings],
 ) -> None:
-    """Refuse limits of what is not measured.
+    """Refuse limits of quantities that are not measured.
 
     Raises
     ------
     MisfitError
-        With the place of the first.
+        With the place of the first mistake.
     """
     if unit == PLANT:
         raise MisfitError("is kept for alarms of the whole plant; choose another", "id")
