@@ -32,7 +32,7 @@ from service.measuring.counters import store_info
 from service.measuring.service_alarms import SHARED, StreamLook
 from service.measuring.sources import WatchedUnit
 from service.measuring.timings import Timings, timed_monitors
-from service.notifications.message import Around
+from service.notifications.message import LiveContext
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
@@ -148,16 +148,16 @@ async def run_analyse(
     """
     part = partition.part_of(plant)
     live = live_view(part, clock)
-    around = Around(live)
+    alarm_context = LiveContext(live)
     with ExitStack() as stack:
         if plant.store.postgresql is None:
             stack.enter_context(only_one(database_path(plant)))
-        store = open_store(part, Origin.LIVE, router_of(part, Origin.LIVE, around, clock))
+        store = open_store(part, Origin.LIVE, router_of(part, Origin.LIVE, alarm_context, clock))
         stack.callback(store.close)
         ground = Ground(
             part, Origin.LIVE, clock, store, live, Heartbeats(clock), Timings(monitors, clock)
         )
-        analysing = Analysing(plant, partition, settings, monitors, ground, around)
+        analysing = Analysing(plant, partition, settings, monitors, ground, alarm_context)
         try:
             await analysing.run(listener, announce, manager)
         finally:
@@ -174,10 +174,10 @@ class Analysing:
         settings: StreamSettings,
         monitors: Mapping[str, UnitMonitor],
         ground: Ground,
-        around: Around,
+        alarm_context: LiveContext,
     ) -> None:
         self._share, self._settings = partition.share_of(plant), settings
-        self._monitors, self._ground, self._around = monitors, ground, around
+        self._monitors, self._ground, self._alarm_context = monitors, ground, alarm_context
         self._plant = plant
         self._holds = Holds(ground.store, monitors, ground.clock)
         self._stored: dict[str, StreamPosition] = {}
@@ -228,7 +228,7 @@ class Analysing:
         self._memories = memories_of(self._stored.values())
         stream = StreamLook(self._trouble, self._behind_s)
         analysis = await analysis_on(
-            ground, monitors, bus, self._around, self._share, self._memories, stream
+            ground, monitors, bus, self._alarm_context, self._share, self._memories, stream
         )
         self._analysis = analysis
         consumer = Consumer(

@@ -1,13 +1,15 @@
 """Receivers of notifications in the plant file: webhooks and mail servers."""
 
 import re
-from typing import Annotated, Literal, Self
+from datetime import datetime, time
+from typing import TYPE_CHECKING, Annotated, Literal, Self, get_args
 from urllib.parse import urlsplit
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
 from pydantic import Field, StringConstraints, model_validator
 
 from core.alarms.alarm import AlarmChange
+from core.units import NS_PER_S
 from service.settings.alarm_kinds import AlarmKindName
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 
@@ -28,7 +30,12 @@ TimeoutS = Annotated[float, Field(gt=0.0, le=600.0)]
 
 PRINTABLE_URL = re.compile(r"^[!-~]+$")
 
-TOLD = (AlarmChange.RAISED, AlarmChange.ESCALATED, AlarmChange.EASED, AlarmChange.RETURNED)
+DEFAULT_CHANGES = (
+    AlarmChange.RAISED,
+    AlarmChange.ESCALATED,
+    AlarmChange.EASED,
+    AlarmChange.RETURNED,
+)
 
 
 class SecretSettings(Settings):
@@ -70,9 +77,15 @@ class QuietSettings(Settings):
             raise MisfitError('is no known time zone; "UTC" always is', "time_zone") from error
         return self
 
+    def include(self, time_ns: int) -> bool:
+        """Return whether a time lies within the quiet hours."""
+        moment = datetime.fromtimestamp(time_ns // NS_PER_S, ZoneInfo(self.time_zone)).time()
+        start, end = time.fromisoformat(self.start), time.fromisoformat(self.end)
+        return start <= moment < end if start < end else moment >= start or moment < end
 
-class _ReceiverSettings(Settings):
-    """Settings that all receivers share."""
+
+class ReceiverSettings(Settings):
+    """Settings that all receivers share; a subclass adds its ``kind`` and its address."""
 
     id: Identifier
     """Shown with its backlog; what waits for it is kept under this name."""
@@ -83,7 +96,7 @@ class _ReceiverSettings(Settings):
     kinds: tuple[AlarmKindName, ...] | None = None
     """Kinds of alarms that it receives; all unless given. Example: ["link_lost"]."""
 
-    changes: Annotated[tuple[AlarmChange, ...], Field(min_length=1)] = TOLD
+    changes: Annotated[tuple[AlarmChange, ...], Field(min_length=1)] = DEFAULT_CHANGES
     """Changes of an alarm that are sent."""
 
     lowest_priority: Literal["alert", "danger"] = "alert"
@@ -112,8 +125,13 @@ class _ReceiverSettings(Settings):
     """Certificates (PEM) to trust instead of the system's; for a plant with a CA of its own;
     example: "/etc/padwatch/plant-ca.pem"."""
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the receivers in the outbox, one for each queue."""
+        return (self.id,)
 
-class WebhookSettings(_ReceiverSettings):
+
+class WebhookSettings(ReceiverSettings):
     """A web server that takes each event as a POST of JSON."""
 
     kind: Literal["webhook"]
@@ -138,7 +156,7 @@ class WebhookSettings(_ReceiverSettings):
         return self
 
 
-class SmtpSettings(_ReceiverSettings):
+class SmtpSettings(ReceiverSettings):
     """A mail server that takes each event as a mail to every recipient."""
 
     kind: Literal["smtp"]
@@ -174,8 +192,20 @@ class SmtpSettings(_ReceiverSettings):
         refuse_twice(("recipients", n, each) for n, each in enumerate(self.recipients))
         return self
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the receivers in the outbox, one for each recipient."""
+        return tuple(f"{self.id}:{recipient}" for recipient in self.recipients)
 
-ReceiverSettings = Annotated[WebhookSettings | SmtpSettings, Field(discriminator="kind")]
+
+AnyReceiver = WebhookSettings | SmtpSettings
+"""Receivers of all channels."""
+
+if TYPE_CHECKING:
+    ChannelKind = str
+else:
+    ChannelKind = Literal[tuple(t.model_fields["kind"].annotation for t in get_args(AnyReceiver))]
+"""Name of a channel."""
 
 
 class DeliverySettings(Settings):
@@ -185,7 +215,9 @@ class DeliverySettings(Settings):
     """URL of the dashboard for the link in each message; the service's own host and port unless
     given. Example: "https://padwatch.plant.example/"."""
 
-    receiver: Annotated[tuple[ReceiverSettings, ...], Field(max_length=50)] = ()
+    receiver: Annotated[
+        tuple[Annotated[AnyReceiver, Field(discriminator="kind")], ...], Field(max_length=50)
+    ] = ()
     """Receivers."""
 
     @model_validator(mode="after")

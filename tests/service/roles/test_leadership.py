@@ -15,19 +15,24 @@ from service.notifications.channel import Delivered
 from service.notifications.sender import Deliveries, Receiver
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
 from service.settings.loading import load_plant_file
+from service.settings.notifications import WebhookSettings
 from service.store.database import Hold
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
 
 
 class Postman:
-    """Carries everything at once."""
+    """Delivers everything at once."""
 
-    async def carry(self, *_: object) -> Delivered:
+    address = ""
+
+    async def send(self, *_: object) -> Delivered:
         return Delivered("")
 
 
-SHIFT = Receiver("shift", "webhook", "", Postman())
+SHIFT = Receiver(
+    "shift", WebhookSettings(kind="webhook", id="shift", url="http://x.example"), Postman()
+)
 
 
 class Name:

@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.clock import SystemClock
 from service.app.notifications import receivers_of, router_of
-from service.notifications.message import Surroundings
+from service.notifications.message import AlarmContext
 from service.settings.loading import load_plant_file
 from service.settings.storage import Origin
 from service.store.outbox import no_recipients
@@ -45,18 +45,21 @@ def test_every_recipient_is_a_receiver_and_secrets_in_addresses_are_not_shown(
 
     found = receivers_of(plant, Origin.LIVE, clock)
 
-    assert [(one.name, one.address) for one in found] == [
+    assert [(one.name, one.channel.address) for one in found] == [
         ("desk", "https://alarms.example"),
         ("shift:a@plant.example", "a@plant.example"),
         ("shift:b@plant.example", "b@plant.example"),
     ]
-    assert found[0].quiet is not None
+    assert found[0].settings.quiet is not None
     midnight_utc_ns, hour_ns = 1_767_225_600_000_000_000, 3600 * 10**9  # 21:00 in Asunción
-    quiet = [found[0].quiet.hold_at(midnight_utc_ns + hours * hour_ns) for hours in range(0, 24, 3)]
+    quiet = [
+        found[0].settings.quiet.include(midnight_utc_ns + hours * hour_ns)
+        for hours in range(0, 24, 3)
+    ]
     assert quiet == [False, True, True, False, False, False, False, False]
     # A replay tells nobody.
     assert receivers_of(plant, Origin.REPLAY, clock) == []
-    assert router_of(plant, Origin.REPLAY, lambda _: Surroundings(), clock) is no_recipients
+    assert router_of(plant, Origin.REPLAY, lambda _: AlarmContext(), clock) is no_recipients
 
 
 @pytest.mark.parametrize(
