@@ -24,7 +24,7 @@ from service.cluster.ownership import Holds, Leadership, Partition
 from service.cluster.progress import UnitProgress, memories_of, usable
 from service.cluster.publisher import Publisher, publisher_metrics
 from service.cluster.session import identity_of
-from service.cluster.silent_units import Silence, SilentUnits, silences_s
+from service.cluster.silent_units import SilenceWatch, SilentUnits, silences_s
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Acquirer, Bus
 from service.measuring.analyser import BUS_CAPACITY, UnitMemory
@@ -184,7 +184,7 @@ class Analysing:
         self._memories: dict[str, UnitMemory] = {}
         self._analysis: Analysis | None = None
         self._consumer: Consumer | None = None
-        self._silence: Silence | None = None
+        self._silence: SilenceWatch | None = None
         self._silent_units: SilentUnits | None = None
 
     async def run(
@@ -239,7 +239,7 @@ class Analysing:
         silent = SilentUnits(everywhere, analysis.alarms, ground.store, ground.clock)
         self._silent_units = silent
         after_s = silences_s(ground.plant.unit, self._settings.silent_after_s)
-        self._silence = Silence(after_s, analysis.analyser, ground.live, ground.clock)
+        self._silence = SilenceWatch(after_s, analysis.analyser, ground.live, ground.clock)
         tend = ground.beats.tend
         async with asyncio.TaskGroup() as tasks:
             analysis.start(tasks)

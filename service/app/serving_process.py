@@ -25,7 +25,7 @@ from service.app.web import access_desk, application, server_of
 from service.cluster.replica_metrics import NoCaptures, ReplicaDeliveries, ReplicaMetrics
 from service.cluster.replica_state import ReplicaAlarms, ReplicaFilms, ReplicaLive
 from service.cluster.reported_commands import CommandClient
-from service.cluster.reported_state import UnitDescription, Feed
+from service.cluster.reported_state import Feed, UnitDescription
 from service.measuring.acquirer import Bus
 from service.measuring.commands import InProcess
 from service.measuring.references_in_force import ReferencesInForce

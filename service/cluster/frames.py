@@ -1,10 +1,11 @@
-"""Blocks and news of links as bytes, and back, bit for bit."""
+"""Encoding of blocks and news of links as messages, and decoding without loss."""
 
 import hashlib
 import json
 import math
 import struct
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Annotated, TypeVar
@@ -19,12 +20,12 @@ from service.measuring.acquirer import LinkNews
 
 
 class WireError(ValueError):
-    """A message cannot be used; it will be the same the next time.
+    """A message cannot be used; decoding it again fails in the same way.
 
     Parameters
     ----------
     kind
-        Short snake-case word, used as a counter's label.
+        Short word in snake case, used as the label of a counter.
     """
 
     def __init__(self, kind: str, message: str) -> None:
@@ -33,22 +34,22 @@ class WireError(ValueError):
 
 
 def require_possible(block: SampleBlock) -> None:
-    """Refuse what no adapter makes, before anything reckons with it.
+    """Refuse a block that no adapter produces, before it is analysed.
 
     Raises
     ------
     WireError
-        If a block has no samples, or one that is no number, which would blind a whole spectrum; a
-        slow value that is none; or less than no rejected samples.
+        If a block has no samples, a sample or slow value that is not finite, or a negative number
+        of rejected samples.
     """
     if not block.n_samples:
         raise WireError("impossible", "a block without samples")
     if not np.isfinite(block.samples).all():
-        raise WireError("impossible", "a block with samples that are no numbers")
+        raise WireError("impossible", "a block with samples that are not finite")
     if not all(math.isfinite(reading.value or 0.0) for reading in block.slow.values()):
-        raise WireError("impossible", "a block with a slow value that is no number")
+        raise WireError("impossible", "a block with a slow value that is not finite")
     if any(rejection.n_samples < 0 for rejection in block.rejected):
-        raise WireError("impossible", "a block before which less than no samples were rejected")
+        raise WireError("impossible", "a block with a negative number of rejected samples")
 
 
 FINGERPRINT_BYTES = 16
@@ -56,16 +57,14 @@ FINGERPRINT_BYTES = 16
 
 @dataclass(frozen=True)
 class UnitIdentity:
-    """A unit as the blocks on a stream must have been made for it.
+    """Identity of a unit, which every message of the unit carries.
 
     Parameters
     ----------
-    unit
-        Its id.
     plant
-        Fingerprint of the plant's name.
+        Fingerprint of the name of the plant.
     make
-        Fingerprint of rate and channels: samples of another make would be read as something else.
+        Fingerprint of rate and channels, without which samples would be misinterpreted.
     """
 
     unit: str
@@ -74,7 +73,7 @@ class UnitIdentity:
 
 
 def fingerprint(*words: object) -> bytes:
-    """A short mark of some JSON values: equal for equal ones, and for no others that occur."""
+    """Return a short hash of some JSON values."""
     text = json.dumps(words, ensure_ascii=True, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).digest()[:FINGERPRINT_BYTES]
 
@@ -83,7 +82,7 @@ MAGIC = b"PWSM"
 
 VERSION = 1
 READABLE = (1,)
-"""A reader knows the version it writes and the one before: it is upgraded before the writers."""
+"""A reader supports its own version and the previous one, as it is upgraded before the writers."""
 
 MAX_HEAD_BYTES = 1 << 18
 MAX_SAMPLE_BYTES = 1 << 26
@@ -93,7 +92,7 @@ _CRC = struct.Struct("<I")
 
 
 class Kind(IntEnum):
-    """What a message is."""
+    """Kind of a message."""
 
     BLOCK = 1
     LINK = 2
@@ -101,7 +100,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Frame:
-    """A message taken apart, with nothing read of its head yet."""
+    """Parts of a message; the head is not decoded."""
 
     kind: Kind
     head: bytes
@@ -109,12 +108,12 @@ class Frame:
 
 
 def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b"") -> bytes:
-    """Put a message together.
+    """Assemble a message.
 
     Raises
     ------
     ValueError
-        If a part is longer than a reader takes.
+        If a part exceeds the limit of readers.
     """
     if len(head) > MAX_HEAD_BYTES or len(samples) > MAX_SAMPLE_BYTES:
         raise ValueError(
@@ -129,16 +128,16 @@ def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b""
 
 
 def unframed(message: bytes, identity: UnitIdentity) -> Frame:
-    """Take a message apart.
+    """Split a message into its parts.
 
     Raises
     ------
     WireError
-        If it is no message, damaged, of another version, plant or configuration; never anything
-        else, whatever the bytes are.
+        If the bytes are not a message, or are damaged, or have another version, plant or
+        configuration. No other exception is raised for any bytes.
     """
     if len(message) < _START.size + _CRC.size or message[:4] != MAGIC:
-        raise WireError("not_a_message", f"{len(message)} bytes that are no message of padwatch")
+        raise WireError("not_a_message", f"{len(message)} bytes that are not a message of padwatch")
     _, version, kind, plant, make, n_head, n_samples = _START.unpack_from(message)
     if version not in READABLE:
         raise WireError("other_version", _other_version(version))
@@ -148,17 +147,17 @@ def unframed(message: bytes, identity: UnitIdentity) -> Frame:
     (crc,) = _CRC.unpack_from(message, whole - _CRC.size)
     body = memoryview(message)
     if crc != zlib.crc32(body[: whole - _CRC.size]):
-        raise WireError("damaged", "a message whose checksum does not fit it")
+        raise WireError("damaged", "a message with a wrong checksum")
     if plant != identity.plant:
-        raise WireError("other_plant", "a message of another plant: give each its own stream")
+        raise WireError("other_plant", "a message of another plant: use one stream for each plant")
     if make != identity.make:
         raise WireError(
             "other_configuration",
-            f"a block of {identity.unit} made with other channels or another rate: let acquire and"
-            " analyse use the same plant file",
+            f"a block of {identity.unit} with other channels or another rate: use the same plant"
+            " file for acquire and analyse",
         )
     if kind not in Kind.__members__.values():
-        raise WireError("unknown_kind", f"a message of kind {kind}, which is not known")
+        raise WireError("unknown_kind", f"a message of unknown kind {kind}")
     head = bytes(body[_START.size : _START.size + n_head])
     samples = body[_START.size + n_head : whole - _CRC.size]
     return Frame(Kind(kind), head, samples)
@@ -174,10 +173,10 @@ SAMPLE = np.dtype("<f4")
 
 Epoch = Annotated[int, Field(ge=0, lt=2**63)]
 Index = Annotated[int, Field(ge=0, lt=2**53)]
-"""Exact in recordings, too, where numbers are doubles."""
+"""Exact as a double, which recordings use."""
 
 Ns = Annotated[int, Field(ge=-(2**62), lt=2**62)]
-"""From 1823 to 2116, so that nothing that is worked out from it overflows in a database."""
+"""From 1823 to 2116, so that sums and differences do not overflow in a database."""
 
 T = TypeVar("T")
 
@@ -186,7 +185,7 @@ STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="constants")
 
 @dataclass(frozen=True)
 class BlockHead:
-    """All of a block but its samples."""
+    """Fields of a block without its samples."""
 
     __pydantic_config__ = STRICT
 
@@ -197,7 +196,7 @@ class BlockHead:
     rate_hz: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
     n_samples: Index
     channel_quality: tuple[Quality, ...]
-    slow: dict[str, Reading]
+    slow: Mapping[str, Reading]
     rejected: tuple[Rejection, ...]
     clock: DeviceClock | None
     stamp_fault: StampFault | None
@@ -220,57 +219,49 @@ _BLOCK, _LINK = TypeAdapter(BlockHead), TypeAdapter(LinkHead)
 
 @dataclass(frozen=True)
 class Taken:
-    """A block with when it was taken from its device.
+    """A block with its time of acquisition.
 
     Parameters
     ----------
     taken_ns
-        When its device had its last sample, by the clock of the host that acquires: how far behind
-        the analysis is.
+        Time of its last sample by the clock of the acquiring host; the delay of the analysis is
+        measured from it.
     """
 
     block: SampleBlock
     taken_ns: int
 
 
+SHARED_FIELDS = tuple(BlockHead.__dataclass_fields__.keys() - {"n_samples", "taken_ns"})
+"""Fields of a block that its head has under the same name."""
+
+
 def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> bytes:
-    """A block as a message. Raises `ValueError` if it is longer than a reader takes."""
-    head = BlockHead(
-        unit=block.unit,
-        epoch=block.epoch,
-        first_index=block.first_index,
-        start_ns=block.start_ns,
-        rate_hz=block.rate_hz,
-        n_samples=block.n_samples,
-        channel_quality=block.channel_quality,
-        slow=dict(block.slow),
-        rejected=block.rejected,
-        clock=block.clock,
-        stamp_fault=block.stamp_fault,
-        taken_ns=taken_ns,
-    )
+    """Encode a block. Raises `ValueError` if it exceeds the limits of readers."""
+    fields = {name: getattr(block, name) for name in SHARED_FIELDS}
+    head = BlockHead(n_samples=block.n_samples, taken_ns=taken_ns, **fields)
     samples = np.ascontiguousarray(block.samples, dtype=SAMPLE).tobytes()
     return framed(Kind.BLOCK, identity, _BLOCK.dump_json(head), samples)
 
 
 def encoded_link(news: LinkNews, identity: UnitIdentity) -> bytes:
-    """News of a link as a message."""
+    """Encode news of a link."""
     head = LinkHead(news.unit, news.state, None if news.reason is None else news.reason[:1000])
     return framed(Kind.LINK, identity, _LINK.dump_json(head))
 
 
 def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
-    """What a message says.
+    """Decode a message.
 
     Parameters
     ----------
     identity
-        Of the unit that it must be of.
+        Identity of the unit that the message must belong to.
 
     Raises
     ------
     WireError
-        If it cannot be used; never anything else, whatever the bytes are.
+        If the message cannot be used. No other exception is raised for any bytes.
     """
     frame = unframed(message, identity)
     if frame.kind is Kind.LINK:
@@ -290,20 +281,10 @@ def _block(frame: Frame, identity: UnitIdentity) -> Taken:
             f"{len(frame.samples)} bytes of samples for {n_channels} channels of {head.n_samples}",
         )
     samples = np.frombuffer(frame.samples, dtype=SAMPLE).reshape(n_channels, head.n_samples)
-    block = SampleBlock(
-        unit=head.unit,
-        epoch=head.epoch,
-        first_index=head.first_index,
-        start_ns=head.start_ns,
-        rate_hz=head.rate_hz,
-        samples=samples.astype(np.float32, copy=False),
-        channel_quality=head.channel_quality,
-        slow=head.slow,
-        rejected=head.rejected,
-        clock=head.clock,
-        stamp_fault=head.stamp_fault,
+    fields = {name: getattr(head, name) for name in SHARED_FIELDS}
+    return Taken(
+        SampleBlock(samples=samples.astype(np.float32, copy=False), **fields), head.taken_ns
     )
-    return Taken(block, head.taken_ns)
 
 
 def _read(adapter: TypeAdapter[T], head: bytes) -> T:
@@ -312,7 +293,7 @@ def _read(adapter: TypeAdapter[T], head: bytes) -> T:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"])
-        message = f"a message whose head is not understood: {where}: {first['msg']}"
+        message = f"a message with an invalid head: {where}: {first['msg']}"
         raise WireError("not_understood", message) from None
 
 

@@ -35,6 +35,9 @@ NOT_ANALYSED = "no process that analyses this unit is alive"
 NOT_REPORTED = UnitStatus(LinkState.NOT_CONNECTED, NOT_ANALYSED)
 
 
+NO_SIGNS = UnitSigns(UnitStatus(), None, {})
+
+
 @dataclass(frozen=True)
 class LatestReport:
     """Latest report on a unit.
@@ -52,8 +55,8 @@ class LatestReport:
 
     beat: tuple[str, int] | None = None
     sent_s: float | None = None
-    signs: UnitSigns = UnitSigns(UnitStatus(), None, {})
-    status: UnitStatus = UnitStatus()
+    signs: UnitSigns = NO_SIGNS
+    status: UnitStatus = NO_SIGNS.status
     results: Mapping[str, Assessment] = field(default_factory=dict)
 
 

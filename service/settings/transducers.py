@@ -18,6 +18,7 @@ from core.machine.response import (
     ResponseTable,
 )
 from service.settings.base import MisfitError, Settings
+from service.settings.toml_file import FOLDER
 
 COLUMNS = ("frequency_hz", "magnitude", "phase_deg")
 MAX_SHEET_BYTES = 1_000_000
@@ -108,10 +109,6 @@ def _check(place: str, point: tuple[float, ...], before: list[tuple[float, ...]]
         )
     if magnitude <= 0.0:
         raise SheetError(f"{place}: magnitude must be above 0, got {magnitude:g}")
-
-
-FOLDER = "folder"
-"""Key of the validation context: where the plant file lies, and so the sheets it names."""
 
 
 class HighPassSettings(Settings):

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, PrivateAttr, StringConstraints, ValidationInfo, model_validator
 
 from service.settings.base import Identifier, MisfitError, Settings
-from service.settings.transducers import FOLDER
+from service.settings.toml_file import FOLDER
 
 DBC_NAME = "[A-Za-z_][A-Za-z0-9_]{0,127}"
 

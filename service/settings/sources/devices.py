@@ -14,8 +14,7 @@ from service.settings.base import MisfitError, Settings
 from service.settings.sources.can import CanSettings
 from service.settings.sources.modbus import ModbusLinkSettings
 from service.settings.sources.register_map import RegisterMapSettings, load_map_file
-from service.settings.toml_file import TomlFileError
-from service.settings.transducers import FOLDER
+from service.settings.toml_file import FOLDER, TomlFileError
 
 MIN_STALE_POLLS = 2
 

@@ -173,9 +173,6 @@ def _optional(default: CellDefaults, cell: CellSettings | None, *at: int | str) 
     return None if cell is None else default.cell(cell, *at)
 
 
-_KINDS_OF_TIME = ("epoch", "calendar")
-
-
 def load_map_file(path: Path) -> RegisterMapSettings:
     """Read and check a register map.
 
@@ -184,4 +181,4 @@ def load_map_file(path: Path) -> RegisterMapSettings:
     TomlFileError
         If it cannot be read or anything in it is wrong.
     """
-    return load_toml(path, RegisterMapSettings, _KINDS_OF_TIME)
+    return load_toml(path, RegisterMapSettings)

@@ -8,7 +8,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from core.machine.response import HighPass, Resonance, ResponseChain, ResponseTable
 from service.settings.core_values import machine_of
-from service.settings.loading import PlantFileError, load_plant_file
+from service.settings.loading import load_plant_file
+from service.settings.toml_file import TomlFileError
 from service.settings.transducers import (
     FOLDER,
     ResponseSettings,
@@ -87,7 +88,7 @@ def test_a_response_is_known_to_its_channel_and_a_sheet_lies_beside_the_plant_fi
 
 def test_a_sheet_that_is_not_there_is_named_with_the_line_of_its_channel(tmp_path: Path) -> None:
     path = written(tmp_path, '[{ kind = "sheet", file = "missing.csv" }]')
-    with pytest.raises(PlantFileError, match=r"plant\.toml:\d+: .*missing\.csv"):
+    with pytest.raises(TomlFileError, match=r"plant\.toml:\d+: .*missing\.csv"):
         load_plant_file(path)
 
 

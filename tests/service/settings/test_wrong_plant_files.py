@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from service.settings.loading import MAX_FILE_BYTES, PlantFileError, load_plant_file
+from service.settings.loading import load_plant_file
+from service.settings.toml_file import MAX_FILE_BYTES, TomlFileError
 
 Changed = Callable[[str, str], tuple[str, int]]
 Mistakes = Callable[[str | bytes], list[str]]
@@ -220,7 +221,7 @@ def test_a_path_that_is_no_plant_file_is_refused_in_one_line(tmp_path: Path) -> 
         (pipe, "not a regular file"),
         (huge, f"larger than {MAX_FILE_BYTES} bytes"),
     ):
-        with pytest.raises(PlantFileError, match=said) as refusal:
+        with pytest.raises(TomlFileError, match=said) as refusal:
             load_plant_file(path)
         assert str(refusal.value).startswith(f"{path}: ")
         assert "\n" not in str(refusal.value)
@@ -228,7 +229,7 @@ def test_a_path_that_is_no_plant_file_is_refused_in_one_line(tmp_path: Path) -> 
 
 def test_a_file_that_is_nested_too_deeply_is_refused(mistakes: Mistakes) -> None:
     for text in ("a." * 20_000 + "a = 1", "a = " + "[" * 20_000 + "]" * 20_000):
-        assert mistakes(text) == [" nested too deeply for a plant file"]
+        assert mistakes(text) == [" nested too deeply"]
 
 
 def test_an_empty_file_or_a_key_with_a_line_break_is_refused_in_its_lines(

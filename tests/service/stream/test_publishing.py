@@ -190,7 +190,7 @@ async def test_without_a_server_it_waits_and_says_so(plant: PlantFile, server: N
     server.kill()
     async with running(publisher(plant, server.url)) as out:
         await out.publish(block(plant, 0))
-        await until(lambda: "is not reached" in (out.trouble or ""))
+        await until(lambda: "cannot be reached" in (out.trouble or ""))
         server.start()
         await drained(out)
 

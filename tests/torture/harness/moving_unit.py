@@ -46,7 +46,7 @@ class Life:
 
     async def store(self) -> None:
         """Store everything, with how far it is."""
-        if not self.progress.is_reliving:
+        if not self.progress.is_replaying:
             self.analysis.recorder.put(Findings(position=self.progress.position()))
         await self.analysis.recorder.flush()
 
