@@ -36,11 +36,8 @@ class WireError(ValueError):
 def require_possible(block: SampleBlock) -> None:
     """Refuse a block that no adapter produces, before it is analysed.
 
-    Raises
-    ------
-    WireError
-        If a block has no samples, a sample or slow value that is not finite, or a negative number
-        of rejected samples.
+    Raises `WireError` if a block has no samples, a sample or slow value that is not finite, or a
+    negative number of rejected samples.
     """
     if not block.n_samples:
         raise WireError("impossible", "a block without samples")
@@ -108,13 +105,7 @@ class Frame:
 
 
 def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b"") -> bytes:
-    """Assemble a message.
-
-    Raises
-    ------
-    ValueError
-        If a part exceeds the limit of readers.
-    """
+    """Assemble a message. Raises `ValueError` if a part exceeds the limit of readers."""
     if len(head) > MAX_HEAD_BYTES or len(samples) > MAX_SAMPLE_BYTES:
         raise ValueError(
             f"a message holds at most {MAX_HEAD_BYTES} bytes of head and {MAX_SAMPLE_BYTES} of"
@@ -130,11 +121,8 @@ def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b""
 def unframed(message: bytes, identity: UnitIdentity) -> Frame:
     """Split a message into its parts.
 
-    Raises
-    ------
-    WireError
-        If the bytes are not a message, or are damaged, or have another version, plant or
-        configuration. No other exception is raised for any bytes.
+    Raises `WireError` if the bytes are not a message, or are damaged, or have another version,
+    plant or configuration. No other exception is raised for any bytes.
     """
     if len(message) < _START.size + _CRC.size or message[:4] != MAGIC:
         raise WireError("not_a_message", f"{len(message)} bytes that are not a message of padwatch")

@@ -161,10 +161,7 @@ class Partition:
     def part_of(self, plant: PlantFile) -> PlantFile:
         """Return the plant with the units of this part only.
 
-        Raises
-        ------
-        ValueError
-            If the part has no units.
+        Raises `ValueError` if the part has no units.
         """
         mine = set(self.units([unit.id for unit in plant.unit]))
         if not mine:

@@ -47,13 +47,7 @@ class ReplicaDeliveries:
         self._receivers, self._outbox = {each.name: each for each in receivers}, outbox
 
     async def look(self) -> list[ReceiverView]:
-        """Return the state of all receivers.
-
-        Raises
-        ------
-        StoreError
-            If the outbox cannot be read.
-        """
+        """Return the state of all receivers. Raises `StoreError` if the outbox cannot be read."""
         return await asyncio.to_thread(receiver_views, self._receivers, self._outbox, self._status)
 
     def _status(self, name: str) -> SenderStatus:

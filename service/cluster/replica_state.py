@@ -266,10 +266,7 @@ class ReplicaFilms:
     def fetch(self, unit: str, state: UnitState) -> Mapping[str, BearingBaseline]:
         """Read the baselines that are in force by a state; blocks.
 
-        Raises
-        ------
-        StoreError
-            If they cannot be read.
+        Raises `StoreError` if they cannot be read.
         """
         found = {}
         for bearing, in_force in state.baselines.items():

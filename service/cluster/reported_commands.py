@@ -72,10 +72,7 @@ class CommandClient:
     async def _send(self, unit: str, task: Task, actor: str) -> Answer:
         """Store a command and wait for its answer.
 
-        Raises
-        ------
-        NotCarriedOutError
-            If the command is not carried out, or its outcome is unknown.
+        Raises `NotCarriedOutError` if the command is not carried out, or its outcome is unknown.
         """
         command = self._command(unit, task, actor)
         await asyncio.to_thread(self._store.commands.ask, command)

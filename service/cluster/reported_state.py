@@ -184,10 +184,7 @@ class Feed:
     async def start(self) -> None:
         """Read the stored alarms and the reports before the first request.
 
-        Raises
-        ------
-        StoreError
-            If they cannot be read.
+        Raises `StoreError` if they cannot be read.
         """
         self._alarms.take_stored(await asyncio.to_thread(self._store.alarms))
         self._take(await asyncio.to_thread(self._read))

@@ -277,10 +277,8 @@ def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
 async def ensure(stream: JetStreamContext, plant: PlantFile, settings: StreamSettings) -> None:
     """Create the stream, or apply the limits of the plant file to it.
 
-    Raises
-    ------
-    StreamMisfitError
-        If JetStream is off, or the stream belongs to another plant or cannot be configured.
+    Raises `StreamMisfitError` if JetStream is off, or the stream belongs to another plant or cannot
+    be configured.
     """
     config, found = wanted(plant, settings), await _info(stream, plant)
     if found is None:
@@ -292,12 +290,8 @@ async def ensure(stream: JetStreamContext, plant: PlantFile, settings: StreamSet
 async def require(stream: JetStreamContext, plant: PlantFile) -> str:
     """Return the name of the stream with its time of creation.
 
-    Raises
-    ------
-    StreamError
-        If it does not exist yet.
-    StreamMisfitError
-        If JetStream is off, or the stream belongs to another plant.
+    Raises `StreamError` if it does not exist yet. Raises `StreamMisfitError` if JetStream is off,
+    or the stream belongs to another plant.
     """
     name, found = stream_name(plant), await _info(stream, plant)
     if found is None:

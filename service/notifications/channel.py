@@ -73,10 +73,7 @@ class SecretError(Exception):
 def read_secret(settings: SecretSettings) -> str:
     """Read a secret, without the line end that editors add.
 
-    Raises
-    ------
-    SecretError
-        If the secret is missing or not a single printable line.
+    Raises `SecretError` if the secret is missing or not a single printable line.
     """
     file = settings.file
     place = f"environment variable {settings.env}" if file is None else f"file {file}"
@@ -107,10 +104,7 @@ class TrustedAuthorities:
     async def context(self) -> ssl.SSLContext:
         """Return the TLS context; certificate and host name are always checked.
 
-        Raises
-        ------
-        OSError
-            If the file cannot be used; the message names it.
+        Raises `OSError` if the file cannot be used; the message names it.
         """
         if self._context is None:
             self._context = await asyncio.to_thread(_context, self._ca_file)
@@ -127,10 +121,7 @@ def _context(ca_file: str | None) -> ssl.SSLContext:
 async def connected_socket(look_up: NameLookUp, port: int, timeout_s: float) -> socket.socket:
     """Connect to the first address of a name that accepts a connection.
 
-    Raises
-    ------
-    OSError
-        If no address does; the reason is that of the last one.
+    Raises `OSError` if no address does; the reason is that of the last one.
     """
     failure: OSError = OSError("has no address")
     async with asyncio.timeout(timeout_s):

@@ -189,10 +189,7 @@ class Mail:
     async def _log_in(self, server: aiosmtplib.SMTP) -> None:
         """Connect, encrypt and log in.
 
-        Raises
-        ------
-        SecretError
-            If the password cannot be read; then no connection is made.
+        Raises `SecretError` if the password cannot be read; then no connection is made.
         """
         settings = self._settings
         password = read_secret(settings.password) if settings.password else None

@@ -338,13 +338,7 @@ class Deliveries:
             sender.wake()
 
     async def look(self) -> list[ReceiverView]:
-        """Return the state of all receivers.
-
-        Raises
-        ------
-        StoreError
-            If the outbox cannot be read.
-        """
+        """Return the state of all receivers. Raises `StoreError` if the outbox cannot be read."""
         receivers = {name: sender.receiver for name, sender in self._senders.items()}
         return await asyncio.to_thread(
             receiver_views, receivers, self._outbox, lambda name: self._senders[name].status

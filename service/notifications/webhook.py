@@ -55,13 +55,7 @@ class BoundedStream(httpcore2.AsyncNetworkStream):
         self._stream, self._n_left = stream, n_left
 
     async def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
-        """Read some bytes.
-
-        Raises
-        ------
-        httpcore2.ReadError
-            If the limit is exceeded.
-        """
+        """Read some bytes. Raises `httpcore2.ReadError` if the limit is exceeded."""
         if self._n_left <= 0:
             raise httpcore2.ReadError(f"the response is longer than {MAX_BYTES} bytes")
         found = await self._stream.read(min(max_bytes, PIECE_BYTES), timeout)
@@ -108,12 +102,8 @@ class BoundedNetwork(httpcore2.AsyncNetworkBackend):
     ) -> httpcore2.AsyncNetworkStream:
         """Connect to the first address that accepts a connection.
 
-        Raises
-        ------
-        OSError
-            If the name cannot be resolved.
-        httpcore2.ConnectError, httpcore2.ConnectTimeout
-            If no address accepts a connection.
+        Raises `OSError` if the name cannot be resolved. Raises `httpcore2.ConnectError` or
+        `httpcore2.ConnectTimeout` if no address accepts a connection.
         """
         failure: Exception = httpcore2.ConnectError(f"{host} has no address")
         async with asyncio.timeout(timeout):
@@ -198,10 +188,7 @@ class Webhook:
     def _headers(self, id_: str, body: bytes) -> dict[str, str]:
         """Return the headers of a request.
 
-        Raises
-        ------
-        SecretError
-            If a secret cannot be read; then nothing is sent.
+        Raises `SecretError` if a secret cannot be read; then nothing is sent.
         """
         time_s = str(self._clock.now_ns() // NS_PER_S)
         headers = {

@@ -43,10 +43,7 @@ Measure = Callable[[Path], DiskSpace]
 def measure_disk(folder: Path) -> DiskSpace:
     """Measure the file system of a folder, or of its nearest parent that exists.
 
-    Raises
-    ------
-    OSError
-        If the file system cannot be read.
+    Raises `OSError` if the file system cannot be read.
     """
     there = folder.absolute()
     while not there.exists() and there != there.parent:

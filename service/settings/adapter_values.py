@@ -77,10 +77,7 @@ def can_link_of(source: settings.CanSettings) -> CanLinkSettings:
 def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
     """The messages of the simulated CAN DAQ for a unit's channels.
 
-    Raises
-    ------
-    LookupError
-        If the unit's source does not read those messages.
+    Raises `LookupError` if the unit's source does not read those messages.
     """
     if source.profile is None:
         raise LookupError(
@@ -153,12 +150,9 @@ def _listed(signals: str | tuple[str, ...]) -> tuple[str, ...]:
 
 
 def require_dbc_fits(unit: UnitSettings) -> None:
-    """Look into the DBC file of a unit that reads CAN, without opening a bus.
+    """Check the DBC file of a unit that reads CAN, without opening a bus.
 
-    Raises
-    ------
-    ConfigError
-        Naming file, key, what was found and what is needed.
+    Raises `ConfigError` if it does not fit the unit; the message names file and key.
     """
     if isinstance(unit.source, settings.CanSettings):
         compile_plan(can_settings_of(unit, unit.source), calibration_of(unit))

@@ -15,9 +15,6 @@ def plant_file_schema() -> dict[str, Any]:
 def load_plant_file(path: Path) -> PlantFile:
     """Read and validate a plant file.
 
-    Raises
-    ------
-    TomlFileError
-        If the file cannot be read or is wrong; the message names every mistake.
+    Raises `TomlFileError` if the file cannot be read or is wrong; the message names every mistake.
     """
     return load_toml(path, PlantFile)

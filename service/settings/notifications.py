@@ -11,10 +11,16 @@ from pydantic import Field, StringConstraints, model_validator
 from core.alarms.alarm import AlarmChange
 from core.units import NS_PER_S
 from service.settings.alarm_kinds import AlarmKindName
-from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
+from service.settings.base import (
+    Identifier,
+    MisfitError,
+    Settings,
+    refuse_twice,
+    refuse_unknown_units,
+)
 
 TimeOfDay = Annotated[str, StringConstraints(pattern=r"^([01][0-9]|2[0-3]):[0-5][0-9]$")]
-"""Hours and minutes, as in "22:00"."""
+"""Hours and minutes, such as "22:00"."""
 
 MailAddress = Annotated[
     str,
@@ -42,11 +48,10 @@ class SecretSettings(Settings):
     """Place of a secret outside the plant file."""
 
     file: Annotated[str, StringConstraints(min_length=1)] | None = None
-    """File that holds it and nothing else; read before every message, so that a new one is taken
-    over without a restart. Example: "/etc/padwatch/webhook.key"."""
+    """File with the secret only, read before each message; example: "/etc/padwatch/webhook.key"."""
 
     env: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = None
-    """Environment variable that holds it; example: "PADWATCH_WEBHOOK_KEY"."""
+    """Environment variable with the secret; example: "PADWATCH_WEBHOOK_KEY"."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -74,7 +79,7 @@ class QuietSettings(Settings):
         try:
             ZoneInfo(self.time_zone)
         except (ZoneInfoNotFoundError, ValueError, OSError) as error:
-            raise MisfitError('is no known time zone; "UTC" always is', "time_zone") from error
+            raise MisfitError('is not a known time zone such as "UTC"', "time_zone") from error
         return self
 
     def include(self, time_ns: int) -> bool:
@@ -88,7 +93,7 @@ class ReceiverSettings(Settings):
     """Settings that all receivers share; a subclass adds its ``kind`` and its address."""
 
     id: Identifier
-    """Shown with its backlog; what waits for it is kept under this name."""
+    """Name of the receiver and of its queue."""
 
     units: tuple[str, ...] | None = None
     """Units whose alarms it receives; all unless given; example: ["U1"]."""
@@ -152,7 +157,7 @@ class WebhookSettings(ReceiverSettings):
         if fault is not None:
             raise MisfitError(fault, "url")
         if self.authorization is not None and not self.url.lower().startswith("https:"):
-            raise MisfitError("would show it to everyone on the way; use https", "authorization")
+            raise MisfitError("would be sent unencrypted; use an https URL", "authorization")
         return self
 
 
@@ -186,9 +191,9 @@ class SmtpSettings(ReceiverSettings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         if (self.username is None) != (self.password is None):
-            raise MisfitError("username and password go together", "username")
+            raise MisfitError("username and password must be given together", "username")
         if self.username is not None and self.tls == "none":
-            raise MisfitError("would send the password in the clear", "tls")
+            raise MisfitError("would send the password unencrypted", "tls")
         refuse_twice(("recipients", n, each) for n, each in enumerate(self.recipients))
         return self
 
@@ -230,11 +235,8 @@ class DeliverySettings(Settings):
 
     def require_units(self, known: tuple[str, ...]) -> None:
         """Refuse a receiver of an unknown unit."""
-        for number, receiver in enumerate(self.receiver):
-            for place, unit in enumerate(receiver.units or ()):
-                if unit not in known:
-                    words = f"is no unit of this plant, it has {', '.join(known)}"
-                    raise MisfitError(words, "delivery", "receiver", number, "units", place)
+        for n, receiver in enumerate(self.receiver):
+            refuse_unknown_units(receiver.units or (), known, "delivery", "receiver", n, "units")
 
 
 def url_fault(url: str) -> str | None:
@@ -243,11 +245,11 @@ def url_fault(url: str) -> str | None:
         parts = urlsplit(url)
         port = parts.port
     except ValueError:
-        return "is no URL"
+        return "is not a URL"
     if PRINTABLE_URL.match(url) is None or port == 0 or not parts.hostname:
-        return "is no URL of printable ASCII with a host"
+        return "is not a URL of printable ASCII with a host"
     if parts.scheme.lower() not in ("http", "https"):
         return "must begin with https:// or http://"
     if "@" in parts.netloc:
-        return "must not hold a name or password; use authorization"
+        return "must not contain a name or password; use authorization"
     return None

@@ -207,10 +207,7 @@ class TomlFileError(Exception):
 def load_toml(path: Path, model: type[Model]) -> Model:
     """Read and validate a file.
 
-    Raises
-    ------
-    TomlFileError
-        If the file cannot be read or is wrong; the message names every mistake.
+    Raises `TomlFileError` if the file cannot be read or is wrong; the message names every mistake.
     """
     text = _read(path)
     data = _parsed(path, text)

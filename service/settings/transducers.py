@@ -33,11 +33,8 @@ def read_calibration_sheet(path: Path) -> ResponseTable:
 
     Lines that begin with # and empty lines at the end are ignored.
 
-    Raises
-    ------
-    SheetError
-        If the file cannot be read, a column or a value is missing, a value is not a finite number,
-        frequencies do not increase from above zero, or a magnitude is not above zero.
+    Raises `SheetError` if the file cannot be read, a column or a value is missing, a value is not a
+    finite number, frequencies do not increase from above zero, or a magnitude is not above zero.
     """
     rows = _rows(path, _read(path))
     number, header = next(rows, (1, []))

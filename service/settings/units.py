@@ -29,20 +29,7 @@ def require_source_fit(
     channels: Sequence[str],
     slow: Sequence[str],
 ) -> None:
-    """Refuse a source that lacks a channel, or a second device that gives none.
-
-    Parameters
-    ----------
-    beside
-        Device that slow channels are polled from, if there is one.
-    channels, slow
-        Ids of the unit's waveform and slow channels.
-
-    Raises
-    ------
-    MisfitError
-        Names the channel and the requirement.
-    """
+    """Refuse a source, or a second device beside it, that does not fit the ids of the channels."""
     if beside is not None:
         beside.require_fit(slow)
     own = [id_ for id_ in slow if beside is None or id_ not in beside.mapped_channels]
@@ -56,18 +43,7 @@ def require_source_fit(
 
 
 def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]]) -> None:
-    """Refuse a serial line that two devices of the plant file share: a line has one master.
-
-    Parameters
-    ----------
-    readers
-        Place of each device in the file, and its settings.
-
-    Raises
-    ------
-    MisfitError
-        Names the device that uses the line already.
-    """
+    """Refuse a serial line of two devices (location, settings): a line has one master."""
     taken: dict[str, tuple[int | str, ...]] = {}
     for at, device in readers:
         if not isinstance(device, ModbusLinkSettings) or device.device in (None, "pty"):
@@ -97,13 +73,7 @@ def require_alarm_fit(
     channels: Iterable[ChannelSettings],
     bearings: Sequence[BearingSettings],
 ) -> None:
-    """Refuse limits of quantities that are not measured.
-
-    Raises
-    ------
-    MisfitError
-        With the place of the first mistake.
-    """
+    """Refuse limits of quantities that are not measured."""
     if unit == PLANT:
         raise MisfitError("is kept for alarms of the whole plant; choose another", "id")
     is_rack = isinstance(source, ModbusVectorSettings)

@@ -144,10 +144,7 @@ class CanSettings(Settings):
     def check_channels(self, channels: Iterable[str], slow_channels: Iterable[str]) -> None:
         """Refuse signals that do not fit a unit's channels, one to one.
 
-        Raises
-        ------
-        MisfitError
-            Naming the channel.
+        Raises `MisfitError` if a channel is unknown or has no signal.
         """
         if self.profile is not None:
             return

@@ -97,13 +97,7 @@ class MappedDeviceSettings(ModbusLinkSettings):
         )
 
     def require_known(self, known: Sequence[str], *at: int | str) -> None:
-        """Refuse a value of a channel that the unit has not.
-
-        Raises
-        ------
-        MisfitError
-            Naming the channels that there are.
-        """
+        """Refuse values of unknown channels. Raises `MisfitError` if the map has one."""
         for n, value in enumerate(self._map.value):
             if value.channel not in known:
                 place = (*at, "map", "value", n, "channel") if self.map else (*at, "map_file")
@@ -120,12 +114,9 @@ class ModbusPolledSettings(MappedDeviceSettings):
     """This source's kind."""
 
     def require_fit(self, channels: Sequence[str], slow: Sequence[str]) -> None:
-        """Refuse a map that does not give every waveform channel, or gives vectors.
+        """Refuse a map that does not fit the channels of the unit.
 
-        Raises
-        ------
-        MisfitError
-            Saying which is missing.
+        Raises `MisfitError` if a waveform channel is missing, or the map has vectors.
         """
         self.require_known([*channels, *slow], "source")
         for row in self.rows:
@@ -165,12 +156,9 @@ class ModbusVectorSettings(MappedDeviceSettings):
         return PollSettings(self.n_polls, self.hop_polls, self.min_polls)
 
     def require_fit(self, channels: Sequence[str], slow: Sequence[str]) -> None:
-        """Refuse a map without the 1× amplitude of every channel.
+        """Refuse a map that does not fit the channels of the unit.
 
-        Raises
-        ------
-        MisfitError
-            Saying which is missing.
+        Raises `MisfitError` if a 1× amplitude is missing, or the map has plain values.
         """
         self.require_known([*channels, *slow], "source")
         given = [r.channel for r in self.rows if r.part is VectorPart.ORDER1_AMPLITUDE]
@@ -187,12 +175,9 @@ class SlowDeviceSettings(MappedDeviceSettings):
     """A device of slow values beside the one that the waveforms come from."""
 
     def require_fit(self, slow: Sequence[str]) -> None:
-        """Refuse a value that is of no slow channel.
+        """Refuse a map that does not fit the slow channels of the unit.
 
-        Raises
-        ------
-        MisfitError
-            Naming those that there are.
+        Raises `MisfitError` if a value belongs to no slow channel.
         """
         self.require_known(slow, "slow_source")
 
@@ -232,10 +217,8 @@ class ModbusFifoSettings(ModbusLinkSettings):
     def fifo_layout(self, n_channels: int) -> FifoLayout:
         """The queues as the adapter takes them.
 
-        Raises
-        ------
-        MisfitError
-            If the channels do not fit into a FIFO read of 31 registers, or cannot be told apart.
+        Raises `MisfitError` if the channels do not fit into a FIFO read of 31 registers, or cannot
+        be told apart.
         """
         try:
             return FifoLayout(

@@ -140,13 +140,7 @@ class RegisterMapSettings(Settings):
         return self
 
     def register_map(self) -> RegisterMap:
-        """The map as the adapters take it.
-
-        Raises
-        ------
-        MapError
-            If it cannot be used; says where.
-        """
+        """The map as the adapters take it. Raises `MapError` if it cannot be used; says where."""
         default = CellDefaults(self.function, self.byte_order)
         register = 4 if self.function == 4 else 3
         return RegisterMap(
@@ -176,9 +170,6 @@ def _optional(default: CellDefaults, cell: CellSettings | None, *at: int | str) 
 def load_map_file(path: Path) -> RegisterMapSettings:
     """Read and check a register map.
 
-    Raises
-    ------
-    TomlFileError
-        If it cannot be read or anything in it is wrong.
+    Raises `TomlFileError` if it cannot be read or anything in it is wrong.
     """
     return load_toml(path, RegisterMapSettings)

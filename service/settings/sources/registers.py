@@ -163,13 +163,7 @@ class CellDefaults:
     byte_order: ByteOrder
 
     def cell(self, cell: CellSettings, *at: int | str) -> Cell:
-        """Build a cell.
-
-        Raises
-        ------
-        MapError
-            If there can be no such cell; says where in the map.
-        """
+        """Build a cell. Raises `MapError` if there can be no such cell; says where in the map."""
         try:
             return Cell(
                 address=cell.address,
@@ -184,10 +178,7 @@ class CellDefaults:
     def value(self, number: int, value: ValueSettings) -> MapValue:
         """Build a value, in padwatch's conventions: zero-to-peak, degrees of lead.
 
-        Raises
-        ------
-        MapError
-            If there can be no such value; says where in the map.
+        Raises `MapError` if there can be no such value; says where in the map.
         """
         try:
             return MapValue(
