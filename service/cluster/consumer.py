@@ -53,11 +53,6 @@ class Consumer:
     """Passes the messages of the stream to the units.
 
     The loss of a connection does not interrupt the processing of fetched messages.
-
-    Parameters
-    ----------
-    begin
-        Called once, when the stream is known.
     """
 
     def __init__(

@@ -20,13 +20,7 @@ from service.measuring.acquirer import LinkNews
 
 
 class WireError(ValueError):
-    """A message cannot be used; decoding it again fails in the same way.
-
-    Parameters
-    ----------
-    kind
-        Short word in snake case, used as the label of a counter.
-    """
+    """A message cannot be used; decoding it again fails in the same way."""
 
     def __init__(self, kind: str, message: str) -> None:
         super().__init__(message)
@@ -240,11 +234,6 @@ def encoded_link(news: LinkNews, identity: UnitIdentity) -> bytes:
 
 def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
     """Decode a message.
-
-    Parameters
-    ----------
-    identity
-        Identity of the unit that the message must belong to.
 
     Raises
     ------

@@ -81,13 +81,6 @@ class Leadership:
 
     Two processes may run the loops for a short time when the lock changes hands; the work of the
     loops is idempotent.
-
-    Parameters
-    ----------
-    hold
-        Takes a lock; raises `StoreError` while another process holds it.
-    loops
-        Loops by name.
     """
 
     def __init__(

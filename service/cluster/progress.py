@@ -74,13 +74,7 @@ class Window:
         self._seen: deque[_Seen] = deque()
 
     def note(self, sequence: int, block: SampleBlock, state: MonitorState) -> None:
-        """Add a processed block, and remove messages that are no longer needed.
-
-        Parameters
-        ----------
-        state
-            State of the monitor after the block.
-        """
+        """Add a processed block, and remove messages that are no longer needed."""
         self._seen.append(_Seen(sequence, state.epoch, block.stop_index))
         while len(self._seen) > 1 and not self._is_needed(self._seen[0], state):
             self._seen.popleft()
@@ -209,13 +203,7 @@ class UnitProgress:
         return self._stored is not None and self.sequence <= self._stored.sequence
 
     def fall_silent(self, after_s: float, trouble: str | None = None) -> None:
-        """Mark the unit as not connected if no usable message arrived for a time.
-
-        Parameters
-        ----------
-        trouble
-            Why no messages can arrive; None if unknown.
-        """
+        """Mark the unit as not connected if no usable message arrived for a time."""
         if self._clock.monotonic_s() - self._arrived_s <= after_s:
             return
         if self._live.status(self.unit).state in MAY_ARRIVE or self._analyser.is_connected(

@@ -56,13 +56,8 @@ class Outgoing:
 class Outbound:
     """Queue of messages to publish.
 
-    `put` waits while the queue is full. The ring of the device buffers samples meanwhile, and if it
-    overruns, the index of the next block shows the exact gap.
-
-    Parameters
-    ----------
-    capacity
-        Maximum size in bytes; a larger message waits alone.
+    `put` waits while ``capacity`` bytes are queued. The ring of the device buffers samples
+    meanwhile, and if it overruns, the index of the next block shows the exact gap.
     """
 
     def __init__(self, units: Iterable[str], capacity: int, clock: Clock) -> None:
@@ -148,11 +143,6 @@ class Publisher:
 
     One message per unit is sent at a time, so that the messages of a unit arrive in order. A
     message that was not confirmed is sent again with the same id.
-
-    Parameters
-    ----------
-    identities
-        Identity of each unit, which its messages carry.
     """
 
     def __init__(

@@ -62,15 +62,7 @@ class ReplicaDeliveries:
 
 @dataclass(frozen=True)
 class ReplicaMetrics:
-    """Collector of a process that only serves.
-
-    Parameters
-    ----------
-    bearings
-        Bearings of every unit.
-    receivers
-        State of the receivers as `scrape` read it; None if the outbox cannot be read.
-    """
+    """Collector of a process that only serves."""
 
     bearings: Mapping[str, Sequence[str]]
     live: ReplicaLive

@@ -66,11 +66,6 @@ class ReplicaLive:
     Ages are measured by the monotonic clock of this process from the arrival of a report, less the
     delay of the report. The clocks of the hosts need not agree, and a report that the database
     delayed does not make its values younger.
-
-    Parameters
-    ----------
-    stale_after_s
-        Age above which a result is no longer current.
     """
 
     def __init__(self, units: Iterable[str], clock: Clock, stale_after_s: float) -> None:
@@ -287,13 +282,7 @@ class ReplicaFilms:
 
 
 class ReplicaAlarms:
-    """Alarms of the reports and of the table of alarms.
-
-    Parameters
-    ----------
-    is_alive
-        Returns whether a unit is analysed; otherwise its alarms are not judged.
-    """
+    """Alarms of the reports and of the table of alarms; those of silent units are not judged."""
 
     def __init__(
         self, units: Iterable[str], is_alive: Callable[[str], bool], chatter_rule: ChatterRule

@@ -126,15 +126,10 @@ INTERRUPTED = Answer(
 
 
 class CommandWorker:
-    """Carries out commands one after the other, in order.
+    """Carries out the commands on the held units, one after the other.
 
     A command on an alarm is answered in the transaction that stores the event of the alarm.
     Therefore an open command was not carried out, and another process can start it anew.
-
-    Parameters
-    ----------
-    held
-        Returns the units that this process is responsible for.
     """
 
     def __init__(

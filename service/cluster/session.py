@@ -104,11 +104,6 @@ PING_S = 5
 async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStreamContext]:
     """Connect to the servers; the body is cancelled when the connection is lost.
 
-    Parameters
-    ----------
-    name
-        Name of the connection on the servers.
-
     Raises
     ------
     StreamError

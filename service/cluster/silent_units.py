@@ -27,15 +27,10 @@ EVERY_S = 1.0
 
 
 class SilentUnits:
-    """Raises an alarm about a unit whose reports have stopped, while this process leads.
+    """Raises alarms about all units whose reports have stopped, while this process leads.
 
     Ages are measured by the monotonic clock of this process from the arrival of a report, so that
     the clocks of the hosts need not agree. Time in which reports cannot be read does not count.
-
-    Parameters
-    ----------
-    units
-        All units of the plant, including those that other processes analyse.
     """
 
     def __init__(
@@ -114,15 +109,10 @@ def silences_s(units: Iterable[UnitSettings], least_s: float) -> dict[str, float
 
 
 class SilenceWatch:
-    """Marks units as not connected that have sent nothing for some time.
+    """Marks units as not connected that have sent nothing for their longest silence.
 
     This includes units whose restored state says that samples arrive while the stream has not been
     reached since the start.
-
-    Parameters
-    ----------
-    after_s
-        Longest time without messages, by unit.
     """
 
     def __init__(

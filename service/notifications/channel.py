@@ -29,13 +29,7 @@ class Refused:
 
 @dataclass(frozen=True)
 class Failed:
-    """The attempt failed and will be repeated.
-
-    Parameters
-    ----------
-    retry_after_s
-        Delay requested by the receiver; None without a request.
-    """
+    """The attempt failed and is repeated, after a delay if the receiver requested one."""
 
     answer: str
     retry_after_s: float | None = None
@@ -53,13 +47,7 @@ class Channel(Protocol):
         ...
 
     async def send(self, message: Message, body: str) -> Outcome:
-        """Make one attempt, which ends within the time-outs of the settings.
-
-        Parameters
-        ----------
-        body
-            The serialized message.
-        """
+        """Make one attempt within the time-outs; ``body`` is the serialized message."""
         ...
 
 

@@ -92,19 +92,7 @@ class LiveContext:
 
 
 class Composer:
-    """Composes messages about a plant.
-
-    Parameters
-    ----------
-    plant
-        Name of the plant.
-    url
-        URL of the dashboard; None if it is not known.
-    unit_names
-        Names of the units by id.
-    new_id
-        Returns a unique identifier.
-    """
+    """Composes messages about a plant; ``url`` is the dashboard, ``new_id`` returns unique ids."""
 
     def __init__(
         self,

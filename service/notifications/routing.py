@@ -55,13 +55,7 @@ def notice_of(alarm: Alarm, event: AlarmEvent) -> Notice | None:
 
 
 class Router:
-    """Makes letters of events while these are being stored.
-
-    Parameters
-    ----------
-    now_ns
-        Clock of the host.
-    """
+    """Makes letters of events while these are being stored."""
 
     def __init__(
         self,

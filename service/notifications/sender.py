@@ -66,13 +66,7 @@ S_PER_H = 3600.0
 
 @dataclass(frozen=True)
 class Receiver:
-    """A receiver of notifications.
-
-    Parameters
-    ----------
-    name
-        Name of its letters in the outbox.
-    """
+    """A receiver of notifications."""
 
     name: str
     settings: AnyReceiver
@@ -287,11 +281,6 @@ def receiver_views(
 ) -> list[ReceiverView]:
     """Return the state of all receivers: those of the plant file, then others with letters.
 
-    Parameters
-    ----------
-    status
-        Returns the status of the sender of a receiver.
-
     Raises
     ------
     StoreError
@@ -308,13 +297,7 @@ def receiver_views(
 
 
 class Deliveries:
-    """Runs an independent sender for each receiver.
-
-    Parameters
-    ----------
-    receivers
-        Empty in a replay, which sends nothing.
-    """
+    """Runs an independent sender for each receiver."""
 
     def __init__(self, receivers: Sequence[Receiver], outbox: Outbox, clock: Clock) -> None:
         self._senders = {each.name: Sender(each, outbox, clock) for each in receivers}

@@ -43,13 +43,7 @@ SocketOption = (
 
 
 class BoundedStream(httpcore2.AsyncNetworkStream):
-    """A connection with a limit on the bytes that are read.
-
-    Parameters
-    ----------
-    n_left
-        Bytes that may still be read.
-    """
+    """A connection with a limit on the bytes that are read."""
 
     def __init__(self, stream: httpcore2.AsyncNetworkStream, n_left: int = MAX_BYTES) -> None:
         self._stream, self._n_left = stream, n_left

@@ -22,19 +22,7 @@ from acquisition.clock import Clock
 
 @dataclass(frozen=True)
 class Seen:
-    """State of a histogram at one time.
-
-    Parameters
-    ----------
-    bounds_s
-        Upper bound of each bucket except the last, which is unbounded.
-    n_up_to
-        Cumulative count at each bound; the last entry counts all.
-    sum_s
-        Sum of all durations.
-    newest_s
-        Newest duration; None before the first.
-    """
+    """State of a histogram: upper bounds, cumulative counts (the last counts all), sum, newest."""
 
     bounds_s: tuple[float, ...]
     n_up_to: tuple[int, ...]
@@ -111,21 +99,19 @@ def histogram(name: str, meaning: str, durations: Mapping[str, Durations]) -> Me
     """Return a histogram family with the label `unit`."""
     family = HistogramMetricFamily(f"padwatch_{name}", meaning, labels=("unit",))
     for unit, its in durations.items():
-        seen = its.seen()
-        family.add_metric((unit,), buckets(seen), seen.sum_s)
+        family.add_metric((unit,), *_buckets(its.seen()))
     return family
 
 
 def plain_histogram(name: str, meaning: str, durations: Durations) -> Metric:
     """Return a histogram family without labels."""
-    seen = durations.seen()
-    return HistogramMetricFamily(f"padwatch_{name}", meaning, buckets(seen), seen.sum_s)
+    return HistogramMetricFamily(f"padwatch_{name}", meaning, *_buckets(durations.seen()))
 
 
-def buckets(seen: Seen) -> list[tuple[str, float]]:
-    """Return the bounds as Prometheus writes them, each with its cumulative count."""
-    bounds = [*(repr(bound) for bound in seen.bounds_s), "+Inf"]
-    return [(bound, float(n)) for bound, n in zip(bounds, seen.n_up_to, strict=True)]
+def _buckets(seen: Seen) -> tuple[list[tuple[str, float]], float]:
+    """Return the bounds as text, each with its cumulative count, and the sum."""
+    bounds = [*map(repr, seen.bounds_s), "+Inf"]
+    return list(zip(bounds, map(float, seen.n_up_to), strict=True)), seen.sum_s
 
 
 TEXT = exposition.CONTENT_TYPE_PLAIN_0_0_4

@@ -75,13 +75,7 @@ def _current_task() -> asyncio.Task[Any] | None:
 
 
 class TimedSource:
-    """A source whose polls are measured.
-
-    Parameters
-    ----------
-    make
-        Creates the source with the clock that it must wait by.
-    """
+    """A source whose polls are measured."""
 
     def __init__(self, make: Callable[[Clock], SampleSource], clock: Clock) -> None:
         self._clock = PollClock(clock)

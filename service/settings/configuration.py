@@ -1,4 +1,4 @@
-"""`Configuration`: the settings of the plant file without secrets, named by their hash."""
+"""Configuration: the settings of the plant file without secrets, identified by their hash."""
 
 import hashlib
 import json
@@ -14,18 +14,12 @@ FORMAT = "padwatch-configuration"
 LEFT_OUT = "left out"
 
 SECRETS = ("secret", "authorization", "password", "username")
-"""Keys whose values are secret, in any table."""
+"""Keys of secret values in any table."""
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """A configuration and its version, the SHA-256 of its text.
-
-    Parameters
-    ----------
-    text
-        Canonical JSON: keys sorted, no spaces, UTF-8.
-    """
+    """A configuration and its version, the SHA-256 of its text."""
 
     text: bytes
 
@@ -36,13 +30,7 @@ class Configuration:
 
 
 def configuration_of(plant: PlantFile, program: str, commit: str | None) -> Configuration:
-    """Return the configuration of a plant file without its secrets.
-
-    Parameters
-    ----------
-    program, commit
-        Version of padwatch, and the commit that it was built from, if that is known.
-    """
+    """Return the configuration of a plant file without its secrets."""
     settings = without_secrets(plant.model_dump(mode="json"))
     document = {"format": FORMAT, "version": 1, "padwatch": program, "commit": commit}
     return Configuration(canonical(document | {"settings": settings}))

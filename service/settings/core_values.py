@@ -1,4 +1,6 @@
-"""Settings of units as values of core: machine, calibration, analysis, alarm and film rules."""
+"""Conversion of settings to values of core: machine, calibration, analysis and rules."""
+
+from collections.abc import Mapping
 
 from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.alarms.judgements import OrderVector, VectorReference
@@ -19,7 +21,6 @@ from service.settings.films import FilmAlarmSettings
 from service.settings.limits import (
     GapLimitSettings,
     LimitSettings,
-    VectorReferenceSettings,
     ZoneSettings,
     ZoneTableSettings,
     states_of,
@@ -45,7 +46,7 @@ ACCURACY_KEYS = {
 
 
 def machine_of(settings: UnitSettings) -> Unit:
-    """Return the unit in core's terms."""
+    """Return the unit as a value of core."""
     return Unit(
         id=settings.id,
         rated_speed_rpm=settings.rated_speed_rpm,
@@ -62,7 +63,7 @@ def machine_of(settings: UnitSettings) -> Unit:
 
 
 def _channel(settings: ChannelSettings) -> Channel:
-    calibration = _calibration(settings)
+    calibration = ChannelCalibration(**settings.scale)
     return Channel(
         id=settings.id,
         measurand=settings.measurand,
@@ -77,20 +78,16 @@ def _channel(settings: ChannelSettings) -> Channel:
     )
 
 
-def _calibration(settings: ChannelSettings) -> ChannelCalibration:
-    return ChannelCalibration(**settings.scale)
-
-
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
+    gain = {channel.id: channel.gain_uncertainty for channel in unit.channel}
     return Bearing(
         **settings.model_dump(exclude=ACCURACY_KEYS | {"alarms", "watched_estimator"}),
-        accuracy=_accuracy(settings, unit),
-        gap_accuracy=_gap_accuracy(settings, unit),
+        accuracy=_accuracy(settings, gain),
+        gap_accuracy=_gap_accuracy(settings, gain),
     )
 
 
-def _gap_accuracy(settings: BearingSettings, unit: UnitSettings) -> GapAccuracy:
-    gain = _gains(unit)
+def _gap_accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> GapAccuracy:
     return GapAccuracy(
         gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
         reference_um=settings.gap_reference_uncertainty_um,
@@ -100,13 +97,8 @@ def _gap_accuracy(settings: BearingSettings, unit: UnitSettings) -> GapAccuracy:
     )
 
 
-def _gains(unit: UnitSettings) -> dict[str, float]:
-    return {channel.id: channel.gain_uncertainty for channel in unit.channel}
-
-
-def _accuracy(settings: BearingSettings, unit: UnitSettings) -> BearingAccuracy:
-    """Return the worse of two transducers, for both directions."""
-    gain = _gains(unit)
+def _accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> BearingAccuracy:
+    """Return the accuracy of both directions, by the less accurate transducer."""
     return BearingAccuracy(
         shaft_gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
         bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),
@@ -123,7 +115,7 @@ def calibration_of(settings: UnitSettings) -> UnitCalibration:
     return UnitCalibration(
         unit=settings.id,
         rate_hz=settings.rate_hz,
-        channels=tuple(_calibration(c) for c in settings.channel),
+        channels=tuple(ChannelCalibration(**c.scale) for c in settings.channel),
         slow=tuple(SlowCalibration(c.id, c.minimum, c.maximum) for c in settings.slow_channel),
         block_samples=settings.block_samples,
     )
@@ -177,15 +169,12 @@ def chatter_rule_of(alarms: AlarmSettings) -> ChatterRule:
 def references_of(unit: UnitSettings) -> list[VectorReference]:
     """Return the 1× reference vectors of the plant file."""
     return [
-        VectorReference(unit.id, bearing.id, state, _vectors(reference))
+        VectorReference(unit.id, bearing.id, state, vectors)
         for bearing in unit.bearing
         for reference in bearing.alarms.order1_reference
+        for vectors in [{at: OrderVector(*vector) for at, vector in reference.vectors().items()}]
         for state in states_of(reference.states)
     ]
-
-
-def _vectors(reference: VectorReferenceSettings) -> dict[str, OrderVector]:
-    return {place: OrderVector(*vector) for place, vector in reference.vectors().items()}
 
 
 def _bearing_rules(bearing: BearingSettings) -> BearingRules:

@@ -187,8 +187,11 @@ def _limits(
 
 
 if TYPE_CHECKING:
-    AmplitudeLimitSettings = SpanLimitSettings = VelocityLimitSettings = LimitSettings
-    EccentricityLimitSettings = VectorChangeLimitSettings = LimitSettings
+    AmplitudeLimitSettings = LimitSettings
+    SpanLimitSettings = LimitSettings
+    VelocityLimitSettings = LimitSettings
+    EccentricityLimitSettings = LimitSettings
+    VectorChangeLimitSettings = LimitSettings
 else:
     AmplitudeLimitSettings = _limits(
         "AmplitudeLimitSettings",

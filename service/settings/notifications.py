@@ -16,7 +16,6 @@ from service.settings.base import (
     MisfitError,
     Settings,
     refuse_twice,
-    refuse_unknown_units,
 )
 
 TimeOfDay = Annotated[str, StringConstraints(pattern=r"^([01][0-9]|2[0-3]):[0-5][0-9]$")]
@@ -232,11 +231,6 @@ class DeliverySettings(Settings):
             raise MisfitError(fault, "dashboard_url")
         refuse_twice(("receiver", n, "id", each.id) for n, each in enumerate(self.receiver))
         return self
-
-    def require_units(self, known: tuple[str, ...]) -> None:
-        """Refuse a receiver of an unknown unit."""
-        for n, receiver in enumerate(self.receiver):
-            refuse_unknown_units(receiver.units or (), known, "delivery", "receiver", n, "units")
 
 
 def url_fault(url: str) -> str | None:

@@ -1,19 +1,12 @@
 """Stored data: database, retention, recordings, evidence, disk limits, origin."""
 
-from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StringConstraints, model_validator
 
-from service.settings.base import (
-    Identifier,
-    MisfitError,
-    SecretMisfitError,
-    Settings,
-    refuse_unknown_units,
-)
+from service.settings.base import Identifier, MisfitError, SecretMisfitError, Settings
 from service.settings.processes import FilePath
 
 Conninfo = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
@@ -134,10 +127,6 @@ class RecordingSettings(Settings):
     max_days: Annotated[float, Field(gt=0.0, le=36_500.0)] = 30.0
     """Age above which recordings are removed, days. It applies once a day of recordings of the unit
     exists, so that a wrong clock removes nothing."""
-
-    def require_units(self, known: Sequence[str]) -> None:
-        """Refuse an unknown unit."""
-        refuse_unknown_units(self.units, known, "recording", "units")
 
     def keeps(self, unit: str) -> bool:
         """Return whether all samples of a unit are recorded."""

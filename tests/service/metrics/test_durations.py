@@ -12,7 +12,7 @@ from acquisition.clock import Clock
 from core.samples.blocks import SampleBlock
 from service.measuring.counters import MAX_REASONS, bounded
 from service.measuring.timings import Timings
-from service.runtime.heartbeats import Unheard
+from service.runtime.heartbeats import Pulse
 from service.runtime.metrics import Durations
 from service.runtime.polls import PollClock, TimedSource
 
@@ -112,7 +112,7 @@ async def test_a_source_that_is_connected_again_begins_anew(stepped_clock: Any) 
 
 async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(stepped_clock: Any) -> None:
     """As that of a CAN bus does; it says nothing of the task that reads the source."""
-    pulse = Mock(spec=Unheard)
+    pulse = Mock(spec=Pulse)
     polls = PollClock(stepped_clock)
     polls.listen(pulse)
     assert await asyncio.to_thread(polls.monotonic_s) == stepped_clock.monotonic_s()

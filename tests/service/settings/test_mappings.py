@@ -75,7 +75,7 @@ WRONG_CSV = [
     (FORMAT, 'format = "tdms"', ":6: time.form = 'iso8601': is only for csv, this is tdms"),
     ('"column"\n', '"file"\n', ":4: time.source = 'file': csv has no time of its own; write"),
     ('form = "iso8601"\n', "", 'time.form: is needed for source "column"'),
-    ("iso8601", "elapsed_s", "time.start: is needed: what time counts from"),
+    ("iso8601", "elapsed_s", "time.start: is needed as the origin of the times"),
     ("iso8601", "timestamp", "time.form = 'timestamp': is only for tdms, this is csv"),
     ("zone = ", "start = 2026-01-01\nzone = ", "time.start"),
     ("zone = ", "start = 2026-01-01T00:00:00\nzone = ", "time.start"),
