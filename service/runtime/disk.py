@@ -60,10 +60,11 @@ def measure_disk(folder: Path) -> DiskSpace:
 
 EVERY_S = 600.0
 OVER_S = 86_400.0
-"""The pace is a day's mean: captures follow alarms, backups run at night."""
+"""Interval of the stored measurements, and length of the history: the mean of a day includes
+captures and nightly backups."""
 
-LEAST_S = 3600.0
-"""Shortest time that a pace is estimated from."""
+MIN_HISTORY_S = 3600.0
+"""Shortest history that a pace is estimated from."""
 
 S_PER_DAY = 86_400.0
 
@@ -87,7 +88,7 @@ class Growth:
             return None
         since_s, free_then = self._seen[0]
         lasted_s, taken = now_s - since_s, free_then - space.free_bytes
-        if lasted_s < LEAST_S or taken <= 0:
+        if lasted_s < MIN_HISTORY_S or taken <= 0:
             return None
         return space.free_bytes / taken * lasted_s / S_PER_DAY
 
