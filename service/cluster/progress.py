@@ -154,9 +154,9 @@ class UnitProgress:
         if stored is None or self._memory is None or self.sequence:
             return
         if first_sequence > stored.sequence + 1:
-            log.error("the stream does not reach back to what is stored", unit=self.unit)
+            log.error("the stream begins after the stored results", unit=self.unit)
         elif first_sequence > stored.window_sequence:
-            log.warning("the stream holds less than the window", unit=self.unit)
+            log.warning("the stream begins within the window of the analysis", unit=self.unit)
 
     async def take(self, sequence: int, payload: bytes) -> bool:
         """Process a message; return False if it is refused."""

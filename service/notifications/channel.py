@@ -1,4 +1,4 @@
-"""What all channels share: outcomes of an attempt, secrets, TLS and connections."""
+"""Shared parts of channels: outcomes of an attempt, secrets, TLS and connections."""
 
 import asyncio
 import os

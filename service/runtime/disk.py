@@ -102,7 +102,7 @@ DEADBAND_SHARE = 0.2
 
 @dataclass(frozen=True)
 class SpaceLimits:
-    """Limits of free space; the limit that is reached first counts."""
+    """Limits of free space in shares and in bytes; the limit that is reached first applies."""
 
     alert_share: float = 0.1
     danger_share: float = 0.05

@@ -1,4 +1,4 @@
-"""`ALARM_KINDS`: all kinds of alarms, those of units and those about the service itself."""
+"""Table of all kinds of alarms: those of units and those about the service."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

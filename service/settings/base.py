@@ -1,4 +1,4 @@
-"""What all settings models share."""
+"""Base class of settings, errors and shared checks."""
 
 import re
 from collections.abc import Iterable

@@ -211,7 +211,9 @@ class ChannelSettings(Settings):
         )
         for key in (*others, *(VOLTAGE_KEYS if in_counts else ())):
             if getattr(self, key) is not None:
-                raise MisfitError("a channel is in volts or in scaled counts, not in both", key)
+                raise MisfitError(
+                    "must not be given: a channel is either in volts or in scaled counts", key
+                )
         for key in keys:
             if getattr(self, key) is None:
                 raise MissingError("is missing", key)
@@ -224,13 +226,13 @@ class ChannelSettings(Settings):
     def _check_key_phase(self) -> None:
         for key in NO_KEY_PHASE_KEYS:
             if getattr(self, key) not in (None, (), 0.0):
-                raise MisfitError("a key_phase has none; leave it out", key)
+                raise MisfitError("does not apply to a key_phase; remove it", key)
 
     def _check_runout(self) -> None:
         for key in ("probe", "slow_roll"):
             if getattr(self, key) is not None and self.transducer not in SHAFT_TRANSDUCERS:
                 words = " or ".join(SHAFT_TRANSDUCERS)
-                raise MisfitError(f"is for a {words}; this is a {self.transducer}", key)
+                raise MisfitError(f"applies to a {words}; this is a {self.transducer}", key)
         if self.slow_roll is not None and self.probe is None:
             raise MisfitError("must be given with slow_roll, which belongs to one probe", "probe")
 

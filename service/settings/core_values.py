@@ -253,7 +253,7 @@ def film_rules_of(unit: UnitSettings, settings: FilmAlarmSettings) -> FilmRules 
 
 
 def watched_estimator(unit: UnitSettings, bearing: BearingSettings) -> Estimator:
-    """Return the estimator whose stiffness is compared; one estimator makes it comparable."""
+    """Return the estimator whose stiffness is compared with its baseline."""
     if bearing.watched_estimator is not None:
         return bearing.watched_estimator
     if isinstance(unit.source, ModbusVectorSettings):

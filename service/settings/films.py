@@ -105,7 +105,7 @@ class OperatingModel(Settings):
     """Limits of the operating states, as shares of rated speed and power."""
 
     standing_below: Share = OperatingLimits.standing_below
-    """Share of the rated speed below which a unit stands still."""
+    """Share of the rated speed below which a unit is stopped."""
 
     at_speed_above: Share = OperatingLimits.at_speed_above
     """Share of the rated speed above which it is at speed."""

@@ -47,10 +47,10 @@ class RegionSettings(Settings):
     @model_validator(mode="after")
     def _check_region(self) -> Self:
         refuse_twice(("states", n, name) for n, name in enumerate(self.states or ()))
-        for key, (least, most) in RANGES.items():
+        for key, (low, high) in RANGES.items():
             bounds: Bounds | None = getattr(self, key)
-            if bounds is not None and not least <= bounds[0] < bounds[1] <= most:
-                raise MisfitError(f"must rise, and lie within {least:g} to {most:g}", key)
+            if bounds is not None and not low <= bounds[0] < bounds[1] <= high:
+                raise MisfitError(f"must increase, within {low:g} to {high:g}", key)
         return self
 
     def region(self, states: StateNames) -> Region:
@@ -71,7 +71,7 @@ def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None
     regions = [table.region(states) for table in tables]
     for n, m in combinations(range(len(tables)), 2):
         if regions[n].overlaps(regions[m]):
-            raise MisfitError(f"holds under conditions of table {n + 1}, too", "table", m)
+            raise MisfitError(f"overlaps the conditions of table {n + 1}", "table", m)
 
 
 class WatchSettings(Settings):

@@ -146,7 +146,7 @@ class DynamicModel(Settings):
         for name in ("band_hz", "quiet_band_hz"):
             low, high = getattr(self, name)
             if not 0.0 < low < high:
-                raise MisfitError(f"must rise from above 0, got [{low:g}, {high:g}]", name)
+                raise MisfitError(f"must increase from above 0, got [{low:g}, {high:g}]", name)
         return self
 
 

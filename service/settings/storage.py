@@ -192,7 +192,7 @@ class SpaceSettings(Settings):
 
 
 class Origin(StrEnum):
-    """Where samples come from; a replay never shares a database with the live plant."""
+    """Origin of samples; a replay never shares a database with the live plant."""
 
     LIVE = "live"
     REPLAY = "replay"

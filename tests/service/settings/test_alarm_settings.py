@@ -234,7 +234,7 @@ BETWEEN = "alert_below = 600.0, alert = 700.0"
             ORDER1,
             f"{{ {OTHER} eccentricity_ratio = [0.4, 0.3] }}] }}",
             ".table[1].eccentricity_ratio",
-            "must rise",
+            "must increase",
         ),
         (
             ORDER1,

@@ -113,10 +113,15 @@ BOTH = f'postgresql = "{ADDRESS} passfile=x"\npassword_file = "y"'
         ("alarms", "max_samples_lost_share = 0.0", "max_samples_lost_share = 0.0", "than 0"),
         ("alarms", "store_failing_after_s = -1.0", "store_failing_after_s = -1.0", "equal to 0"),
         ("store", 'password_file = "x"', "password_file = 'x'", "postgresql, which is not given"),
-        ("store", f'postgresql = "{ADDRESS} password=x"', "postgresql", "must not hold a password"),
+        (
+            "store",
+            f'postgresql = "{ADDRESS} password=x"',
+            "postgresql",
+            "must not contain a password",
+        ),
         ("store", 'postgresql = "postgresql://a:x@b.c/d"', "postgresql", "not hold a password"),
-        ("store", 'postgresql = "no address"', "postgresql", "is no connection string of libpq"),
-        ("store", 'postgresql = "hostname=x"', "postgresql", "is no connection string of libpq"),
+        ("store", 'postgresql = "no address"', "postgresql", "is not a libpq connection string"),
+        ("store", 'postgresql = "hostname=x"', "postgresql", "is not a libpq connection string"),
         ("store", BOTH, "password_file = 'y'", "is given as well as passfile"),
     ],
 )
@@ -264,7 +269,7 @@ def test_a_line_that_two_units_or_two_devices_of_a_unit_are_read_on_is_refused(
     [said] = mistakes(text)
 
     assert said.startswith(f"{line}: unit[2].source.device = '/dev/ttyUSB0'")
-    assert "is read by source of unit[1] already: a serial line has one source" in said
+    assert "is read by source of unit[1] already; a line has one source" in said
 
     text, _ = changed(HOST, 'device = "/dev/ttyUSB0"')
     first, unit_1, unit_2 = text.split("\n[[unit]]\n")
