@@ -232,7 +232,7 @@ class PlantFile(Settings):
     """HTTP server and data folder of the running program."""
 
     access: AccessSettings = AccessSettings()
-    """Logins: requirement and duration."""
+    """Logins of people and programs."""
 
     analysis: AnalysisModel = AnalysisModel()
     """Segments and averaging."""

@@ -214,7 +214,7 @@ BETWEEN = "alert_below = 600.0, alert = 700.0"
         (GAP, "{ deadband = 1.0 }", ".alert", "alert_below or danger_below"),
         (GAP, "{ alert_below = 600.0, danger_below = 700.0 }", ".alert_below", "danger_below, 700"),
         (GAP, "{ alert_below = 600.0, alert = 500.0 }", ".alert = 500.0", "above alert_below, 600"),
-        (GAP, f"{{ {BETWEEN}, deadband = 50.0 }}", ".deadband = 50", "between, 50"),
+        (GAP, f"{{ {BETWEEN}, deadband = 50.0 }}", ".deadband = 50", "half the range, 50"),
         (ZONES, ONE_TABLE.format(2.0, 2.0, 3.0), ".table[1].b_c = 2.0", "a_b, 2"),
         (ZONES, ONE_TABLE.format(1.0, 2.0, 1.5), ".table[1].c_d = 1.5", "b_c, 2"),
         (ZONES, ONE_TABLE.format(0.0, 2.0, 3.0), ".table[1].a_b = 0.0", "than 0"),

@@ -66,9 +66,9 @@ ROLL = f"{CHANNEL_1}slow_roll."
 @pytest.mark.parametrize(
     ("old", "new", "key", "said"),
     [
-        ('e = "kp"', 'e = "kq"', "unit[1].key_phase = 'kq'", "there is kp"),
+        ('e = "kp"', 'e = "kq"', "unit[1].key_phase = 'kq'", "such channels: kp"),
         ('e = "kp"', 'e = "ujb_bearing_x"', "unit[1].key_phase = 'ujb_", 'transducer "key_phase"'),
-        ('_x = "ujb_shaft_x"', '_x = "kp"', "unit[1].bearing[1].shaft_x = 'kp'", "no vibration"),
+        ('_x = "ujb_shaft_x"', '_x = "kp"', "unit[1].bearing[1].shaft_x = 'kp'", "not a vibration"),
         (KEY, f"{KEY}\nsensitivity = 1.0", f"{CHANNEL_13}sensitivity = 1.0", "remove it"),
         (KEY, f'{KEY}\nsensitivity_unit = "V/mm"', f"{CHANNEL_13}sensitivity_unit", "remove it"),
         (KEY, f"{KEY}\n{VECTOR}", f"{CHANNEL_13}slow_roll", "remove it"),
@@ -79,7 +79,7 @@ ROLL = f"{CHANNEL_1}slow_roll."
         ("= 8.0, taken", "= 0.0, taken", f"{ROLL}speed_rpm = 0.0", "than 0"),
         ("10:00:00Z", "10:00:00", f"{ROLL}taken = 2026-03-01T10:00:00", "timezone"),
         ("taken = 2026-03-01T10:00:00Z, ", "", f"{ROLL}taken is missing", "offset"),
-        (', probe = "SN123" }', " }", f"{ROLL}probe is missing", "Another one"),
+        (', probe = "SN123" }', " }", f"{ROLL}probe is missing", "another probe"),
         (', probe = "SN123" }', ', probe = "" }', f"{ROLL}probe = ''", "1 char"),
         (SHAFT_X + 'probe = "SN123"\n', SHAFT_X, f"{CHANNEL_1}probe (by default)", "slow_roll"),
         ("sensitivity = 4.0\n", "", f"{CHANNEL_1}sensitivity (by default)", "0.5 to 50 V/mm"),

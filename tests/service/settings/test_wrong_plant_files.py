@@ -119,7 +119,7 @@ BOTH = f'postgresql = "{ADDRESS} passfile=x"\npassword_file = "y"'
             "postgresql",
             "must not contain a password",
         ),
-        ("store", 'postgresql = "postgresql://a:x@b.c/d"', "postgresql", "not hold a password"),
+        ("store", 'postgresql = "postgresql://a:x@b.c/d"', "postgresql", "not contain a password"),
         ("store", 'postgresql = "no address"', "postgresql", "is not a libpq connection string"),
         ("store", 'postgresql = "hostname=x"', "postgresql", "is not a libpq connection string"),
         ("store", BOTH, "password_file = 'y'", "is given as well as passfile"),
