@@ -69,7 +69,7 @@ async def run_acquire(
     beats, live = Heartbeats(clock), live_view(plant, clock)
     identities = {unit.id: identity_of(plant, unit) for unit in plant.unit if unit.id in units}
     publisher = Publisher(plant, settings, identities, clock)
-    acquirer = Acquirer(units, live, clock, publisher.publish, publisher.tell, beats)
+    acquirer = Acquirer(units, live, clock, publisher.publish, publisher.publish_link, beats)
     health = HealthServer(_health(publisher, live, beats, list(units)), listener, clock)
     supervision = Supervision(manager, beats, live, units, clock)
     stopped = stop_on_signals()

@@ -112,11 +112,6 @@ class Outbound:
         async with self._room:
             self._room.notify_all()
 
-    async def published_at_least(self, n_messages: int) -> None:
-        """Wait until this many messages have been published since the start."""
-        async with self._room:
-            await self._room.wait_for(lambda: self.n_published >= n_messages)
-
     async def drained(self) -> None:
         """Wait until the queue is empty."""
         async with self._room:
@@ -181,7 +176,7 @@ class Publisher:
             return now_ns
         return now_ns - ns_from_s(self._clock.monotonic_s() - block.sampled_s)
 
-    def tell(self, news: LinkNews) -> None:
+    def publish_link(self, news: LinkNews) -> None:
         """Queue news of a link, unless they are unchanged."""
         if self._links.get(news.unit) == news:
             return

@@ -204,7 +204,7 @@ def _listening(source: SampleSource, pulse: Pulse) -> Callable[[], None]:
     """What to say before a source is waited for; one that cannot be heard may take for ever."""
     if not isinstance(source, TimedSource):
         return pulse.rest
-    source.listen(pulse)
+    source.set_pulse(pulse)
     return pulse.beat
 
 

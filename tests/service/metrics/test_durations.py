@@ -114,7 +114,7 @@ async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(stepped_clo
     """As that of a CAN bus does; it says nothing of the task that reads the source."""
     pulse = Mock(spec=Pulse)
     polls = PollClock(stepped_clock)
-    polls.listen(pulse)
+    polls.set_pulse(pulse)
     assert await asyncio.to_thread(polls.monotonic_s) == stepped_clock.monotonic_s()
     pulse.beat.assert_not_called()
     polls.monotonic_s()
