@@ -3,9 +3,9 @@
 import math
 from collections.abc import Sequence
 from itertools import combinations, pairwise
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, ValidationError, create_model, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from core.alarms.rules import Region, States
 from core.condition.operating_state import OperatingState
@@ -162,72 +162,69 @@ class LimitSettings(WatchSettings):
             raise MisfitError(f"must be below the lowest limit, {given[0]:g}", "deadband")
 
 
-def _limits(
-    name: str, of: str, unit: str, highest: float, examples: tuple[float, float], deadband: float
-) -> type[LimitSettings]:
-    """Declare the limits of a quantity in a unit, with its highest value and default deadband."""
-    limit = Annotated[float, Field(gt=0.0, le=highest)] | None
-    alert = f"Value above which the alarm is an alert, {unit}; example: {examples[0]}."
-    danger = (
-        f"Value above which it is a danger, {unit}; must be above alert; example: {examples[1]}."
-    )
-    width = f"How far below a limit the value must fall for the alarm to return, {unit}."
-    return create_model(
-        name,
-        __base__=LimitSettings,
-        __module__=__name__,
-        __doc__=f"Limits of {of}.",
-        alert=(limit, Field(None, description=alert)),
-        danger=(limit, Field(None, description=danger)),
-        deadband=(
-            Annotated[float, Field(ge=0.0, le=highest)],
-            Field(deadband, description=width),
-        ),
-    )
+class AmplitudeLimitSettings(LimitSettings):
+    """Limits of a shaft's vibration at 1×. padwatch is not a protection system: these inform."""
+
+    alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
+    """Value above which the alarm is an alert, µm zero-to-peak; example: 150.0."""
+
+    danger: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
+    """Value above which it is a danger, µm zero-to-peak; must be above alert; example: 250.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=5000.0)] = 5.0
+    """How far below a limit the amplitude must fall for the alarm to return, µm."""
 
 
-if TYPE_CHECKING:
-    AmplitudeLimitSettings = LimitSettings
-    SpanLimitSettings = LimitSettings
-    VelocityLimitSettings = LimitSettings
-    EccentricityLimitSettings = LimitSettings
-    VectorChangeLimitSettings = LimitSettings
-else:
-    AmplitudeLimitSettings = _limits(
-        "AmplitudeLimitSettings",
-        "a shaft's vibration at 1×",
-        "µm zero-to-peak",
-        5e3,
-        (150.0, 250.0),
-        5.0,
-    )
-    SpanLimitSettings = _limits(
-        "SpanLimitSettings",
-        "a shaft's broad-band vibration",
-        "µm peak-to-peak",
-        1e4,
-        (300.0, 500.0),
-        10.0,
-    )
-    VelocityLimitSettings = _limits(
-        "VelocityLimitSettings", "a bearing's broad-band velocity", "mm/s rms", 1e3, (2.0, 4.0), 0.1
-    )
-    EccentricityLimitSettings = _limits(
-        "EccentricityLimitSettings",
-        "the eccentricity ratio",
-        "share of the clearance",
-        5.0,
-        (0.7, 0.9),
-        0.02,
-    )
-    VectorChangeLimitSettings = _limits(
-        "VectorChangeLimitSettings",
-        "the distance of a 1× vector from its reference",
-        "µm zero-to-peak",
-        5e3,
-        (30.0, 60.0),
-        2.0,
-    )
+class SpanLimitSettings(LimitSettings):
+    """Limits of a shaft's broad-band vibration, peak-to-peak."""
+
+    alert: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
+    """Value above which the alarm is an alert, µm peak-to-peak; example: 300.0."""
+
+    danger: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
+    """Value above which it is a danger, µm peak-to-peak; must be above alert; example: 500.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] = 10.0
+    """How far below a limit the value must fall for the alarm to return, µm."""
+
+
+class VelocityLimitSettings(LimitSettings):
+    """Limits of a bearing's broad-band velocity."""
+
+    alert: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
+    """Value above which the alarm is an alert, mm/s rms; example: 2.0."""
+
+    danger: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
+    """Value above which it is a danger, mm/s rms; must be above alert; example: 4.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.1
+    """How far below a limit the velocity must fall for the alarm to return, mm/s."""
+
+
+class EccentricityLimitSettings(LimitSettings):
+    """Limits of the eccentricity ratio, the used share of the clearance."""
+
+    alert: Annotated[float, Field(gt=0.0, le=5.0)] | None = None
+    """Value above which the alarm is an alert; example: 0.7."""
+
+    danger: Annotated[float, Field(gt=0.0, le=5.0)] | None = None
+    """Value above which it is a danger; must be above alert; example: 0.9."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=5.0)] = 0.02
+    """How far below a limit the ratio must fall for the alarm to return."""
+
+
+class VectorChangeLimitSettings(LimitSettings):
+    """Limits of the distance of a 1× vector from its reference; without phase, of its length."""
+
+    alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
+    """Value above which the alarm is an alert, µm zero-to-peak; example: 30.0."""
+
+    danger: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
+    """Value above which it is a danger, µm zero-to-peak; must be above alert; example: 60.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=5000.0)] = 2.0
+    """How far below a limit the distance must fall for the alarm to return, µm."""
 
 
 class TemperatureLimitSettings(LimitSettings):
