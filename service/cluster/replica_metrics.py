@@ -117,5 +117,5 @@ def unit_metrics(live: ReplicaLive, units: Sequence[str]) -> Iterator[Metric]:
     meaning = "Since the last report of the process that analyses the unit."
     yield gauge("unit_silence_seconds", meaning, UNIT, silence)
     ages = (((u,), age) for u in units if (age := live.data_age_s(u)) is not None)
-    yield gauge("data_age_seconds", "Since the newest samples arrived.", UNIT, ages)
+    yield gauge("data_age_seconds", "Since samples arrived last.", UNIT, ages)
     yield one("reports_readable", "1 if the database could be read.", live.read_error is None)
