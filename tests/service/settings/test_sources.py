@@ -246,7 +246,7 @@ CAN_OWN = ({"signals": {"x": "A.b"}}, {"counters": ["A.b"]}, {"epoch": "A.b"})
         (CAN | {"when_full": "block"}, "drop"),
         (CAN | {"options": {"a b": 1}}, "pattern"),
         (CAN | {"stale_after": 3.0}, "Extra inputs"),
-        *((CAN_PROFILE | own, "the profile knows its own") for own in CAN_OWN),
+        *((CAN_PROFILE | own, "a profile has its own") for own in CAN_OWN),
     ],
 )
 def test_a_wrong_value_of_a_can_source_is_refused(source, words):
