@@ -21,7 +21,7 @@ from acquisition.clock import Clock
 
 
 @dataclass(frozen=True)
-class Seen:
+class HistogramState:
     """State of a histogram: upper bounds, cumulative counts (the last counts all), sum, newest."""
 
     bounds_s: tuple[float, ...]
@@ -68,11 +68,11 @@ class Durations:
         yield
         self.observe(self._clock.monotonic_s() - began_s)
 
-    def seen(self) -> Seen:
+    def state(self) -> HistogramState:
         """Return the current state."""
         with self._lock:
             n_up_to = tuple(accumulate(self._n_in))
-            return Seen(self._bounds_s, n_up_to, self._sum_s, self._newest_s)
+            return HistogramState(self._bounds_s, n_up_to, self._sum_s, self._newest_s)
 
 
 Rows = Iterable[tuple[tuple[str, ...], float]]
@@ -99,19 +99,19 @@ def histogram(name: str, meaning: str, durations: Mapping[str, Durations]) -> Me
     """Return a histogram family with the label `unit`."""
     family = HistogramMetricFamily(f"padwatch_{name}", meaning, labels=("unit",))
     for unit, its in durations.items():
-        family.add_metric((unit,), *_buckets(its.seen()))
+        family.add_metric((unit,), *_buckets(its.state()))
     return family
 
 
 def plain_histogram(name: str, meaning: str, durations: Durations) -> Metric:
     """Return a histogram family without labels."""
-    return HistogramMetricFamily(f"padwatch_{name}", meaning, *_buckets(durations.seen()))
+    return HistogramMetricFamily(f"padwatch_{name}", meaning, *_buckets(durations.state()))
 
 
-def _buckets(seen: Seen) -> tuple[list[tuple[str, float]], float]:
+def _buckets(state: HistogramState) -> tuple[list[tuple[str, float]], float]:
     """Return the bounds as text, each with its cumulative count, and the sum."""
-    bounds = [*map(repr, seen.bounds_s), "+Inf"]
-    return list(zip(bounds, map(float, seen.n_up_to), strict=True)), seen.sum_s
+    bounds = [*map(repr, state.bounds_s), "+Inf"]
+    return list(zip(bounds, map(float, state.n_up_to), strict=True)), state.sum_s
 
 
 TEXT = exposition.CONTENT_TYPE_PLAIN_0_0_4
