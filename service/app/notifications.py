@@ -1,7 +1,7 @@
 """Receivers and routes of notifications, built from the plant file."""
 
 from acquisition.clock import Clock
-from service.notifications.channel import Channel
+from service.notifications.channel import Channel, TrustedAuthorities
 from service.notifications.mail import Mail
 from service.notifications.message import Composer, FindContext
 from service.notifications.routing import Router
@@ -19,7 +19,8 @@ def channels_of(settings: AnyReceiver, clock: Clock) -> list[Channel]:
         case WebhookSettings():
             return [Webhook(settings, clock)]
         case SmtpSettings():
-            return [Mail(settings, recipient) for recipient in settings.recipients]
+            trusted = TrustedAuthorities(settings.ca_file)
+            return [Mail(settings, recipient, trusted) for recipient in settings.recipients]
 
 
 def receivers_of(plant: PlantFile, origin: Origin, clock: Clock) -> list[Receiver]:

@@ -135,9 +135,9 @@ POLICY = SMTP_POLICY.clone(cte_type="7bit", max_line_length=76)
 class Mail:
     """Sends messages to one recipient."""
 
-    def __init__(self, settings: SmtpSettings, recipient: str) -> None:
+    def __init__(self, settings: SmtpSettings, recipient: str, trusted: TrustedAuthorities) -> None:
         self.address = recipient
-        self._settings, self._trusted = settings, TrustedAuthorities(settings.ca_file)
+        self._settings, self._trusted = settings, trusted
         self._look_up = NameLookUp(settings.host, settings.port)
 
     async def send(self, message: Message, body: str) -> Outcome:  # noqa: ARG002

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.notifications.channel import Delivered, Failed, Refused
+from service.notifications.channel import Delivered, Failed, Refused, TrustedAuthorities
 from service.notifications.mail import Mail, mail_of
 from service.notifications.message import Message
 from service.settings.notifications import SmtpSettings
@@ -102,7 +102,8 @@ def mail_to(server: MailServer, ca_file: Path | None = None, **changes: Any) -> 
         "connect_timeout_s": 20.0, "answer_timeout_s": 20.0, "total_timeout_s": 20.0,
         "ca_file": None if ca_file is None else str(ca_file), **changes,
     }  # fmt: skip
-    return Mail(SmtpSettings.model_validate(settings), "desk@x.example")
+    valid = SmtpSettings.model_validate(settings)
+    return Mail(valid, "desk@x.example", TrustedAuthorities(valid.ca_file))
 
 
 async def test_a_mail_says_what_where_since_when_by_how_much_and_under_which_condition(
