@@ -24,7 +24,7 @@ from service.cluster.ownership import Holds, Leadership, Partition
 from service.cluster.progress import UnitProgress, memories_of, usable
 from service.cluster.publisher import Publisher, publisher_metrics
 from service.cluster.session import identity_of
-from service.cluster.silent_units import Silence, SilentUnits, silences_s
+from service.cluster.silent_units import SilenceWatch, SilentUnits, silences_s
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Acquirer, Bus
 from service.measuring.analyser import BUS_CAPACITY, UnitMemory
@@ -32,7 +32,7 @@ from service.measuring.counters import store_info
 from service.measuring.service_alarms import SHARED, StreamLook
 from service.measuring.sources import WatchedUnit
 from service.measuring.timings import Timings, timed_monitors
-from service.notifications.message import Around
+from service.notifications.message import LiveContext
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
@@ -69,7 +69,7 @@ async def run_acquire(
     beats, live = Heartbeats(clock), live_view(plant, clock)
     identities = {unit.id: identity_of(plant, unit) for unit in plant.unit if unit.id in units}
     publisher = Publisher(plant, settings, identities, clock)
-    acquirer = Acquirer(units, live, clock, publisher.publish, publisher.tell, beats)
+    acquirer = Acquirer(units, live, clock, publisher.publish, publisher.publish_link, beats)
     health = HealthServer(_health(publisher, live, beats, list(units)), listener, clock)
     supervision = Supervision(manager, beats, live, units, clock)
     stopped = stop_on_signals()
@@ -148,16 +148,16 @@ async def run_analyse(
     """
     part = partition.part_of(plant)
     live = live_view(part, clock)
-    around = Around(live)
+    alarm_context = LiveContext(live)
     with ExitStack() as stack:
         if plant.store.postgresql is None:
             stack.enter_context(only_one(database_path(plant)))
-        store = open_store(part, Origin.LIVE, router_of(part, Origin.LIVE, around, clock))
+        store = open_store(part, Origin.LIVE, router_of(part, Origin.LIVE, alarm_context, clock))
         stack.callback(store.close)
         ground = Ground(
             part, Origin.LIVE, clock, store, live, Heartbeats(clock), Timings(monitors, clock)
         )
-        analysing = Analysing(plant, partition, settings, monitors, ground, around)
+        analysing = Analysing(plant, partition, settings, monitors, ground, alarm_context)
         try:
             await analysing.run(listener, announce, manager)
         finally:
@@ -174,17 +174,17 @@ class Analysing:
         settings: StreamSettings,
         monitors: Mapping[str, UnitMonitor],
         ground: Ground,
-        around: Around,
+        alarm_context: LiveContext,
     ) -> None:
         self._share, self._settings = partition.share_of(plant), settings
-        self._monitors, self._ground, self._around = monitors, ground, around
+        self._monitors, self._ground, self._alarm_context = monitors, ground, alarm_context
         self._plant = plant
         self._holds = Holds(ground.store, monitors, ground.clock)
         self._stored: dict[str, StreamPosition] = {}
         self._memories: dict[str, UnitMemory] = {}
         self._analysis: Analysis | None = None
         self._consumer: Consumer | None = None
-        self._silence: Silence | None = None
+        self._silence: SilenceWatch | None = None
         self._silent_units: SilentUnits | None = None
 
     async def run(
@@ -228,7 +228,7 @@ class Analysing:
         self._memories = memories_of(self._stored.values())
         stream = StreamLook(self._trouble, self._behind_s)
         analysis = await analysis_on(
-            ground, monitors, bus, self._around, self._share, self._memories, stream
+            ground, monitors, bus, self._alarm_context, self._share, self._memories, stream
         )
         self._analysis = analysis
         consumer = Consumer(
@@ -239,7 +239,7 @@ class Analysing:
         silent = SilentUnits(everywhere, analysis.alarms, ground.store, ground.clock)
         self._silent_units = silent
         after_s = silences_s(ground.plant.unit, self._settings.silent_after_s)
-        self._silence = Silence(after_s, analysis.analyser, ground.live, ground.clock)
+        self._silence = SilenceWatch(after_s, analysis.analyser, ground.live, ground.clock)
         tend = ground.beats.tend
         async with asyncio.TaskGroup() as tasks:
             analysis.start(tasks)

@@ -21,7 +21,7 @@ from service.app.storage import (
     watch,
     waveform_keeper,
 )
-from service.cluster.reported_commands import CarryingOut
+from service.cluster.reported_commands import CommandWorker
 from service.cluster.reported_state import Reporter, process_name
 from service.measuring.acquirer import Bus
 from service.measuring.alarm_engine import WHOLE, AlarmEngine, Listener, PlantPart, alarm_engine
@@ -32,7 +32,7 @@ from service.measuring.references_in_force import ReferencesInForce
 from service.measuring.service_alarms import StreamLook
 from service.measuring.soundness import Soundness
 from service.measuring.sources import vector_rows
-from service.notifications.message import Around
+from service.notifications.message import LiveContext
 from service.notifications.sender import Deliveries
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import Tape
@@ -115,7 +115,7 @@ async def analysis_on(
     ground: Ground,
     monitors: Mapping[str, UnitMonitor],
     bus: Bus,
-    around: Around,
+    alarm_context: LiveContext,
     part: PlantPart = WHOLE,
     memories: Mapping[str, UnitMemory] = NO_MEMORIES,
     stream: StreamLook | None = None,
@@ -126,7 +126,7 @@ async def analysis_on(
     ----------
     bus
         Queue of blocks to the analysis.
-    around
+    alarm_context
         Context of alarms for messages; receives the film monitors.
     part
         Units that this process is responsible for.
@@ -183,7 +183,7 @@ async def analysis_on(
     films = await film_keeper(plant, machines, store.films, clock)
     for unit, memory in memories.items():
         films.resume(unit, memory.films)
-    around.watch_films(films.newest)
+    alarm_context.watch_films(films.newest)
     evidence = evidence_of(plant, origin, live, films, store, captures, clock)
     watch(evidence, alarms, captures, origin)
     references = ReferencesInForce(monitors, store, clock)
@@ -233,5 +233,5 @@ def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> 
     reporter = Reporter(
         process, ground.plant.unit, held, ground.live, *parts, store.unit_states, ground.clock
     )
-    carrying_out = CarryingOut(process, held, *parts, analysis.recorder, store, ground.clock)
+    carrying_out = CommandWorker(process, held, *parts, analysis.recorder, store, ground.clock)
     return {"report": reporter.run, "commands": carrying_out.run}

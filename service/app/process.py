@@ -97,11 +97,11 @@ class Supervision:
 
     def ready(self) -> None:
         """Notify the service manager that the service is ready."""
-        self._manager.tell(READY="1", STATUS=self._status())
+        self._manager.notify(READY="1", STATUS=self._status())
 
     def stopping(self) -> None:
         """Notify the service manager that the service is stopping."""
-        self._manager.tell(STOPPING="1", STATUS="stopping")
+        self._manager.notify(STOPPING="1", STATUS="stopping")
 
     async def run(self) -> None:
         """Check the loops until cancelled."""
@@ -117,9 +117,9 @@ class Supervision:
             self._told = set(troubles)
             _log(words)
         if words:
-            self._manager.tell(STATUS="; ".join(words))
+            self._manager.notify(STATUS="; ".join(words))
         else:
-            self._manager.tell(WATCHDOG="1", STATUS=self._status())
+            self._manager.notify(WATCHDOG="1", STATUS=self._status())
 
     def _status(self) -> str:
         states = [self._live.status(unit).state for unit in self._units]

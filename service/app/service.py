@@ -18,7 +18,7 @@ from service.measuring.acquirer import Bus
 from service.measuring.analyser import BUS_CAPACITY, Runner
 from service.measuring.sources import WatchedUnit
 from service.measuring.timings import Timings, timed, timed_sources
-from service.notifications.message import Around
+from service.notifications.message import LiveContext
 from service.runtime.heartbeats import Heartbeats
 from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
@@ -78,13 +78,13 @@ async def run_service(
     """
     plant, origin = performance.plant, performance.origin
     live = live_view(plant, clock)
-    around = Around(live)
+    alarm_context = LiveContext(live)
     with only_one(database_path(plant)):
-        store = open_store(plant, origin, router_of(plant, origin, around, clock))
+        store = open_store(plant, origin, router_of(plant, origin, alarm_context, clock))
         beats, timings = Heartbeats(clock), Timings(performance.units, clock)
         ground = Ground(plant, origin, clock, store, live, beats, timings)
         try:
-            await _run(performance, ground, around, listener, announce, manager)
+            await _run(performance, ground, alarm_context, listener, announce, manager)
         finally:
             store.close()
 
@@ -92,7 +92,7 @@ async def run_service(
 async def _run(
     performance: Performance,
     ground: Ground,
-    around: Around,
+    alarm_context: LiveContext,
     listener: socket.socket,
     announce: Callable[[str], None],
     manager: ServiceManager,
@@ -102,7 +102,7 @@ async def _run(
     units = timed(performance.units, ground.timings)
     bus = Bus(BUS_CAPACITY, clock)
     monitors = {unit: watched.monitor for unit, watched in units.items()}
-    analysis = await analysis_on(ground, monitors, bus, around)
+    analysis = await analysis_on(ground, monitors, bus, alarm_context)
     runner = _runner(units, analysis, bus)
     audit = ServiceTrail(plant, ground.origin, ground.store.audit, clock)
     await audit.begin()

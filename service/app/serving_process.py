@@ -22,16 +22,10 @@ from service.app.process import STALE_HOPS, Ground, Supervision, live_view, refr
 from service.app.service_audit import ServiceTrail
 from service.app.storage import evidence_folders, open_store, recordings_folder
 from service.app.web import access_desk, application, server_of
-from service.cluster.replica_state import (
-    NoCaptures,
-    ReplicaAlarms,
-    ReplicaDeliveries,
-    ReplicaFilms,
-    ReplicaLive,
-    ReplicaMetrics,
-)
-from service.cluster.reported_commands import Asking
-from service.cluster.reported_state import Described, Feed
+from service.cluster.replica_metrics import NoCaptures, ReplicaDeliveries, ReplicaMetrics
+from service.cluster.replica_state import ReplicaAlarms, ReplicaFilms, ReplicaLive
+from service.cluster.reported_commands import CommandClient
+from service.cluster.reported_state import Feed, UnitDescription
 from service.measuring.acquirer import Bus
 from service.measuring.commands import InProcess
 from service.measuring.references_in_force import ReferencesInForce
@@ -219,7 +213,7 @@ async def replica_on(plant: PlantFile, store: Store, clock: Clock) -> Replica:
     feed = Feed(store, live, alarms, films, clock)
     await feed.start()
     references = ReferencesInForce(
-        {unit.id: Described(machine_of(unit)) for unit in plant.unit}, store, clock
+        {unit.id: UnitDescription(machine_of(unit)) for unit in plant.unit}, store, clock
     )
     await references.look()
     receivers = receivers_of(plant, Origin.LIVE, clock)
@@ -244,7 +238,7 @@ def replica_context(
         references=replica.references,
         alarms=replica.alarms,
         films=replica.films,
-        operators=Asking(replica.store, replica.alarms, replica.clock),
+        operators=CommandClient(replica.store, replica.alarms, replica.clock),
         captures=NoCaptures(),
         deliveries=replica.deliveries,
         metrics=ReplicaMetrics(bearings, *seen, replica.store.kind).scrape,

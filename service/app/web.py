@@ -24,7 +24,7 @@ from service.dashboard.assets import edition
 from service.dashboard.routes import dashboard_router
 from service.reports.routes import EvidenceDesk, evidence_router
 from service.settings.plant import PlantFile
-from service.settings.processes import Doorway, is_loopback, why_closed
+from service.settings.processes import is_loopback, why_closed
 from service.store.access.identities import Role, SessionLimits
 from service.store.access.port import AccessStore
 
@@ -100,17 +100,17 @@ def access_desk(
         If accounts cannot be read.
     """
     service, access = plant.service, plant.access
-    doorway = Doorway(
+    is_unix_socket = service.socket is not None
+    reason = why_closed(
         service.host,
-        is_unix_socket=service.socket is not None,
+        is_unix_socket=is_unix_socket,
         has_tls=service.tls is not None,
         has_account=bool(store.accounts.all()),
     )
-    reason = why_closed(doorway)
     if reason is not None:
         raise ClosedError(reason)
     local_role: Role | None = Role.ADMIN if is_demo else Role.VIEWER
-    if access.login or doorway.is_unix_socket or not is_loopback(service.host):
+    if access.login or is_unix_socket or not is_loopback(service.host):
         local_role = None
     limits = SessionLimits(idle_s=60.0 * access.idle_min, absolute_s=3600.0 * access.longest_h)
     return AccessDesk(store, clock, local_role, limits=limits)

@@ -14,7 +14,7 @@ from service.app.notifications import composer_of, receivers_of
 from service.app.storage import has_store, open_store, store_name
 from service.cli.options import PlantPath, fail, read_plant_file
 from service.notifications.channel import Delivered, Outcome, Refused
-from service.notifications.message import Surroundings, dumps
+from service.notifications.message import AlarmContext, dumps
 from service.notifications.sender import Receiver
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -71,9 +71,9 @@ def send_again(
 
 
 async def _tried(plant: PlantFile, chosen: Sequence[Receiver]) -> list[Outcome]:
-    message = composer_of(plant, lambda _: Surroundings()).test(SystemClock().now_ns())
+    message = composer_of(plant, lambda _: AlarmContext()).test(SystemClock().now_ns())
     body = dumps(message)
-    return await asyncio.gather(*(one.carrier.carry(message, body) for one in chosen))
+    return await asyncio.gather(*(one.channel.send(message, body) for one in chosen))
 
 
 def _result(receiver: Receiver, outcome: Outcome) -> dict[str, str]:
@@ -84,7 +84,7 @@ def _result(receiver: Receiver, outcome: Outcome) -> dict[str, str]:
         word = "refused"
     return {
         "receiver": receiver.name,
-        "address": receiver.address,
+        "address": receiver.channel.address,
         "outcome": word,
         "answer": outcome.answer,
     }

@@ -11,9 +11,10 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from service.settings.loading import PlantFileError, load_plant_file
+from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
+from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
 
 PlantPath = Annotated[Path, typer.Argument(help="The plant file (TOML).", show_default=False)]
@@ -23,7 +24,7 @@ def read_plant_file(path: Path) -> PlantFile:
     """Read a plant file, or end with exit code 2 and a line for each mistake."""
     try:
         return load_plant_file(path)
-    except PlantFileError as error:
+    except TomlFileError as error:
         fail(str(error), code=2)
 
 

@@ -1,10 +1,9 @@
-"""Blocks from the stream to the analysis, acknowledged once stored."""
+"""Consumer of blocks: passes them to the analysis and acknowledges them once they are stored."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 
-import structlog
 from nats.aio.msg import Msg
 from nats.errors import Error
 from nats.errors import TimeoutError as NatsTimeoutError
@@ -17,6 +16,9 @@ from acquisition.clock import Clock
 from acquisition.delivery.network import let_stop_through
 from service.cluster.progress import UnitProgress
 from service.cluster.session import (
+    MISFIT_RETRY_S,
+    NOT_REACHED,
+    RETRY_S,
     StreamAnewError,
     StreamError,
     StreamMisfitError,
@@ -26,38 +28,31 @@ from service.cluster.session import (
     stream_name,
     subject,
 )
+from service.measuring.counters import one
 from service.measuring.recorder import Findings, Recorder
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.metrics import counter, gauge
+from service.runtime.periodic import TroubleLog
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
-
-log = structlog.get_logger()
-
-RETRY_S = 1.0
-MISFIT_RETRY_S = 5.0
 
 FETCH_S = 5.0
 REST_S = 1.0
 BATCH = 32
-"""Most messages of a unit that one acknowledgement waits for."""
+"""Maximum number of messages of a unit that are acknowledged together."""
 
 MAX_UNACKNOWLEDGED = 256
 ACK_WAIT_S = 60.0
 
 Begin = Callable[[str, int], Awaitable[Mapping[str, UnitProgress]]]
-"""Makes the progress of all units on a stream: its name with its birth, its newest message."""
+"""Returns the progress of all units on a stream, given its name with its time of creation and its
+newest message."""
 
 
 class Consumer:
-    """Feeds units from the stream.
+    """Passes the messages of the stream to the units.
 
-    What is taken in is never left half done: connections come and go beside it.
-
-    Parameters
-    ----------
-    begin
-        Called when it is known which stream it is; once, unless the stream was made anew.
+    The loss of a connection does not interrupt the processing of fetched messages.
     """
 
     def __init__(
@@ -75,37 +70,46 @@ class Consumer:
         self._queues: dict[str, asyncio.Queue[Msg]] = {}
         self._fetched: dict[str, int] = {}
         self._settled: dict[str, int] = {}
-        self.trouble: str | None = "the servers have not been reached yet"
+        self._state = TroubleLog(
+            "blocks are not being read from the stream",
+            "blocks are being read from the stream",
+            NOT_REACHED,
+        )
         self.n_pending: dict[str, int] = {}
 
     @property
+    def trouble(self) -> str | None:
+        """Why blocks are not being read; None if they are."""
+        return self._state.trouble
+
+    @property
     def waiting(self) -> frozenset[str]:
-        """Units of which messages wait here to be taken in, as while nothing can be stored."""
+        """Units with fetched messages that are not processed yet, as while the store fails."""
         return frozenset(unit for unit, queue in self._queues.items() if not queue.empty())
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Feed for ever, over one connection after the other."""
+        """Consume until cancelled; a lost connection is renewed."""
         async with asyncio.TaskGroup() as tasks:
             while True:
                 pulse.rest()
                 try:
                     async with session(self._settings, "padwatch analyse") as stream:
-                        await self._know(stream, tasks)
+                        await self._find(stream, tasks)
                         await self._fetch_all(stream)
                 except StreamError as error:
-                    self._note(str(error))
+                    self._state.note(str(error))
                     is_misfit = isinstance(error, StreamMisfitError)
                     await self._clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
 
-    async def _know(self, stream: JetStreamContext, tasks: asyncio.TaskGroup) -> None:
-        """Find out which stream it is, and where each unit goes on."""
+    async def _find(self, stream: JetStreamContext, tasks: asyncio.TaskGroup) -> None:
+        """Identify the stream and the position at which each unit resumes."""
         found = await require(stream, self._plant)
         state = (await stream.stream_info(stream_name(self._plant))).state
         newest = max(self._fetched.values(), default=0)
         if self._stream not in (None, found) or state.last_seq < newest:
             raise StreamAnewError(
-                "the stream was made anew, or has lost what it had confirmed, while it was read:"
-                " start `padwatch analyse` again"
+                "the stream was replaced, or lost confirmed messages, while it was read:"
+                " restart `padwatch analyse`"
             )
         if self._stream is None:
             self.units = await self._begin(found, state.last_seq)
@@ -123,12 +127,12 @@ class Consumer:
         async with asyncio.TaskGroup() as tasks:
             for unit in self.units:
                 tasks.create_task(self._fetch_unit(stream, unit), name=f"fetch {unit}")
-            self._note(None)
+            self._state.note(None)
 
     async def _fetch_unit(self, stream: JetStreamContext, unit: str) -> None:
         name, durable = stream_name(self._plant), consumer_name(unit)
         with suppress(NotFoundError):
-            await stream.delete_consumer(name, durable)  # whoever still reads by it ends
+            await stream.delete_consumer(name, durable)  # another reader of it ends
         await stream.add_consumer(
             name,
             ConsumerConfig(
@@ -151,7 +155,9 @@ class Consumer:
     async def _offer(self, unit: str, message: Msg) -> None:
         sequence = message.metadata.sequence.stream
         self.n_pending[unit] = message.metadata.num_pending
-        if sequence <= self._fetched[unit]:  # delivered again: it waits here, or nobody was told
+        if (
+            sequence <= self._fetched[unit]
+        ):  # redelivered: waits here, or its acknowledgement was lost
             if sequence <= self._settled.get(unit, 0):
                 with suppress(Error):
                     await message.ack()
@@ -160,7 +166,7 @@ class Consumer:
         self._fetched[unit] = sequence
 
     async def _take_all(self, unit: str) -> None:
-        """Take a unit's messages in; whole ones, whatever becomes of the connection."""
+        """Process the messages of a unit, independently of the connection."""
         queue, progress = self._queues[unit], self.units[unit]
         while True:
             batch = [await queue.get()]
@@ -169,31 +175,21 @@ class Consumer:
             refused = [m for m in batch if not await progress.take(_sequence(m), m.data)]
             await self._stored(progress)
             for message in batch:
-                with suppress(Error):  # it is stored; who was not told sends it once more
+                with suppress(Error):  # stored; without acknowledgement the message is redelivered
                     await (message.term() if message in refused else message.ack())
             self._settled[unit] = _sequence(batch[-1])
 
     async def _stored(self, progress: UnitProgress) -> None:
-        """Wait until all that was taken in is on the disk, with how far that is."""
-        if progress.is_reliving:
+        """Wait until the results and the position of a unit are stored."""
+        if progress.is_replaying:
             return
         position = progress.position()
         self._recorder.put(Findings(position=position))
         await self._recorder.reached(position)
 
-    def _note(self, trouble: str | None) -> None:
-        """Log when reading begins or ceases to fail."""
-        if trouble == self.trouble:
-            return
-        if trouble is None:
-            log.info("blocks are being read from the stream")
-        else:
-            log.warning("blocks are not being read from the stream", reason=trouble)
-        self.trouble = trouble
-
 
 async def _fetched(puller: JetStreamContext.PullSubscription) -> Iterable[Msg]:
-    """What is there; the first as soon as it comes, and the rest with it."""
+    """Wait for the first message and return it with all others that are available."""
     try:
         messages = await puller.fetch(1, FETCH_S)
         waiting = messages[-1].metadata.num_pending
@@ -213,38 +209,31 @@ UNIT = ("unit",)
 
 
 def consumer_metrics(consumer: Consumer) -> Iterator[Metric]:
-    """How far behind the stream each unit is, and what was refused."""
-    yield gauge(
-        "stream_connected",
-        "1 while blocks are read from the servers of the stream.",
-        (),
-        [((), consumer.trouble is None)],
-    )
+    """Yield the backlog of each unit, and counts of refused and redelivered messages."""
+    units = consumer.units.items()
+    connected = consumer.trouble is None
+    yield one("stream_connected", "1 while blocks are read from the stream.", connected)
     yield gauge(
         "stream_pending",
-        "Messages of the unit that are on the stream and were not fetched yet.",
+        "Messages of the unit on the stream that were not fetched yet.",
         UNIT,
         (((unit,), n) for unit, n in consumer.n_pending.items()),
     )
     yield gauge(
         "stream_analysis_behind_seconds",
-        "How far behind its device the block of the unit was that was taken in last.",
+        "Delay of the newest analysed block of the unit against its device.",
         UNIT,
-        (((unit,), its.behind_s) for unit, its in consumer.units.items()),
+        (((unit,), its.behind_s) for unit, its in units),
     )
     yield counter(
         "stream_refused",
         "Messages of the unit that could not be used, by reason.",
         ("unit", "reason"),
-        (
-            ((unit, kind), n)
-            for unit, its in consumer.units.items()
-            for kind, n in its.refused.items()
-        ),
+        (((unit, kind), n) for unit, its in units for kind, n in its.refused.items()),
     )
     yield counter(
         "stream_redelivered",
-        "Messages of the unit that came a second time, and counted once.",
+        "Messages of the unit that were delivered again and counted once.",
         UNIT,
-        (((unit,), its.n_repeated) for unit, its in consumer.units.items()),
+        (((unit,), its.n_repeated) for unit, its in units),
     )

@@ -1,4 +1,4 @@
-"""Blocks and news of links as bytes, and back, bit for bit."""
+"""Encoding of blocks and news of links as messages, and decoding without loss."""
 
 import hashlib
 import itertools
@@ -23,13 +23,7 @@ from service.measuring.acquirer import LinkNews
 
 
 class WireError(ValueError):
-    """A message cannot be used; it will be the same the next time.
-
-    Parameters
-    ----------
-    kind
-        Short snake-case word, used as a counter's label.
-    """
+    """A message cannot be used; decoding it again fails in the same way."""
 
     def __init__(self, kind: str, message: str) -> None:
         super().__init__(message)
@@ -37,22 +31,19 @@ class WireError(ValueError):
 
 
 def require_possible(block: SampleBlock) -> None:
-    """Refuse what no adapter makes, before anything is calculated from it.
+    """Refuse a block that no adapter produces, before it is analysed.
 
-    Raises
-    ------
-    WireError
-        If a block has no samples, a calibration or a reading that is not finite, or a negative
-        number of rejected samples.
+    Raises `WireError` if a block has no samples, a calibration or slow value that is not finite, or
+    a negative number of rejected samples.
     """
     if not block.n_samples:
         raise WireError("impossible", "a block without samples")
     if not all(math.isfinite(c.unit_per_count) for c in block.calibration.channels):
-        raise WireError("impossible", "a block with a calibration that is no number")
+        raise WireError("impossible", "a block with a calibration that is not finite")
     if not all(math.isfinite(reading.value or 0.0) for reading in block.slow.values()):
-        raise WireError("impossible", "a block with a slow value that is no number")
+        raise WireError("impossible", "a block with a slow value that is not finite")
     if any(rejection.n_samples < 0 for rejection in block.rejected):
-        raise WireError("impossible", "a block before which less than no samples were rejected")
+        raise WireError("impossible", "a block with a negative number of rejected samples")
 
 
 FINGERPRINT_BYTES = 16
@@ -60,16 +51,14 @@ FINGERPRINT_BYTES = 16
 
 @dataclass(frozen=True)
 class UnitIdentity:
-    """A unit as the blocks on a stream must have been made for it.
+    """Identity of a unit, which every message of the unit carries.
 
     Parameters
     ----------
-    unit
-        Its id.
     plant
-        Fingerprint of the plant's name.
+        Fingerprint of the name of the plant.
     make
-        Fingerprint of rate and channels: samples of another make would be read as something else.
+        Fingerprint of rate and channels, without which samples would be misinterpreted.
     """
 
     unit: str
@@ -78,7 +67,7 @@ class UnitIdentity:
 
 
 def fingerprint(*words: object) -> bytes:
-    """A short mark of some JSON values: equal for equal ones, and for no others that occur."""
+    """Return a short hash of some JSON values."""
     text = json.dumps(words, ensure_ascii=True, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).digest()[:FINGERPRINT_BYTES]
 
@@ -87,7 +76,7 @@ MAGIC = b"PWSM"
 
 VERSION = 2
 READABLE = (2,)
-"""A reader knows the version it writes and the one before: it is upgraded before the writers."""
+"""A reader supports its own version and the previous one, as it is upgraded before the writers."""
 
 MAX_HEAD_BYTES = 1 << 18
 MAX_SAMPLE_BYTES = 1 << 26
@@ -97,7 +86,7 @@ _CRC = struct.Struct("<I")
 
 
 class Kind(IntEnum):
-    """What a message is."""
+    """Kind of a message."""
 
     BLOCK = 1
     LINK = 2
@@ -105,7 +94,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Frame:
-    """A message taken apart, with nothing read of its head yet."""
+    """Parts of a message; the head is not decoded."""
 
     kind: Kind
     head: bytes
@@ -113,13 +102,7 @@ class Frame:
 
 
 def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b"") -> bytes:
-    """Put a message together.
-
-    Raises
-    ------
-    ValueError
-        If a part is longer than a reader takes.
-    """
+    """Assemble a message. Raises `ValueError` if a part exceeds the limit of readers."""
     if len(head) > MAX_HEAD_BYTES or len(samples) > MAX_SAMPLE_BYTES:
         raise ValueError(
             f"a message holds at most {MAX_HEAD_BYTES} bytes of head and {MAX_SAMPLE_BYTES} of"
@@ -133,16 +116,13 @@ def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b""
 
 
 def unframed(message: bytes, identity: UnitIdentity) -> Frame:
-    """Take a message apart.
+    """Split a message into its parts.
 
-    Raises
-    ------
-    WireError
-        If it is no message, damaged, of another version, plant or configuration; never anything
-        else, whatever the bytes are.
+    Raises `WireError` if the bytes are not a message, or are damaged, or have another version,
+    plant or configuration. No other exception is raised for any bytes.
     """
     if len(message) < _START.size + _CRC.size or message[:4] != MAGIC:
-        raise WireError("not_a_message", f"{len(message)} bytes that are no message of padwatch")
+        raise WireError("not_a_message", f"{len(message)} bytes that are not a message of padwatch")
     _, version, kind, plant, make, n_head, n_samples = _START.unpack_from(message)
     if version not in READABLE:
         raise WireError("other_version", _other_version(version))
@@ -152,17 +132,17 @@ def unframed(message: bytes, identity: UnitIdentity) -> Frame:
     (crc,) = _CRC.unpack_from(message, whole - _CRC.size)
     body = memoryview(message)
     if crc != zlib.crc32(body[: whole - _CRC.size]):
-        raise WireError("damaged", "a message whose checksum does not fit it")
+        raise WireError("damaged", "a message with a wrong checksum")
     if plant != identity.plant:
-        raise WireError("other_plant", "a message of another plant: give each its own stream")
+        raise WireError("other_plant", "a message of another plant: use one stream for each plant")
     if make != identity.make:
         raise WireError(
             "other_configuration",
-            f"a block of {identity.unit} made with other channels or another rate: let acquire and"
-            " analyse use the same plant file",
+            f"a block of {identity.unit} with other channels or another rate: use the same plant"
+            " file for acquire and analyse",
         )
     if kind not in Kind.__members__.values():
-        raise WireError("unknown_kind", f"a message of kind {kind}, which is not known")
+        raise WireError("unknown_kind", f"a message of unknown kind {kind}")
     head = bytes(body[_START.size : _START.size + n_head])
     samples = body[_START.size + n_head : whole - _CRC.size]
     return Frame(Kind(kind), head, samples)
@@ -179,10 +159,10 @@ SAMPLE: Mapping[str, np.dtype[Any]] = {"int16": np.dtype("<i2"), "float32": np.d
 
 Epoch = Annotated[int, Field(ge=0, lt=2**63)]
 Index = Annotated[int, Field(ge=0, lt=2**53)]
-"""Exact in recordings, too, where numbers are doubles."""
+"""Exact as a double, which recordings use."""
 
 Ns = Annotated[int, Field(ge=-(2**62), lt=2**62)]
-"""From 1823 to 2116, so that nothing that is worked out from it overflows in a database."""
+"""From 1823 to 2116, so that sums and differences do not overflow in a database."""
 
 T = TypeVar("T")
 
@@ -200,7 +180,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class BlockHead:
-    """All of a block but its samples."""
+    """Fields of a block without its samples."""
 
     __pydantic_config__ = STRICT
 
@@ -233,13 +213,13 @@ _BLOCK, _LINK = TypeAdapter(BlockHead), TypeAdapter(LinkHead)
 
 @dataclass(frozen=True)
 class Taken:
-    """A block with when it was taken from its device.
+    """A block with its time of acquisition.
 
     Parameters
     ----------
     taken_ns
-        When its device had its last sample, by the clock of the host that acquires: how far behind
-        the analysis is.
+        Time of its last sample by the clock of the acquiring host; the delay of the analysis is
+        measured from it.
     """
 
     block: SampleBlock
@@ -247,7 +227,7 @@ class Taken:
 
 
 def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> bytes:
-    """A block as a message. Raises `ValueError` if it is longer than a reader takes."""
+    """Encode a block. Raises `ValueError` if it exceeds the limits of readers."""
     side, type_ = block.side, block.counts.dtype.name
     columns = (side.starts.tolist(), side.start_ns.tolist(), side.ok.T.tolist())
     head = BlockHead(
@@ -271,23 +251,18 @@ def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> 
 
 
 def encoded_link(news: LinkNews, identity: UnitIdentity) -> bytes:
-    """News of a link as a message."""
+    """Encode news of a link."""
     head = LinkHead(news.unit, news.state, None if news.reason is None else news.reason[:1000])
     return framed(Kind.LINK, identity, _LINK.dump_json(head))
 
 
 def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
-    """What a message says.
-
-    Parameters
-    ----------
-    identity
-        Of the unit that it must be of.
+    """Decode a message.
 
     Raises
     ------
     WireError
-        If it cannot be used; never anything else, whatever the bytes are.
+        If the message cannot be used. No other exception is raised for any bytes.
     """
     frame = unframed(message, identity)
     if frame.kind is Kind.LINK:
@@ -351,7 +326,7 @@ def _read(adapter: TypeAdapter[T], head: bytes) -> T:
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         where = ".".join(str(part) for part in first["loc"])
-        message = f"a message whose head is not understood: {where}: {first['msg']}"
+        message = f"a message with an invalid head: {where}: {first['msg']}"
         raise WireError("not_understood", message) from None
 
 

@@ -1,4 +1,4 @@
-"""Which process owns a unit or the plant."""
+"""Ownership: exclusive locks of units and of the shared work, and partitions of a plant."""
 
 import asyncio
 import re
@@ -21,21 +21,21 @@ EVERY_S = 1.0
 
 
 class HoldLostError(StoreError):
-    """Somebody else may analyse a unit now, since the connection to the database was lost."""
+    """The connection to the database was lost, and another process may analyse the units."""
 
 
 class Holds:
-    """The names of some units, all of them or none."""
+    """Exclusive locks of some units in the database, all or none."""
 
     def __init__(self, store: Store, units: Iterable[str], clock: Clock) -> None:
         self._store, self._clock = store, clock
         self._names = [f"analyse {unit}" for unit in sorted(units)]
         self._stack = ExitStack()
         self._holds: Sequence[Hold] = ()
-        self.waits_for: str | None = "not begun"
+        self.waits_for: str | None = "not started"
 
     async def take(self) -> None:
-        """Wait until all are free, and have them: a standby waits here for as long as need be."""
+        """Wait until all locks are free and take them; a standby waits here."""
         while True:
             refusal = await asyncio.to_thread(self._try)
             if refusal is None:
@@ -47,19 +47,19 @@ class Holds:
         self.waits_for = None
 
     def require(self) -> None:
-        """Raise `HoldLostError` where not all are held any more."""
+        """Raise `HoldLostError` unless all locks are held."""
         if not all(hold.is_held for hold in self._holds):
             raise HoldLostError(
-                "the connection to the database was lost, and with it the right to analyse these"
-                " units: another process may have taken over"
+                "the connection to the database was lost, and with it the locks of the units;"
+                " another process may have taken over"
             )
 
     def release(self) -> None:
-        """Let others have them."""
+        """Release all locks."""
         self._stack.close()
 
     def _try(self) -> str | None:
-        """Take all; returns why not."""
+        """Take all locks; return the reason if one is held by another process."""
         with ExitStack() as stack:
             try:
                 self._holds = [stack.enter_context(self._store.hold(name)) for name in self._names]
@@ -70,24 +70,17 @@ class Holds:
 
 
 SHARED_WORK = "shared work"
-"""Name that is held: messages, roll-ups, and what lets old results go."""
+"""Name of the lock for notifications, roll-ups and retention."""
 
 TRY_EVERY_S = 2.0
 LOOK_EVERY_S = 1.0
 
 
 class Leadership:
-    """Runs loops while it holds a name in the database; another process does when it does not.
+    """Runs loops while it holds a lock in the database, so that one process of the plant does.
 
-    What these loops do may be done twice at a change of hands (a message is told again, a roll-up
-    gathered anew), and all of it counts once.
-
-    Parameters
-    ----------
-    hold
-        Takes a name; raises `StoreError` while somebody else holds it.
-    loops
-        By name.
+    Two processes may run the loops for a short time when the lock changes hands; the work of the
+    loops is idempotent.
     """
 
     def __init__(
@@ -101,20 +94,20 @@ class Leadership:
         self.is_leading = False
 
     async def run(self, pulse: Pulse) -> None:
-        """Lead whenever nobody else does, for ever."""
+        """Lead whenever the lock is free, until cancelled."""
         while True:
             pulse.beat(TRY_EVERY_S)
             with ExitStack() as held:
                 try:
                     hold = await asyncio.to_thread(held.enter_context, self._hold(SHARED_WORK))
                 except StoreError:
-                    pass  # somebody else's, or the database is away: both may change
+                    pass  # held by another process, or no connection: try again later
                 else:
                     await self._lead(hold, pulse)
             await self._clock.sleep(TRY_EVERY_S)
 
     async def _lead(self, hold: Hold, pulse: Pulse) -> None:
-        log.info("does the shared work of the plant from now on")
+        log.info("this process starts the shared work of the plant")
         self.is_leading = True
         try:
             async with asyncio.TaskGroup() as tasks:
@@ -130,7 +123,7 @@ class Leadership:
         finally:
             self.is_leading = False
             self._beats.release(*self._loops)
-        log.warning("does the shared work of the plant no longer: the name is lost")
+        log.warning("this process stops the shared work of the plant: the lock is lost")
 
 
 FORM = re.compile(r"([0-9]{1,4})/([0-9]{1,4})")
@@ -138,44 +131,41 @@ FORM = re.compile(r"([0-9]{1,4})/([0-9]{1,4})")
 
 @dataclass(frozen=True)
 class Partition:
-    """The ``number``-th of ``n_parts``, counted from 1."""
+    """Part ``number`` of ``n_parts`` of a plant, counted from 1."""
 
     number: int = 1
     n_parts: int = 1
 
     @classmethod
     def of(cls, text: str) -> "Partition":
-        """Read it from ``i/n``. Raises `ValueError` if it is none."""
+        """Parse ``i/n``. Raises `ValueError` if the text is malformed."""
         found = FORM.fullmatch(text)
         part = cls(int(found[1]), int(found[2])) if found else cls(0, 0)
         if not 1 <= part.number <= part.n_parts:
             raise ValueError(
-                f"{text!r} is no partition: give i/n with i from 1 to n, such as 1/2 and 2/2"
+                f"invalid partition {text!r}: use i/n with i from 1 to n, such as 1/2 and 2/2"
             )
         return part
 
     def units(self, units: Sequence[str]) -> list[str]:
-        """Those that it analyses: every n-th of the sorted ids, so that all have about as many."""
+        """Return the units of this part: every n-th of the sorted ids."""
         return sorted(units)[self.number - 1 :: self.n_parts]
 
     def part_of(self, plant: PlantFile) -> PlantFile:
-        """The plant as far as it is analysed here.
+        """Return the plant with the units of this part only.
 
-        Raises
-        ------
-        ValueError
-            If that is no unit at all.
+        Raises `ValueError` if the part has no units.
         """
         mine = set(self.units([unit.id for unit in plant.unit]))
         if not mine:
             raise ValueError(
-                f"partition {self.number}/{self.n_parts} of {len(plant.unit)} units is empty: give"
-                f" no more than {len(plant.unit)} parts"
+                f"partition {self.number}/{self.n_parts} of {len(plant.unit)} units is empty:"
+                f" use at most {len(plant.unit)} parts"
             )
         return plant.model_copy(update={"unit": tuple(u for u in plant.unit if u.id in mine)})
 
     def share_of(self, plant: PlantFile) -> PlantPart:
-        """What this process looks after of a whole plant."""
+        """Return the part of a whole plant that this process is responsible for."""
         every = [unit.id for unit in plant.unit]
         own = frozenset(self.units(every))
         return PlantPart(own, frozenset(every) - own, leads=self.number == 1)

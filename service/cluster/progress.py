@@ -1,4 +1,4 @@
-"""One unit on its way along the stream, and where it resumes."""
+"""Progress of a unit on the stream: resumption after a restart, and its position."""
 
 from collections import Counter, deque
 from collections.abc import Iterable
@@ -23,12 +23,12 @@ _MEMORY = TypeAdapter(UnitMemory)
 
 
 def written(memory: UnitMemory) -> bytes:
-    """The memory as a document; floats come back to the last bit."""
+    """Serialize a memory without loss."""
     return _MEMORY.dump_json(memory)
 
 
 def read(document: bytes) -> UnitMemory | None:
-    """The memory that a document holds; None if it is not one of this version."""
+    """Parse a memory; None if it has another version."""
     try:
         memory = _MEMORY.validate_json(document)
     except ValidationError:
@@ -37,25 +37,25 @@ def read(document: bytes) -> UnitMemory | None:
 
 
 def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
-    """What is known of units, as far as it can be read."""
+    """Return the stored memories that can be read, by unit."""
     found = {position.unit: read(position.memory) for position in stored}
     for unit, memory in found.items():
         if memory is None:
             log.error(
-                "what was known of a unit is of another version: alarms begin anew", unit=unit
+                "the stored state of a unit has another version: its alarms start anew", unit=unit
             )
     return {unit: memory for unit, memory in found.items() if memory is not None}
 
 
 def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPosition | None:
-    """A stored position, if it is one on this stream as the stream is."""
+    """Return a stored position if it is valid on this stream, otherwise None."""
     if stored is None:
         return None
     if stored.stream != stream:
-        log.error("the stream was made anew: results go on with what is on it", unit=stored.unit)
+        log.error("the stream was replaced: results resume with its messages", unit=stored.unit)
         return None
     if stored.sequence > newest:
-        log.error("the stream has lost what it had confirmed", unit=stored.unit)
+        log.error("the stream has lost confirmed messages", unit=stored.unit)
         return None
     return stored
 
@@ -68,25 +68,19 @@ class _Seen:
 
 
 class Window:
-    """The newest messages of a unit, by what they hold."""
+    """Newest messages of a unit that the monitor still needs after a restart."""
 
     def __init__(self) -> None:
         self._seen: deque[_Seen] = deque()
 
     def note(self, sequence: int, block: SampleBlock, state: MonitorState) -> None:
-        """Take note of a block that was taken in, and let go of what is needed no more.
-
-        Parameters
-        ----------
-        state
-            Behind the block; its epoch is that of the block for the analysis.
-        """
+        """Add a processed block, and remove messages that are no longer needed."""
         self._seen.append(_Seen(sequence, state.epoch, block.stop_index))
         while len(self._seen) > 1 and not self._is_needed(self._seen[0], state):
             self._seen.popleft()
 
     def first(self, otherwise: int) -> int:
-        """The first message that is needed."""
+        """Return the first message that is needed."""
         return self._seen[0].sequence if self._seen else otherwise
 
     @staticmethod
@@ -97,26 +91,26 @@ class Window:
 log = structlog.get_logger()
 
 MAY_ARRIVE = (LinkState.CONNECTING, LinkState.CONNECTED)
-"""States in which nobody has said yet that samples do not."""
+"""States in which samples may arrive."""
 
 
 class UnitProgress:
-    """Takes the messages of one unit in, in order and each once.
+    """Processes the messages of one unit in order, each once.
 
-    Messages up to the stored position are seen once more without a word, so that the monitor holds
-    what it held; from then on everything is as if it had never stopped.
+    Messages up to the stored position are replayed without results, which restores the state of the
+    monitor. Later messages are processed as if the process had never stopped.
 
     Parameters
     ----------
     stored
-        How far results reach that are stored, on the same stream; None where there are none.
+        Position of the stored results on the same stream; None without any.
     memory
-        What was known of the unit then.
+        State of the unit at that position.
     clock
-        Of this host; how far behind a block is can be told as well as it agrees with that of the
-        host that acquires.
+        Clock of this host. The delay of a block is as accurate as this clock agrees with that of
+        the acquiring host.
     done
-        Up to where results are stored, where it is not known which messages they are of.
+        Reach of the stored results, if their position on the stream is unknown.
     """
 
     def __init__(
@@ -139,7 +133,7 @@ class UnitProgress:
         self._memory = None if stored is None else memory
         self._is_rewound = False
         self._done = done
-        self._heard_s = clock.monotonic_s()
+        self._arrived_s = clock.monotonic_s()
         self._why_refused: str | None = None
         self.sequence = 0
         self.behind_s = 0.0
@@ -148,26 +142,26 @@ class UnitProgress:
 
     @property
     def first_needed(self) -> int:
-        """First message that is wanted, at the start."""
+        """First message that is needed at the start."""
         return 1 if self._stored is None else self._stored.window_sequence
 
     def reaches_back(self, first_sequence: int) -> None:
-        """Hear where the stream begins now.
+        """Log whether the stream still has the needed messages.
 
-        What is there no more is a gap in the samples, which the monitor finds by their index.
+        Missing messages are a gap in the samples, which the monitor detects by their index.
         """
         stored = self._stored
         if stored is None or self._memory is None or self.sequence:
             return
         if first_sequence > stored.sequence + 1:
-            log.error("the stream does not reach back to what is stored", unit=self.unit)
+            log.error("the stream begins after the stored results", unit=self.unit)
         elif first_sequence > stored.window_sequence:
-            log.warning("the stream holds less than the window", unit=self.unit)
+            log.warning("the stream begins within the window of the analysis", unit=self.unit)
 
     async def take(self, sequence: int, payload: bytes) -> bool:
-        """Take a message in; False if it is refused."""
+        """Process a message; return False if it is refused."""
         if sequence <= self.sequence:
-            self._heard_s = self._clock.monotonic_s()
+            self._arrived_s = self._clock.monotonic_s()
             self.n_repeated += 1
             return True
         try:
@@ -178,19 +172,19 @@ class UnitProgress:
             self._refuse(sequence, error)
             self.sequence = sequence
             return False
-        self._heard_s, self._why_refused = self._clock.monotonic_s(), None
+        self._arrived_s, self._why_refused = self._clock.monotonic_s(), None
         if self._stored is not None and sequence <= self._stored.sequence:
-            await self._relive(sequence, message)
+            await self._replay(sequence, message)
         elif self._is_done(message):
             self.sequence = sequence
             self.n_repeated += 1
         else:
-            self._settle()
-            await self._live_on(sequence, message)
+            self._commit()
+            await self._process(sequence, message)
         return True
 
     def _require_fit(self, message: Taken) -> None:
-        """Refuse a block that no monitor of the unit takes, whatever its marks say."""
+        """Refuse a block that the monitor of the unit does not accept."""
         require_possible(message.block)
         try:
             self._analyser.require(message.block)
@@ -198,34 +192,28 @@ class UnitProgress:
             raise WireError("misfit", str(error)) from None
 
     def position(self) -> StreamPosition:
-        """How far the unit is; its memory of now goes with it."""
+        """Return the position of the unit with its present memory."""
         memory = written(self._analyser.memory(self.unit))
         first = self._window.first(self.sequence + 1)
         return StreamPosition(self.unit, self._stream, self.sequence, first, memory)
 
     @property
-    def is_reliving(self) -> bool:
-        """Whether what was taken in last is stored already."""
+    def is_replaying(self) -> bool:
+        """Whether the last message was before the stored position."""
         return self._stored is not None and self.sequence <= self._stored.sequence
 
     def fall_silent(self, after_s: float, trouble: str | None = None) -> None:
-        """Count the unit as lost where nothing of use has come of it for so long.
-
-        Parameters
-        ----------
-        trouble
-            Why nothing can come, where that is known.
-        """
-        if self._clock.monotonic_s() - self._heard_s <= after_s:
+        """Mark the unit as not connected if no usable message arrived for a time."""
+        if self._clock.monotonic_s() - self._arrived_s <= after_s:
             return
         if self._live.status(self.unit).state in MAY_ARRIVE or self._analyser.is_connected(
             self.unit
         ):
-            silence = f"no block for {after_s:g} s: is `padwatch acquire` running?"
+            silence = f"no block for {after_s:g} s; check that `padwatch acquire` is running"
             reason = trouble or self._why_refused or silence
-            self._hear(LinkNews(self.unit, LinkState.NOT_CONNECTED, reason))
+            self._take_news(LinkNews(self.unit, LinkState.NOT_CONNECTED, reason))
 
-    async def _relive(self, sequence: int, message: Taken | LinkNews) -> None:
+    async def _replay(self, sequence: int, message: Taken | LinkNews) -> None:
         self.sequence = sequence
         if isinstance(message, LinkNews):
             self._live.set_link(self.unit, message.state, message.reason)
@@ -237,9 +225,9 @@ class UnitProgress:
         self._window.note(sequence, message.block, self._analyser.state(self.unit))
 
     def _is_done(self, message: Taken | LinkNews) -> bool:
-        """Whether the results of a block are stored; from the first on of which they are not none.
+        """Return whether the results of a block are stored; False from the first new block on.
 
-        Analysed once more they would be on another grid of segments, and be there twice.
+        A second analysis on another grid of segments would store results twice.
         """
         if self._done is None or isinstance(message, LinkNews):
             return False
@@ -253,10 +241,10 @@ class UnitProgress:
         return is_done
 
     def _rewind(self, block: SampleBlock) -> None:
-        """Before the first block that is seen once more.
+        """Restore the stored state before the first replayed block.
 
-        Only by that it is known that samples of the window are left: news of links stay on the
-        stream when blocks have gone by age, and blocks of another configuration are refused.
+        Only a block shows that samples of the window are left: news of links may stay on the stream
+        longer than blocks, and blocks of another configuration are refused.
         """
         memory = self._memory
         if memory is None or self._is_rewound:
@@ -265,21 +253,21 @@ class UnitProgress:
             self._analyser.rewind(self.unit, memory)
             self._is_rewound = True
 
-    def _settle(self) -> None:
-        """After the last message that was seen once more; without any, as after a stop."""
+    def _commit(self) -> None:
+        """End the replay; without replayed blocks the unit starts anew."""
         if self._memory is not None and self._is_rewound:
             self._analyser.settle(self.unit, self._memory)
         self._stored = self._memory = None
 
-    async def _live_on(self, sequence: int, message: Taken | LinkNews) -> None:
+    async def _process(self, sequence: int, message: Taken | LinkNews) -> None:
         if isinstance(message, LinkNews):
-            self._hear(message)
+            self._take_news(message)
             self.sequence = sequence
             return
-        # what was seen once more told nobody of the link, nor does a stored alarm know of it
+        # neither the replay nor a stored alarm has reported the link
         is_known = self._analyser.is_connected(self.unit)
         if not is_known or self._live.status(self.unit).state is not LinkState.CONNECTED:
-            self._hear(LinkNews(self.unit, LinkState.CONNECTED))
+            self._take_news(LinkNews(self.unit, LinkState.CONNECTED))
         findings = await self._analyser.learn(message.block, self._sampled_s(message))
         self.sequence = sequence
         self._window.note(sequence, message.block, self._analyser.state(self.unit))
@@ -287,19 +275,21 @@ class UnitProgress:
             self._recorder.put(replace(findings, position=self.position()))
 
     def _sampled_s(self, message: Taken) -> float:
-        """By this process's steady clock, where the clocks of both hosts agree."""
+        """Return the time of sampling by the monotonic clock, if the clocks of both hosts agree."""
         self.behind_s = max(0.0, s_from_ns(self._clock.now_ns() - message.taken_ns))
         return self._clock.monotonic_s() - self.behind_s
 
-    def _hear(self, news: LinkNews) -> None:
+    def _take_news(self, news: LinkNews) -> None:
         if self._live.set_link(news.unit, news.state, news.reason):
-            tell = log.info if news.is_connected else log.warning
-            tell(news.state.value.replace("_", " "), unit=news.unit, reason=news.reason)
+            write = log.info if news.is_connected else log.warning
+            write(news.state.value.replace("_", " "), unit=news.unit, reason=news.reason)
         self._analyser.hear(news)
 
     def _refuse(self, sequence: int, error: WireError) -> None:
         self._why_refused = str(error)
-        if self._stored is None or sequence > self._stored.sequence:  # else it was told then
+        if (
+            self._stored is None or sequence > self._stored.sequence
+        ):  # otherwise it was reported then
             self._analyser.refuse(self.unit, str(error))
         if not self.refused[error.kind]:
             log.error("a message is refused", unit=self.unit, reason=str(error))

@@ -1,11 +1,10 @@
-"""Blocks to the stream: none is let go before the servers have it."""
+"""Publisher of blocks: keeps each block until the servers have confirmed it."""
 
 import asyncio
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-import structlog
 from nats.errors import MaxPayloadError, NoRespondersError
 from nats.errors import TimeoutError as NatsTimeoutError
 from nats.js.api import Header
@@ -19,6 +18,9 @@ from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 from service.cluster.frames import UnitIdentity, encoded_block, encoded_link
 from service.cluster.session import (
+    MISFIT_RETRY_S,
+    NOT_REACHED,
+    RETRY_S,
     StreamError,
     StreamMisfitError,
     ensure,
@@ -28,20 +30,22 @@ from service.cluster.session import (
     subject,
 )
 from service.measuring.acquirer import LinkNews
+from service.measuring.counters import one
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.metrics import counter, gauge
+from service.runtime.metrics import counter
+from service.runtime.periodic import TroubleLog
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
 
 
 @dataclass(frozen=True)
 class Outgoing:
-    """A message with its id; the id is the same whenever the same message is sent.
+    """A message with an id that is the same for every attempt.
 
     Parameters
     ----------
     is_news
-        Whether it tells of a link: of several in a row the last says it all.
+        Whether it is about a link; of consecutive ones only the last is sent.
     """
 
     id: str
@@ -50,15 +54,10 @@ class Outgoing:
 
 
 class Outbound:
-    """What is to be published.
+    """Queue of messages to publish.
 
-    Whoever puts waits while it is full: the device's own ring buffers then, and should that
-    overrun, the index of the next block shows the exact gap.
-
-    Parameters
-    ----------
-    capacity
-        Most bytes that wait; a message that is larger waits alone.
+    `put` waits while ``capacity`` bytes are queued. The ring of the device buffers samples
+    meanwhile, and if it overruns, the index of the next block shows the exact gap.
     """
 
     def __init__(self, units: Iterable[str], capacity: int, clock: Clock) -> None:
@@ -72,40 +71,40 @@ class Outbound:
 
     @property
     def n_waiting(self) -> int:
-        """Messages that wait now."""
+        """Number of waiting messages."""
         return sum(len(queue) for queue in self._waiting.values())
 
     @property
     def behind_s(self) -> float:
-        """For how long something has been waiting without anything being published."""
+        """Time for which messages have waited without any being published."""
         return self._clock.monotonic_s() - self._last_s if self.n_waiting else 0.0
 
     async def put(self, unit: str, message: Outgoing) -> None:
-        """Queue a message, waiting while there is no room."""
+        """Queue a message; waits while the queue is full."""
         async with self._room:
             await self._room.wait_for(lambda: self._fits(message))
             self.add(unit, message)
 
     def add(self, unit: str, message: Outgoing) -> None:
-        """Queue a message at once; news of a link take the place of those before them."""
+        """Queue a message at once; news of a link replace waiting ones."""
         queue = self._waiting[unit]
         if not self.n_waiting:
             self._last_s = self._clock.monotonic_s()
-        if message.is_news and len(queue) > 1 and queue[-1].is_news:  # the first is under way
+        if message.is_news and len(queue) > 1 and queue[-1].is_news:  # the first is being sent
             self.n_bytes -= len(queue.pop().payload)
         queue.append(message)
         self.n_bytes += len(message.payload)
         self._news[unit].set()
 
     async def first(self, unit: str) -> Outgoing:
-        """Wait for the oldest message of a unit; it stays until it is published."""
+        """Wait for the oldest message of a unit, which stays in the queue until `published`."""
         while not self._waiting[unit]:
             self._news[unit].clear()
             await self._news[unit].wait()
         return self._waiting[unit][0]
 
     async def published(self, unit: str) -> None:
-        """Let the oldest message of a unit go: the servers have it."""
+        """Remove the oldest message of a unit, which the servers have confirmed."""
         message = self._waiting[unit].popleft()
         self.n_bytes -= len(message.payload)
         self.n_published += 1
@@ -113,13 +112,8 @@ class Outbound:
         async with self._room:
             self._room.notify_all()
 
-    async def published_at_least(self, n_messages: int) -> None:
-        """Wait until so many have been published since the start."""
-        async with self._room:
-            await self._room.wait_for(lambda: self.n_published >= n_messages)
-
     async def drained(self) -> None:
-        """Wait until nothing waits."""
+        """Wait until the queue is empty."""
         async with self._room:
             await self._room.wait_for(lambda: not self.n_waiting)
 
@@ -127,32 +121,23 @@ class Outbound:
         return not self.n_waiting or self.n_bytes + len(message.payload) <= self.capacity
 
 
-log = structlog.get_logger()
-
-RETRY_S = 1.0
-MISFIT_RETRY_S = 5.0
 FULL_RETRY_S = 1.0
 
-UNCONFIRMED = "the servers do not confirm blocks: is the disk slow, or the cluster split?"
-MOST_UNCONFIRMED = 3
-"""Tries in a row, of all units together, before another connection is made."""
+UNCONFIRMED = "the servers do not confirm blocks: check their disks and the cluster"
+MAX_UNCONFIRMED = 3
+"""Consecutive unconfirmed attempts of all units before the connection is renewed."""
 
 STREAM_FULL = (10047, 10077, 10023)
-"""Error codes of servers: no storage left, more than the stream's most bytes, no resources."""
+"""Error codes of the servers: no storage, maximum bytes exceeded, insufficient resources."""
 
 BYTES_PER_MB = 1e6
 
 
 class Publisher:
-    """Publishes what is acquired.
+    """Publishes blocks and news of links.
 
-    Of each unit one message is under way at a time, so that they arrive in order; units do not
-    wait for each other. A message that may not have arrived is sent again under the same id.
-
-    Parameters
-    ----------
-    identities
-        What the messages of each unit are marked with.
+    One message per unit is sent at a time, so that the messages of a unit arrive in order. A
+    message that was not confirmed is sent again with the same id.
     """
 
     def __init__(
@@ -166,13 +151,20 @@ class Publisher:
         self._identities = identities
         self.waiting = Outbound(identities, round(settings.buffer_mb * BYTES_PER_MB), clock)
         self._links: dict[str, LinkNews] = {}
-        self.trouble: str | None = "the servers have not been reached yet"
+        self._state = TroubleLog(
+            "blocks are not being published", "blocks are being published", NOT_REACHED
+        )
         self.n_repeated = 0
         self.n_doubles = 0
         self._n_unconfirmed = 0
 
+    @property
+    def trouble(self) -> str | None:
+        """Why blocks are not being published; None if they are."""
+        return self._state.trouble
+
     async def publish(self, block: SampleBlock) -> None:
-        """Take a block, waiting while too much waits for the servers."""
+        """Queue a block; waits while the queue is full."""
         identity = self._identities[block.unit]
         message = encoded_block(block, identity, self._taken_ns(block))
         outgoing = Outgoing(message_id(identity, block), message)
@@ -184,8 +176,8 @@ class Publisher:
             return now_ns
         return now_ns - ns_from_s(self._clock.monotonic_s() - block.sampled_s)
 
-    def tell(self, news: LinkNews) -> None:
-        """Take news of a link; what was said last is not said again."""
+    def publish_link(self, news: LinkNews) -> None:
+        """Queue news of a link, unless they are unchanged."""
         if self._links.get(news.unit) == news:
             return
         self._links[news.unit] = news
@@ -194,17 +186,17 @@ class Publisher:
         self.waiting.add(news.unit, Outgoing(id_, encoded_link(news, identity), is_news=True))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Publish for ever, over one connection after the other."""
+        """Publish until cancelled; a lost connection is renewed."""
         while True:
             pulse.rest()
             try:
                 async with session(self._settings, "padwatch acquire") as stream:
                     await ensure(stream, self._plant, self._settings)
                     if not self._n_unconfirmed:
-                        self._note(None)
+                        self._state.note(None)
                     await self._send_all(stream, pulse)
             except StreamError as error:
-                self._note(str(error))
+                self._state.note(str(error))
                 is_misfit = isinstance(error, StreamMisfitError)
                 await self._clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
 
@@ -228,7 +220,7 @@ class Publisher:
                 await self._clock.sleep(FULL_RETRY_S)
 
     async def _sent(self, stream: JetStreamContext, where: str, message: Outgoing) -> bool:
-        """Send a message and wait for the servers' word; False if it is to be sent again."""
+        """Send a message and wait for its confirmation; False if it must be sent again."""
         try:
             answer = await stream.publish(
                 where,
@@ -238,34 +230,24 @@ class Publisher:
                 headers={Header.MSG_ID: message.id},
             )
         except (NatsTimeoutError, NoRespondersError, NoStreamResponseError):
-            self._note(UNCONFIRMED)
+            self._state.note(UNCONFIRMED)
             self._n_unconfirmed += 1
-            if self._n_unconfirmed % MOST_UNCONFIRMED == 0:
-                # cut off from the others, a server answers all but this; the stream may be gone
+            if self._n_unconfirmed % MAX_UNCONFIRMED == 0:
+                # a server without a quorum answers everything else; the stream may be gone
                 raise StreamError(UNCONFIRMED) from None
             return False
         except MaxPayloadError:
             raise StreamMisfitError(
-                f"a block of {len(message.payload)} bytes is more than the servers take: raise"
-                " max_payload in their file"
+                f"a block has {len(message.payload)} bytes, more than the servers accept: raise"
+                " max_payload in their configuration"
             ) from None
         except APIError as error:
-            self._note(_refusal(error, stream_name(self._plant)))
+            self._state.note(_refusal(error, stream_name(self._plant)))
             return False
         self._n_unconfirmed = 0
         self.n_doubles += bool(answer.duplicate)
-        self._note(None)
+        self._state.note(None)
         return True
-
-    def _note(self, trouble: str | None) -> None:
-        """Log when publishing begins or ceases to fail."""
-        if trouble == self.trouble:
-            return
-        if trouble is None:
-            log.info("blocks are being published")
-        else:
-            log.warning("blocks are not being published", reason=trouble)
-        self.trouble = trouble
 
 
 def _refusal(error: APIError, name: str) -> str:
@@ -274,51 +256,32 @@ def _refusal(error: APIError, name: str) -> str:
             f"the stream {name!r} is full: raise [stream] max_gb or lower max_age_h; meanwhile"
             " blocks wait at the devices"
         )
-    return f"the servers refuse blocks for the stream {name!r}: {error.description}"
+    return f"the servers reject blocks for the stream {name!r}: {error.description}"
 
 
 def publisher_metrics(publisher: Publisher) -> Iterator[Metric]:
-    """What waits for the servers, and what they have."""
+    """Yield the metrics of the queue and of the published messages."""
     waiting = publisher.waiting
-    yield gauge(
-        "stream_connected",
-        "1 while blocks are taken by the servers of the stream.",
-        (),
-        [((), publisher.trouble is None)],
-    )
-    yield counter(
-        "stream_published",
-        "Messages that the servers have confirmed.",
-        (),
-        [((), waiting.n_published)],
-    )
-    yield counter(
-        "stream_repeated",
-        "Messages that were sent again because they were not confirmed.",
-        (),
-        [((), publisher.n_repeated)],
-    )
-    yield counter(
-        "stream_doubles",
-        "Messages that the servers had already, and kept once.",
-        (),
-        [((), publisher.n_doubles)],
-    )
-    yield gauge(
-        "stream_waiting_bytes",
-        "Bytes that wait for the servers.",
-        (),
-        [((), waiting.n_bytes)],
-    )
-    yield gauge(
+    connected = publisher.trouble is None
+    yield one("stream_connected", "1 while the servers of the stream accept blocks.", connected)
+    for name, meaning, number in (
+        ("stream_published", "Messages that the servers have confirmed.", waiting.n_published),
+        (
+            "stream_repeated",
+            "Messages that were sent again because they were not confirmed.",
+            publisher.n_repeated,
+        ),
+        ("stream_doubles", "Messages that the servers already had.", publisher.n_doubles),
+    ):
+        yield counter(name, meaning, (), [((), number)])
+    yield one("stream_waiting_bytes", "Bytes that wait for the servers.", waiting.n_bytes)
+    yield one(
         "stream_waiting_share",
-        "How far the memory for them is filled, 0 to 1; beyond it devices wait.",
-        (),
-        [((), waiting.n_bytes / waiting.capacity)],
+        "Filled share of the queue, 0 to 1; devices wait when it is full.",
+        waiting.n_bytes / waiting.capacity,
     )
-    yield gauge(
+    yield one(
         "stream_behind_seconds",
-        "For how long something has been waiting without anything being confirmed.",
-        (),
-        [((), waiting.behind_s)],
+        "Time for which messages have waited without any being confirmed.",
+        waiting.behind_s,
     )

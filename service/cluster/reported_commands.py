@@ -1,4 +1,4 @@
-"""Commands of operators through the database."""
+"""Commands of operators, passed through the database."""
 
 import asyncio
 from collections.abc import Callable, Collection
@@ -27,31 +27,31 @@ from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmKeeper
 from service.measuring.recorder import NotStoredError, Recorder
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.periodic import TroubleLog
+from service.runtime.periodic import TroubleLog, periodic
 from service.store.access.audit_entries import Acting, Source, acting, acting_as
 from service.store.port import Store, StoreError
 from service.store.sharing import DONE, OPEN, Answer, Command, CommandState, OpenCommand
 
 WAIT_S = 5.0
-"""How long an operator waits for whoever analyses the unit."""
+"""Longest wait for the process that analyses the unit."""
 
 EXPIRES_S = 15.0
-"""When nobody may begin any more, should this process not be there to withdraw; by clocks of two
-hosts, which may differ by a few seconds."""
+"""Age above which a command is not started, if this process cannot withdraw it. The clocks of the
+two hosts may differ by a few seconds."""
 
-LOOK_EVERY_S = 0.1
+POLL_EVERY_S = 0.1
 
 
-class Asking:
-    """Asks through the database, and answers when it is done."""
+class CommandClient:
+    """Sends commands and waits for their answers."""
 
     def __init__(self, store: Store, alarms: ReplicaAlarms, clock: Clock) -> None:
         self._store, self._alarms, self._clock = store, alarms, clock
 
     async def operate(self, id_: str, action: Action) -> Alarm:
-        """Do something to an alarm; returns it as it is then, on the disk."""
+        """Operate an alarm; returns its stored state afterwards."""
         unit = self._alarms.owner(id_)
-        answer = await self._ask(unit, OnAlarm(id_, action), action.actor)
+        answer = await self._send(unit, OnAlarm(id_, action), action.actor)
         if answer.state is CommandState.UNKNOWN:
             raise LookupError(answer.words)
         if answer.state is CommandState.REFUSED:
@@ -60,22 +60,19 @@ class Asking:
         return self._alarms.alarm(id_)
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
-        """Do something to the baselines of a bearing."""
-        answer = await self._ask(place.unit, OnBaselines(place, action, actor, reason), actor)
+        """Change the baselines of a bearing."""
+        answer = await self._send(place.unit, OnBaselines(place, action, actor, reason), actor)
         if answer.state is CommandState.REFUSED:
             raise BaselineRefusedError(answer.words)
 
     async def refer_to(self, reference: VectorReference) -> None:
-        """Compare 1× vectors with a reference that has just been stored."""
-        await self._ask(reference.unit, NewReference(reference.unit), acting().actor)
+        """Put a stored reference of 1× vectors in force."""
+        await self._send(reference.unit, NewReference(reference.unit), acting().actor)
 
-    async def _ask(self, unit: str, task: Task, actor: str) -> Answer:
-        """Write it down and wait.
+    async def _send(self, unit: str, task: Task, actor: str) -> Answer:
+        """Store a command and wait for its answer.
 
-        Raises
-        ------
-        NotCarriedOutError
-            If nobody does it, or it is in doubt.
+        Raises `NotCarriedOutError` if the command is not carried out, or its outcome is unknown.
         """
         command = self._command(unit, task, actor)
         await asyncio.to_thread(self._store.commands.ask, command)
@@ -83,7 +80,7 @@ class Asking:
         if answer.state in (CommandState.WITHDRAWN, CommandState.INTERRUPTED):
             raise NotCarriedOutError("Not carried out", f"unit {unit}: {answer.words}")
         if answer.state in OPEN:
-            detail = f"unit {unit}: it is being carried out, but is not on the disk yet"
+            detail = f"unit {unit}: the command is being carried out but is not on the disk yet"
             raise NotCarriedOutError("Not on the disk yet", detail)
         return answer
 
@@ -95,47 +92,44 @@ class Asking:
         return Command(uuid4().hex, unit, kind, document, *who, now_ns, expires_ns)
 
     async def _answer(self, command: Command) -> Answer:
-        """What has come of a command within a few seconds; what nobody took up is withdrawn."""
+        """Wait for the answer to a command; withdraw a command that no process takes."""
         until_s = self._clock.monotonic_s() + WAIT_S
         while True:
             found = await asyncio.to_thread(self._store.commands.look, command.id)
             if found is None:
-                return Answer(CommandState.WITHDRAWN, "the command is there no more")
+                return Answer(CommandState.WITHDRAWN, "the command no longer exists")
             if found.state not in OPEN:
                 return found
             if self._clock.monotonic_s() >= until_s:
                 return await asyncio.to_thread(self._give_up, command, found)
-            await self._clock.sleep(LOOK_EVERY_S)
+            await self._clock.sleep(POLL_EVERY_S)
 
     def _give_up(self, command: Command, found: Answer) -> Answer:
         words = (
-            f"the process that analyses it has not answered within {WAIT_S:g} s; it is not"
-            " carried out later, either"
+            f"the process that analyses it has not answered within {WAIT_S:g} s; the command was"
+            " withdrawn"
         )
         if self._store.commands.withdraw(command.id, words, self._clock.now_ns()):
             return Answer(CommandState.WITHDRAWN, words)
         return self._store.commands.look(command.id) or found
 
 
-EVERY_S = 0.25
+READ_EVERY_S = 0.25
 
-TOO_LATE = Answer(CommandState.WITHDRAWN, "nobody took it up in time; it is not carried out")
+TOO_LATE = Answer(
+    CommandState.WITHDRAWN, "no process took the command in time; it was not carried out"
+)
 INTERRUPTED = Answer(
     CommandState.INTERRUPTED,
-    "the process that carried it out was ended meanwhile: look whether it is done",
+    "the process ended while it carried out the command; check the result",
 )
 
 
-class CarryingOut:
-    """Takes commands up in order, one after the other.
+class CommandWorker:
+    """Carries out the commands on the held units, one after the other.
 
-    What is done to an alarm is answered in the transaction that stores its event: a command
-    that is still open was not carried out, and whoever analyses the unit next may begin anew.
-
-    Parameters
-    ----------
-    held
-        Which units are this process's just now.
+    A command on an alarm is answered in the transaction that stores the event of the alarm.
+    Therefore an open command was not carried out, and another process can start it anew.
     """
 
     def __init__(
@@ -153,15 +147,16 @@ class CarryingOut:
         self._trouble = TroubleLog("commands are not carried out", "commands are carried out again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Look for commands for ever."""
-        while True:
-            pulse.beat(EVERY_S)
+        """Carry out commands until cancelled."""
+
+        async def look() -> None:
             await self.look()
-            pulse.rest()  # a store that does not answer is somebody else's to tell
-            await self._clock.sleep(EVERY_S)
+            pulse.rest()  # a store that does not answer is not a fault of this loop
+
+        await periodic(look, READ_EVERY_S, self._clock, pulse)
 
     async def look(self) -> None:
-        """Carry out what is asked now."""
+        """Carry out the open commands."""
         try:
             for found in await asyncio.to_thread(self._store.commands.open, self._held()):
                 await self._take_up(found)
@@ -180,14 +175,14 @@ class CarryingOut:
         await asyncio.to_thread(commands.answer, command.id, answer, self._clock.now_ns())
 
     def _why_not(self, found: OpenCommand) -> Answer | None:
-        """What is to be said instead of carrying a command out; None if it is to be."""
+        """Return the answer to a command that must not be carried out; None otherwise."""
         if self._clock.now_ns() > found.command.expires_ns:
             return TOO_LATE
         try:
             task = read(found.command.kind, found.command.document)
         except UnreadableCommandError as error:
             return Answer(CommandState.REFUSED, str(error))
-        # baselines are written in a transaction of their own: it may be done, or not
+        # baselines are stored in a separate transaction: the outcome is unknown
         is_in_doubt = isinstance(task, OnBaselines) and found.taken_by is not None
         return INTERRUPTED if is_in_doubt else None
 
@@ -203,7 +198,7 @@ class CarryingOut:
         except NotStoredError as error:
             return Answer(
                 CommandState.INTERRUPTED,
-                f"it is done, but not in the alarm's history, and a restart undoes it: {error}",
+                f"the command was carried out but not stored, and a restart undoes it: {error}",
             )
         return DONE
 

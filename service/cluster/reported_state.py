@@ -1,4 +1,4 @@
-"""State of units, reported through the database and read from it."""
+"""State of units: written to the database by analysing processes and read by replicas."""
 
 import asyncio
 import os
@@ -28,22 +28,22 @@ from service.measuring.describing import alarm_state, plant_signs, unit_signs, u
 from service.measuring.films import FilmKeeper
 from service.measuring.service_alarms import SHARED, is_shared, told_by
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.runtime.periodic import TroubleLog
+from service.runtime.periodic import TroubleLog, periodic
 from service.settings.units import UnitSettings
 from service.store.port import Store, StoreError
 from service.store.sharing import UnitBeat, UnitReport, UnitStates
 
-EVERY_S = 1.0
+REPORT_EVERY_S = 1.0
 
 
 @dataclass(frozen=True)
-class Seen:
-    """A unit at one moment.
+class UnitNow:
+    """Present state of a unit.
 
     Parameters
     ----------
     state
-        None where it is as it was when it was last written.
+        None if unchanged since it was last written.
     """
 
     unit: str
@@ -53,13 +53,13 @@ class Seen:
 
 
 class Reporter:
-    """Looks at the units on the event loop, and writes in a thread.
+    """Reads the units on the event loop and writes their reports in a thread.
 
     Parameters
     ----------
     held
-        Which units are this process's just now; with `PLANT` where it also tells of alarms that
-        are of no unit, and `SHARED` where it does the shared work.
+        Returns the units that this process is responsible for; with `PLANT` if it also reports
+        alarms of no unit, and `SHARED` if it does the shared work.
     """
 
     def __init__(
@@ -81,43 +81,38 @@ class Reporter:
         self._trouble = TroubleLog("units are not reported on", "units are reported on again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Report for ever."""
-        while True:
-            pulse.beat(EVERY_S)
-            await self.report()
-            await self._clock.sleep(EVERY_S)
+        """Report until cancelled."""
+        await periodic(self.report, REPORT_EVERY_S, self._clock, pulse)
 
     async def report(self) -> None:
-        """Report once; where that fails, whoever reads will say that nothing is heard."""
+        """Report once; if that fails, readers treat the units as silent."""
         held = list(self._held())
-        self._forget_but(held)
-        seen = [self._look(unit) for unit in held]
-        if not seen:
+        for unit in self._written.keys() - set(held):  # others may write it meanwhile
+            self._written[unit] = (self._written[unit][0], None)
+        found = [self._unit_now(unit) for unit in held]
+        if not found:
             return
         self._n_beats += 1
         try:
-            await asyncio.to_thread(self._write, seen)
+            await asyncio.to_thread(
+                lambda: self._store.report(self._process, [self._report(each) for each in found])
+            )
         except StoreError as error:
             self._trouble.note(str(error))
-            # it may have been written all the same: no other state ever gets its number
-            self._written |= {s.unit: (s.revision, None) for s in seen if s.state is not None}
+            # the report may have been stored: its revision is not used for another state
+            self._written |= {s.unit: (s.revision, None) for s in found if s.state is not None}
             return
         self._trouble.note(None)
-        self._written |= {s.unit: (s.revision, s.state) for s in seen if s.state is not None}
+        self._written |= {s.unit: (s.revision, s.state) for s in found if s.state is not None}
 
-    def _forget_but(self, held: Sequence[str]) -> None:
-        """Write anew, under further numbers, what others may write of meanwhile."""
-        for unit in self._written.keys() - set(held):
-            self._written[unit] = (self._written[unit][0], None)
-
-    def _look(self, unit: str) -> Seen:
+    def _unit_now(self, unit: str) -> UnitNow:
         said_s = self._clock.monotonic_s()
         state, signs = self._state_of(unit)
         signs = replace(signs, said_s=said_s)
         revision, written = self._written.get(unit, (0, None))
         if state == written:
-            return Seen(unit, signs, revision, None)
-        return Seen(unit, signs, revision + 1, state)
+            return UnitNow(unit, signs, revision, None)
+        return UnitNow(unit, signs, revision + 1, state)
 
     def _state_of(self, unit: str) -> tuple[UnitState, UnitSigns]:
         settings = self._units.get(unit)
@@ -131,40 +126,37 @@ class Reporter:
         ]
         return alarm_state(others, self._alarms), plant_signs(self._live)
 
-    def _write(self, seen: Sequence[Seen]) -> None:
-        self._store.report(self._process, [self._report(each) for each in seen])
-
-    def _report(self, seen: Seen) -> UnitReport:
-        status = seen.signs.status
+    def _report(self, now: UnitNow) -> UnitReport:
+        status = now.signs.status
         return UnitReport(
-            unit=seen.unit,
+            unit=now.unit,
             n_beats=self._n_beats,
             beat_ns=self._clock.now_ns(),
             link=status.state.value,
             reason=status.reason,
             last_sample_ns=status.last_sample_ns,
-            signs=written_signs(seen.signs),
-            revision=seen.revision,
-            state=None if seen.state is None else packed_state(seen.state),
+            signs=written_signs(now.signs),
+            revision=now.revision,
+            state=None if now.state is None else packed_state(now.state),
         )
 
 
 log = structlog.get_logger()
 
-LOOK_S = 0.5
+READ_EVERY_S = 0.5
 
 Revision = tuple[str, int]
-"""Process, and number of the state that it has written."""
+"""Process, and revision of the state that it wrote."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """What was read of one unit.
+    """Report on one unit as read from the database.
 
     Parameters
     ----------
     state
-        With its revision and the baselines in force; None where it is as it was.
+        State with its revision and the baselines in force; None if unchanged.
     """
 
     beat: UnitBeat
@@ -173,7 +165,7 @@ class Report:
 
 
 class Feed:
-    """Brings live view, alarms and films of a replica up to what is written down."""
+    """Applies the reports of the database to the live view, alarms and films of a replica."""
 
     def __init__(
         self,
@@ -187,38 +179,30 @@ class Feed:
         self._live, self._alarms, self._films = live, alarms, films
         self._revisions: dict[str, Revision] = {}
         self._unreadable: str | None = None
+        self._trouble = TroubleLog("units cannot be read", "units can be read again")
 
     async def start(self) -> None:
-        """Know what there is before anybody asks.
+        """Read the stored alarms and the reports before the first request.
 
-        Raises
-        ------
-        StoreError
-            If it cannot be read.
+        Raises `StoreError` if they cannot be read.
         """
         self._alarms.take_stored(await asyncio.to_thread(self._store.alarms))
         self._take(await asyncio.to_thread(self._read))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Read for ever."""
-        while True:
-            pulse.beat(LOOK_S)
-            await self.look()
-            await self._clock.sleep(LOOK_S)
+        """Read until cancelled."""
+        await periodic(self.look, READ_EVERY_S, self._clock, pulse)
 
     async def look(self) -> None:
-        """Read once; where that fails everything grows old, and is shown so."""
+        """Read once; if that fails, the values keep aging."""
         try:
             reports = await asyncio.to_thread(self._read)
         except StoreError as error:
-            if self._live.read_error is None:
-                log.error("units cannot be read", reason=str(error))
             self._live.read_error = str(error)
-            return
-        if self._live.read_error is not None:
-            log.info("units can be read again")
-        self._live.read_error = None
-        self._take(reports)
+        else:
+            self._live.read_error = None
+            self._take(reports)
+        self._trouble.note(self._live.read_error)
 
     def _read(self) -> list[Report]:
         states = self._store.unit_states
@@ -229,7 +213,7 @@ class Feed:
         return [report for report in found if report is not None]
 
     def _report(self, beat: UnitBeat, document: tuple[str, int, bytes] | None) -> Report | None:
-        """What can be made of a report; nothing if it is not to be understood."""
+        """Decode a report; None if it is unreadable, which is logged once."""
         try:
             signs = read_signs(beat.signs)
             if document is None:
@@ -237,7 +221,9 @@ class Feed:
             process, revision, content = document
             state = unpacked_state(content)
         except UnreadableStateError as error:
-            self._note(beat.unit, str(error))
+            if str(error) != self._unreadable:
+                reason = self._unreadable = str(error)
+                log.error("unreadable report on a unit", unit=beat.unit, reason=reason)
             return None
         baselines = self._films.fetch(beat.unit, state)
         return Report(beat, signs, ((process, revision), state, baselines))
@@ -250,26 +236,20 @@ class Feed:
                 self._live.set_results(unit, state.bearings)
                 self._alarms.take(unit, state)
                 self._films.take(unit, state, baselines)
-            self._live.hear(unit, report.beat.process, report.beat.n_beats, report.signs)
-
-    def _note(self, unit: str, trouble: str) -> None:
-        """Log once what cannot be understood; the unit then counts as silent."""
-        if trouble != self._unreadable:
-            log.error("a report is of another version, or damaged", unit=unit, reason=trouble)
-        self._unreadable = trouble
+            self._live.update(unit, report.beat.process, report.beat.n_beats, report.signs)
 
 
 def process_name() -> str:
-    """Host, number and a word that no other start has had."""
+    """Return a unique name of this process: host, process id and a random word."""
     return f"{socket.gethostname()}:{os.getpid()}:{uuid4().hex[:12]}"
 
 
-class Described:
-    """Stands where there is no monitor: references change what is said of a unit."""
+@dataclass
+class UnitDescription:
+    """Description of a unit in a process without a monitor; references of the shaft change it."""
 
-    def __init__(self, unit: Unit) -> None:
-        self.unit = unit
+    unit: Unit
 
     def replace_description(self, unit: Unit) -> None:
-        """Take a new description of the same unit."""
+        """Set a new description of the same unit."""
         self.unit = unit

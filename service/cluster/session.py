@@ -1,4 +1,4 @@
-"""A connection to JetStream, and the stream itself."""
+"""Connections to JetStream, and creation of the stream."""
 
 import asyncio
 import re
@@ -10,7 +10,7 @@ from pathlib import Path
 import nats.errors
 from nats.aio.client import Client
 from nats.errors import AuthorizationError, Error, NoServersError
-from nats.js.api import DiscardPolicy, RetentionPolicy, StorageType, StreamConfig
+from nats.js.api import DiscardPolicy, RetentionPolicy, StorageType, StreamConfig, StreamInfo
 from nats.js.client import JetStreamContext
 from nats.js.errors import (
     APIError,
@@ -29,27 +29,33 @@ from service.settings.units import UnitSettings
 
 
 class StreamError(Exception):
-    """The servers do not answer, or not as they should; trying later is reasonable."""
+    """The servers do not answer or return an error; retrying later may succeed."""
 
 
 class StreamMisfitError(StreamError):
-    """Servers, stream and plant file do not fit together; the message says what to do."""
+    """Servers, stream and plant file do not match; the message states what to do."""
 
 
 class StreamAnewError(Exception):
-    """The stream is another one than before: what is known of it counts no more."""
+    """The stream was replaced; positions on it are no longer valid."""
 
+
+RETRY_S = 1.0
+MISFIT_RETRY_S = 5.0
+"""Pauses after a lost connection, and after a mismatch."""
+
+NOT_REACHED = "the servers have not been reached yet"
 
 ROOT = "padwatch"
 
 
 def plant_mark(plant: PlantFile) -> bytes:
-    """Fingerprint of a plant."""
+    """Return the fingerprint of a plant."""
     return fingerprint(ROOT, plant.plant.name)
 
 
 def stream_name(plant: PlantFile) -> str:
-    """Name of the plant's stream: legible, and unlike that of any other plant."""
+    """Return the name of the plant's stream, readable and unique."""
     if plant.stream is not None and plant.stream.name is not None:
         return plant.stream.name
     legible = re.sub(r"[^A-Za-z0-9]+", "-", plant.plant.name).strip("-")[:32]
@@ -57,38 +63,38 @@ def stream_name(plant: PlantFile) -> str:
 
 
 def subjects(plant: PlantFile) -> str:
-    """Subjects of all units of a plant."""
+    """Return the subjects of all units of a plant."""
     return f"{ROOT}.{stream_name(plant)}.*"
 
 
 def subject(plant: PlantFile, unit: str) -> str:
-    """Subject of a unit; a dot in its id would part the subject."""
+    """Return the subject of a unit, without dots in its id, which separate tokens."""
     return f"{ROOT}.{stream_name(plant)}.{unit.replace('.', '=')}"
 
 
 def consumer_name(unit: str) -> str:
-    """What a unit's analysis is called on the servers."""
+    """Return the name of a unit's consumer on the servers."""
     return f"analyse-{unit.replace('.', '=')}"
 
 
 def message_id(identity: UnitIdentity, block: SampleBlock) -> str:
-    """The same for the same block, however often it is published, and for no other.
+    """Return a unique id of a block, the same for every attempt.
 
-    Its time tells it from one of a device that counts the same indices anew.
+    It contains the time because a device may restart its indices.
     """
     place = f"{block.epoch}.{block.first_index}.{block.start_ns}"
     return f"{identity.plant.hex()[:8]}.{block.unit}.{place}"
 
 
 def identity_of(plant: PlantFile, unit: UnitSettings) -> UnitIdentity:
-    """What the blocks of a unit must be marked with."""
+    """Return the identity that the messages of a unit must carry."""
     channels = [(channel.id, str(channel.measurand)) for channel in unit.channel]
     make = fingerprint(unit.id, unit.sampling_hz, unit.source.kind, channels)
     return UnitIdentity(unit.id, plant_mark(plant), make)
 
 
 OLDEST_SERVER = (2, 10)
-"""First version whose streams and consumers carry what is asked for."""
+"""First version with all the features of streams and consumers that padwatch uses."""
 
 CONNECT_S = 3
 PING_S = 5
@@ -96,18 +102,12 @@ PING_S = 5
 
 @asynccontextmanager
 async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStreamContext]:
-    """Connect; what runs within is cancelled as soon as the connection is lost.
-
-    Parameters
-    ----------
-    name
-        Shown for the connection by the servers.
+    """Connect to the servers; the body is cancelled when the connection is lost.
 
     Raises
     ------
     StreamError
-        If there is no connection, or it is lost, or what runs within fails by the library's
-        account.
+        If the connection fails or is lost, or if the body raises an error of the library.
     """
     lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
     client = await _connected(settings, name, lost)
@@ -116,8 +116,8 @@ async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStrea
             watching = tasks.create_task(_ended(lost, settings), name="stream watch")
             yield client.jetstream(timeout=settings.ack_timeout_s)
             watching.cancel()
-    except* (StreamError, Error, OSError) as group:  # one clause: two would make a group again
-        raise _told(group, settings) from None
+    except* (StreamError, Error, OSError) as group:  # two clauses would raise a group again
+        raise _most_specific(group, settings) from None
     finally:
         await _closed(client)
 
@@ -128,7 +128,7 @@ async def _connected(settings: StreamSettings, name: str, lost: asyncio.Future[N
     async def note(error: Exception) -> None:
         reasons.append(error)
 
-    async def tell() -> None:
+    async def on_loss() -> None:
         if not lost.done():
             lost.set_result(None)
 
@@ -138,8 +138,8 @@ async def _connected(settings: StreamSettings, name: str, lost: asyncio.Future[N
             servers=list(settings.servers),
             name=name,
             error_cb=note,
-            closed_cb=tell,
-            disconnected_cb=tell,
+            closed_cb=on_loss,
+            disconnected_cb=on_loss,
             allow_reconnect=False,
             max_reconnect_attempts=1,
             reconnect_time_wait=0,
@@ -169,10 +169,10 @@ async def _ended(lost: asyncio.Future[None], settings: StreamSettings) -> None:
 
 
 async def _closed(client: Client) -> None:
-    """Close without waiting for a server that may be gone."""
+    """Close without waiting for a server that does not answer."""
     with suppress(Error, OSError, TimeoutError):
         await asyncio.wait_for(client.close(), CONNECT_S)
-    # the library leaves the socket open where the server has gone before all was sent to it
+    # the library leaves the socket open if the server disconnects while data is being sent
     transport = client._transport  # noqa: SLF001
     if transport is not None:
         transport.close()  # type: ignore[no-untyped-call]
@@ -183,25 +183,29 @@ def _require_version(client: Client) -> None:
     if (version.major, version.minor) < OLDEST_SERVER:
         oldest = ".".join(str(part) for part in OLDEST_SERVER)
         raise StreamMisfitError(
-            f"the NATS server is of version {version}: padwatch needs {oldest} or newer"
+            f"the NATS server has version {version}; padwatch needs {oldest} or newer"
         )
 
 
 def _renamed(error: BaseException, settings: StreamSettings) -> StreamError:
     if isinstance(error, AuthorizationError) or "authorization" in str(error).lower():
         return StreamMisfitError(
-            f"NATS at {_places(settings)} does not let padwatch in: give [stream]"
-            " credentials_file or token_file of an account that it knows"
+            f"NATS at {_places(settings)} rejects the login: set [stream] credentials_file or"
+            " token_file to those of a known account"
         )
     if isinstance(error, OSError):
         words = error.strerror or str(error)
-        return StreamError(f"NATS at {_places(settings)} is not reached ({words}): is it running?")
+        return StreamError(
+            f"NATS at {_places(settings)} cannot be reached ({words}): check that it is running"
+        )
     words = str(error) or type(error).__name__
     return StreamError(f"NATS at {_places(settings)} cannot be used: {words}")
 
 
-def _told(group: BaseExceptionGroup[BaseException], settings: StreamSettings) -> StreamError:
-    """The one of several that says most: a loss makes many fail at once."""
+def _most_specific(
+    group: BaseExceptionGroup[BaseException], settings: StreamSettings
+) -> StreamError:
+    """Return the most informative of several errors; the loss of a connection causes many."""
     found = sorted(_leaves(group), key=lambda error: not isinstance(error, StreamMisfitError))
     own = [error for error in found if isinstance(error, StreamError)]
     return own[0] if own else _renamed(found[0], settings)
@@ -240,14 +244,14 @@ BYTES_PER_GB = 1e9
 S_PER_H = 3600.0
 
 PLANT, FORMAT = "padwatch-plant", "padwatch-format"
-"""Where the stream says whose it is."""
+"""Metadata of the stream that identify its plant and format."""
 
 
 def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
-    """The stream as it should be.
+    """Return the configuration of the stream.
 
-    When it is full, the servers refuse what is new: it is then still at the devices, and somebody
-    hears of it. The other choice would drop blocks that nobody has analysed, without a word.
+    A full stream refuses new blocks, which then wait at the devices with an alarm. The other
+    policy would drop old blocks before they are analysed.
     """
     return StreamConfig(
         name=stream_name(plant),
@@ -266,78 +270,70 @@ def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
 
 
 async def ensure(stream: JetStreamContext, plant: PlantFile, settings: StreamSettings) -> None:
-    """Make the stream, or take over the plant file's limits.
+    """Create the stream, or apply the limits of the plant file to it.
 
-    Raises
-    ------
-    StreamMisfitError
-        If JetStream is off, or the stream is another plant's or cannot be as it should be.
+    Raises `StreamMisfitError` if JetStream is off, or the stream belongs to another plant or cannot
+    be configured.
     """
-    config = wanted(plant, settings)
-    try:
-        there = (await stream.stream_info(stream_name(plant))).config
-    except NotFoundError:
+    config, found = wanted(plant, settings), await _info(stream, plant)
+    if found is None:
         await _made(stream, config)
-        return
-    except (NoStreamResponseError, ServiceUnavailableError, nats.errors.NoRespondersError):
-        raise StreamMisfitError(NOT_ENABLED) from None
-    _require_own(there, plant)
-    if _limits(there) != _limits(config):
+    elif _limits(found.config) != _limits(config):
         await _made(stream, config, update=True)
 
 
 async def require(stream: JetStreamContext, plant: PlantFile) -> str:
-    """Look for the stream, for those who only read it; returns which one it is.
+    """Return the name of the stream with its time of creation.
 
-    Raises
-    ------
-    StreamError
-        If it is not there yet.
-    StreamMisfitError
-        If JetStream is off, or the stream is another plant's.
+    Raises `StreamError` if it does not exist yet. Raises `StreamMisfitError` if JetStream is off,
+    or the stream belongs to another plant.
     """
-    name = stream_name(plant)
-    try:
-        found = await stream.stream_info(name)
-    except NotFoundError:
+    name, found = stream_name(plant), await _info(stream, plant)
+    if found is None:
         raise StreamError(
-            f"there is no stream {name!r} yet: `padwatch acquire` makes it when it starts"
-        ) from None
-    except (NoStreamResponseError, ServiceUnavailableError, nats.errors.NoRespondersError):
-        raise StreamMisfitError(NOT_ENABLED) from None
-    _require_own(found.config, plant)
+            f"the stream {name!r} does not exist yet; `padwatch acquire` creates it at its start"
+        )
     return f"{name} of {found.created}"
 
 
 NOT_ENABLED = (
-    "JetStream does not answer: start nats-server with -js or a jetstream block in its file, and in"
-    " a cluster see that most of its servers run"
+    "JetStream does not answer: start nats-server with -js or with a jetstream block in its"
+    " configuration; in a cluster most of its servers must run"
 )
+
+NO_ANSWER = (NoStreamResponseError, ServiceUnavailableError, nats.errors.NoRespondersError)
+
+
+async def _info(stream: JetStreamContext, plant: PlantFile) -> StreamInfo | None:
+    """Return the plant's stream; None if it does not exist."""
+    name = stream_name(plant)
+    try:
+        found = await stream.stream_info(name)
+    except NotFoundError:
+        return None
+    except NO_ANSWER:
+        raise StreamMisfitError(NOT_ENABLED) from None
+    mark = (found.config.metadata or {}).get(PLANT)
+    if mark != plant_mark(plant).hex():
+        fault = "belongs to another plant" if mark else "was not created by padwatch"
+        raise StreamMisfitError(f"the stream {name!r} {fault}: set another [stream] name")
+    return found
 
 
 async def _made(stream: JetStreamContext, config: StreamConfig, *, update: bool = False) -> None:
     try:
         await (stream.update_stream(config) if update else stream.add_stream(config))
-    except (NoStreamResponseError, ServiceUnavailableError, nats.errors.NoRespondersError):
+    except NO_ANSWER:
         raise StreamMisfitError(NOT_ENABLED) from None
     except BadRequestError as error:
         raise StreamMisfitError(
-            f"the stream {config.name!r} cannot be as [stream] says: {error.description}"
+            f"the stream {config.name!r} cannot be configured by [stream]: {error.description}"
         ) from None
     except APIError as error:
         raise StreamMisfitError(
-            f"the servers do not make the stream {config.name!r}: {error.description}; lower"
+            f"the servers do not create the stream {config.name!r}: {error.description}; lower"
             " [stream] max_gb or replicas, or give the servers more"
         ) from None
-
-
-def _require_own(config: StreamConfig, plant: PlantFile) -> None:
-    mark = (config.metadata or {}).get(PLANT)
-    if mark != plant_mark(plant).hex():
-        whose = "belongs to another plant" if mark else "was not made by padwatch"
-        raise StreamMisfitError(
-            f"the stream {config.name!r} {whose}: give this one another [stream] name"
-        )
 
 
 def _limits(config: StreamConfig) -> tuple[object, ...]:

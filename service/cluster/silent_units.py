@@ -1,4 +1,4 @@
-"""Units whose samples or analysis stopped."""
+"""Detection of units whose samples or analysis have stopped."""
 
 import asyncio
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -14,28 +14,23 @@ from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import Analyser
 from service.measuring.service_alarms import ToldAlarms, gone_alarms, is_shared, judge
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import periodic
 from service.settings.units import UnitSettings
 from service.store.port import Store, StoreError
 from service.store.sharing import UnitBeat
 
 SILENT_AFTER_S = 30.0
-"""A standby takes over within seconds, a restart within ten: what lasts longer, somebody must see
-to."""
+"""Time without reports before the alarm. A standby takes over within seconds, a restart within
+ten."""
 
 EVERY_S = 1.0
 
 
 class SilentUnits:
-    """Raises the alarm about a unit whose reports cease, for as long as this process leads.
+    """Raises alarms about all units whose reports have stopped, while this process leads.
 
-    Ages are measured by this process's steady clock from the moment at which it saw a report, so
-    that hosts' clocks need not agree. While reports cannot be read nothing is judged: who could
-    not read could not write, either.
-
-    Parameters
-    ----------
-    units
-        All of the plant, also those that other processes analyse.
+    Ages are measured by the monotonic clock of this process from the arrival of a report, so that
+    the clocks of the hosts need not agree. Time in which reports cannot be read does not count.
     """
 
     def __init__(
@@ -44,22 +39,19 @@ class SilentUnits:
         self._units, self._alarms = list(units), alarms
         self._store, self._clock = store, clock
         self._beats: dict[str, tuple[str, int]] = {}
-        self._heard_s: dict[str, float] = {}
+        self._seen_s: dict[str, float] = {}
         self._since_s = 0.0
         self._board: ToldAlarms | None = None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Look for as long as this process leads."""
+        """Check while this process leads, until cancelled."""
         try:
-            while True:
-                pulse.beat(EVERY_S)
-                await self.look()
-                await self._clock.sleep(EVERY_S)
+            await periodic(self.look, EVERY_S, self._clock, pulse)
         finally:
             self.leave()
 
     async def look(self) -> None:
-        """Read the reports once, and judge."""
+        """Read the reports once and update the alarms."""
         try:
             if self._board is None:
                 self._board = self._kept(await asyncio.to_thread(self._store.alarms))
@@ -67,65 +59,60 @@ class SilentUnits:
         except StoreError:
             self._since_s = self._clock.monotonic_s()
             return
-        self._hear(beats)
+        self._note(beats)
         now_s = self._clock.monotonic_s()
-        waits_s = {u: now_s - max(self._heard_s.get(u, 0.0), self._since_s) for u in self._units}
+        waits_s = {u: now_s - max(self._seen_s.get(u, 0.0), self._since_s) for u in self._units}
         silent = [unit for unit, wait_s in waits_s.items() if wait_s > SILENT_AFTER_S]
-        heard = [unit for unit in self._heard_s if unit not in silent]
-        judge(self._board, silent, heard, SILENT_AFTER_S)
+        alive = [unit for unit in self._seen_s if unit not in silent]
+        judge(self._board, silent, alive, SILENT_AFTER_S)
 
     def leave(self) -> None:
-        """Leave the alarms to whoever leads next."""
+        """Leave the alarms to the next leading process."""
         if self._board is not None:
             self._alarms.drop(self._board)
         self._board = None
 
     @property
     def is_watching(self) -> bool:
-        """Whether the alarms are this process's just now."""
+        """Whether this process is responsible for the alarms."""
         return self._board is not None
 
     def _kept(self, stored: Iterable[Alarm]) -> ToldAlarms:
-        """Take the alarms over, and wait anew, whoever was heard before."""
+        """Take over the alarms and measure all ages anew."""
         board = gone_alarms(self._units)
         self._alarms.keep(board, [alarm for alarm in stored if is_shared(alarm)])
         self._beats.clear()
-        self._heard_s.clear()
+        self._seen_s.clear()
         self._since_s = self._clock.monotonic_s()
         return board
 
-    def _hear(self, beats: Sequence[UnitBeat]) -> None:
+    def _note(self, beats: Sequence[UnitBeat]) -> None:
         for beat in beats:
             is_new = self._beats.get(beat.unit) != (beat.process, beat.n_beats)
-            # nobody knows how old the first one is that is read
+            # the age of the first report is unknown
             if is_new and beat.unit in self._beats and beat.unit in self._units:
-                self._heard_s[beat.unit] = self._clock.monotonic_s()
+                self._seen_s[beat.unit] = self._clock.monotonic_s()
             self._beats[beat.unit] = (beat.process, beat.n_beats)
 
 
 log = structlog.get_logger()
 
 MIN_BLOCKS = 3
-"""Blocks that are missing in a row; where a sample is a poll, a block may take a minute."""
+"""Consecutive missing blocks before a unit is silent; a block of polls may take a minute."""
 
 
 def silences_s(units: Iterable[UnitSettings], least_s: float) -> dict[str, float]:
-    """How long each unit may be silent: by the settings, and as its blocks come."""
+    """Return the time without blocks after which each unit counts as not connected."""
     return {
         unit.id: max(least_s, MIN_BLOCKS * unit.block_samples / unit.sampling_hz) for unit in units
     }
 
 
-class Silence:
-    """Counts units as lost of which nothing has come for a while.
+class SilenceWatch:
+    """Marks units as not connected that have sent nothing for their longest silence.
 
-    What was known of a unit may say that samples arrive. While the stream has not been reached
-    since the start, there is nobody else who could say otherwise.
-
-    Parameters
-    ----------
-    after_s
-        How long each unit may be silent.
+    This includes units whose restored state says that samples arrive while the stream has not been
+    reached since the start.
     """
 
     def __init__(
@@ -141,17 +128,16 @@ class Silence:
         trouble: str | None,
         waiting: Collection[str] = frozenset(),
     ) -> None:
-        """Look at all units once.
+        """Check all units once.
 
         Parameters
         ----------
         begun
-            Those whose place on the stream is known.
+            Progress of the units whose position on the stream is known.
         trouble
-            Why nothing can come, where that is known.
+            Why no messages can arrive; None if unknown.
         waiting
-            Units of which something has come that was not taken in yet: these are not silent,
-            however long the store holds them up.
+            Units with messages that wait for the store; these are not silent.
         """
         for unit, after_s in self._after_s.items():
             if unit in waiting:
@@ -163,7 +149,7 @@ class Silence:
 
     def _lose(self, unit: str, reason: str) -> None:
         if self._live.status(unit).state is LinkState.NOT_CONNECTED:
-            return  # it was said
+            return
         self._live.set_link(unit, LinkState.NOT_CONNECTED, reason)
         log.warning("not connected", unit=unit, reason=reason)
         self._analyser.hear(LinkNews(unit, LinkState.NOT_CONNECTED, reason))

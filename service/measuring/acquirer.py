@@ -15,7 +15,8 @@ from acquisition.source import SampleSource
 from core.samples.blocks import SampleBlock
 from service.live.live_view import LinkState, LiveView
 from service.measuring.sources import WatchedUnit
-from service.runtime.heartbeats import Audible, Heartbeats, Pulse
+from service.runtime.heartbeats import Heartbeats, Pulse
+from service.runtime.polls import TimedSource
 
 
 @dataclass(frozen=True)
@@ -201,9 +202,9 @@ class Acquirer:
 
 def _listening(source: SampleSource, pulse: Pulse) -> Callable[[], None]:
     """What to say before a source is waited for; one that cannot be heard may take for ever."""
-    if not isinstance(source, Audible):
+    if not isinstance(source, TimedSource):
         return pulse.rest
-    source.listen(pulse)
+    source.set_pulse(pulse)
     return pulse.beat
 
 

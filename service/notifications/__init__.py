@@ -1,1 +1,1 @@
-"""Delivery: alarms told to webhooks and mailboxes through a durable outbox."""
+"""Notifications about alarms by webhook and mail, through a durable outbox."""

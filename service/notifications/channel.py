@@ -1,4 +1,4 @@
-"""What every channel shares: outcomes of an attempt, secrets, TLS, connections, time-outs."""
+"""Shared parts of channels: outcomes of an attempt, secrets, TLS and connections."""
 
 import asyncio
 import os
@@ -10,31 +10,26 @@ from typing import Protocol
 
 from acquisition.delivery.network import NameLookUp
 from service.notifications.message import Message
+from service.settings.notifications import SecretSettings
 
 
 @dataclass(frozen=True)
 class Delivered:
-    """The receiver has taken it."""
+    """The receiver accepted the message."""
 
     answer: str
 
 
 @dataclass(frozen=True)
 class Refused:
-    """The receiver will never take it."""
+    """The receiver rejected the message permanently."""
 
     answer: str
 
 
 @dataclass(frozen=True)
 class Failed:
-    """It may take it later.
-
-    Parameters
-    ----------
-    retry_after_s
-        When it has asked to be tried again; None if it has not.
-    """
+    """The attempt failed and is repeated, after a delay if the receiver requested one."""
 
     answer: str
     retry_after_s: float | None = None
@@ -43,112 +38,68 @@ class Failed:
 Outcome = Delivered | Refused | Failed
 
 
-class Carrier(Protocol):
-    """Carries messages to one receiver."""
+class Channel(Protocol):
+    """Sends messages to one receiver."""
 
-    async def carry(self, message: Message, body: str) -> Outcome:
-        """Try once; ends within its time-outs, whatever the receiver does.
+    @property
+    def address(self) -> str:
+        """Address of the receiver, without secrets."""
+        ...
 
-        Parameters
-        ----------
-        body
-            The same message as it was written down.
-        """
+    async def send(self, message: Message, body: str) -> Outcome:
+        """Make one attempt within the time-outs; ``body`` is the serialized message."""
         ...
 
 
-MAX_BYTES = 8192
+MAX_SECRET_BYTES = 8192
 
 
 class SecretError(Exception):
-    """A secret cannot be read; the message says from where, never what."""
+    """A secret cannot be read; the message names its place and never its content."""
 
 
-@dataclass(frozen=True)
-class Secret:
-    """Where a secret is: a file, or a variable of the environment.
+def read_secret(settings: SecretSettings) -> str:
+    """Read a secret, without the line end that editors add.
 
-    Parameters
-    ----------
-    file, env
-        One of them.
+    Raises `SecretError` if the secret is missing or not a single printable line.
     """
-
-    file: Path | None = None
-    env: str | None = None
-
-    def read(self) -> str:
-        """Read it, without the line's end that editors add.
-
-        Raises
-        ------
-        SecretError
-            If there is none, or it is no printable line.
-        """
-        text = self._text().strip()
-        if not text or not text.isprintable():
-            raise SecretError(f"{self._place} holds no single line of printable text")
-        return text
-
-    @property
-    def _place(self) -> str:
-        return f"file {self.file}" if self.file is not None else f"environment variable {self.env}"
-
-    def _text(self) -> str:
-        if self.file is None:
-            return os.environ.get(self.env or "", "")
-        try:
-            with self.file.open("rb") as file:
-                return file.read(MAX_BYTES).decode()
-        except OSError as error:
-            raise SecretError(f"{self._place}: {error.strerror}") from error
-        except UnicodeDecodeError as error:
-            raise SecretError(f"{self._place} is not UTF-8 text") from error
+    file = settings.file
+    place = f"environment variable {settings.env}" if file is None else f"file {file}"
+    try:
+        text = os.environ.get(settings.env or "", "") if file is None else _start_of(Path(file))
+    except OSError as error:
+        raise SecretError(f"{place}: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise SecretError(f"{place} is not UTF-8 text") from error
+    text = text.strip()
+    if not text or not text.isprintable():
+        raise SecretError(f"{place} must hold a single line of printable text")
+    return text
 
 
-@dataclass(frozen=True)
-class Timeouts:
-    """How long a receiver may take.
-
-    Parameters
-    ----------
-    connect_s
-        To look its name up, and to connect to each of its addresses.
-    answer_s
-        Longest silence after that.
-    total_s
-        For all of an attempt.
-    """
-
-    connect_s: float = 10.0
-    answer_s: float = 30.0
-    total_s: float = 60.0
+def _start_of(path: Path) -> str:
+    with path.open("rb") as file:
+        return file.read(MAX_SECRET_BYTES).decode()
 
 
-PATIENT = Timeouts()
+class TrustedAuthorities:
+    """Certificate authorities of the system, or those of one file."""
 
-
-class Trust:
-    """Whose certificates are believed: the system's authorities, or those of one file."""
-
-    def __init__(self, ca_file: Path | None = None) -> None:
+    def __init__(self, ca_file: str | None) -> None:
         self._ca_file = ca_file
         self._context: ssl.SSLContext | None = None
 
     async def context(self) -> ssl.SSLContext:
-        """Settings for TLS; certificate and name are always checked.
+        """Return the TLS context; certificate and host name are always checked.
 
-        Raises
-        ------
-        OSError
-            If the file cannot be used; the message names it.
+        Raises `OSError` if the file cannot be used; the message names it.
         """
         if self._context is None:
             self._context = await asyncio.to_thread(_context, self._ca_file)
         return self._context
 
 
-def _context(ca_file: Path | None) -> ssl.SSLContext:
+def _context(ca_file: str | None) -> ssl.SSLContext:
     try:
         return ssl.create_default_context(cafile=ca_file)
     except (OSError, ValueError) as error:  # ssl.SSLError is an OSError
@@ -156,12 +107,9 @@ def _context(ca_file: Path | None) -> ssl.SSLContext:
 
 
 async def connected_socket(look_up: NameLookUp, port: int, timeout_s: float) -> socket.socket:
-    """Connect to the first address of a name that answers.
+    """Connect to the first address of a name that accepts a connection.
 
-    Raises
-    ------
-    OSError
-        If none does; the last one's reason.
+    Raises `OSError` if no address does; the reason is that of the last one.
     """
     failure: OSError = OSError("has no address")
     async with asyncio.timeout(timeout_s):
@@ -170,7 +118,7 @@ async def connected_socket(look_up: NameLookUp, port: int, timeout_s: float) -> 
         try:
             async with asyncio.timeout(timeout_s):
                 return await _connected(address, port)
-        except OSError as error:  # a time-out is one, too
+        except OSError as error:  # includes time-outs
             failure = error
     raise failure
 
@@ -187,15 +135,15 @@ async def _connected(address: str, port: int) -> socket.socket:
     return sock
 
 
-def words(error: BaseException) -> str:
-    """An error in words, whatever its class says about itself."""
+def error_text(error: BaseException) -> str:
+    """Return the message of an error, or the name of its class if it has none."""
     if isinstance(error, TimeoutError) and not str(error):
         return "no answer in time"
-    said = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return said or type(error).__name__
+    text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return text or type(error).__name__
 
 
-def printable(text: str, longest: int = 200) -> str:
-    """What somebody else has said, as one line that is safe to show."""
+def printable(text: str, max_chars: int = 200) -> str:
+    """Return foreign text as one line without control characters."""
     one_line = " ".join(text.split())
-    return "".join(c if c.isprintable() else "�" for c in one_line)[:longest]
+    return "".join(c if c.isprintable() else "�" for c in one_line)[:max_chars]

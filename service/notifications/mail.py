@@ -1,11 +1,10 @@
-"""Messages as mail over SMTP: one recipient, one connection, one answer that counts."""
+"""Mail over SMTP: one recipient and one connection per attempt."""
 
 import asyncio
 import contextlib
 import math
 import socket
 from collections.abc import Iterator
-from dataclasses import dataclass
 from datetime import datetime
 from email.message import EmailMessage
 from email.policy import SMTP as SMTP_POLICY
@@ -14,33 +13,30 @@ import aiosmtplib
 
 from acquisition.delivery.network import NameLookUp
 from service.notifications.channel import (
-    PATIENT,
     Delivered,
     Failed,
     Outcome,
     Refused,
-    Secret,
     SecretError,
-    Timeouts,
-    Trust,
+    TrustedAuthorities,
     connected_socket,
+    error_text,
     printable,
-    words,
+    read_secret,
 )
 from service.notifications.message import Message
 from service.settings.alarm_kinds import kind_words
+from service.settings.notifications import SmtpSettings
 
 CHANGES = {"escalated": "rose to danger", "eased": "eased to alert"}
 
 WHOLE_UNIT = ("device", "link")
 
-NOT_A_SYSTEM_OF_PROTECTION = (
-    "padwatch is a condition-monitoring service and no protection system: this mail informs."
-)
+DISCLAIMER = "padwatch monitors conditions and is not a protection system; this mail informs only."
 
 
 def subject(message: Message) -> str:
-    """One line, fit for a header whatever the plant and its parts are called."""
+    """Return the subject: one line without control characters."""
     if message["type"] == "test":
         return printable(f"[padwatch] {message['plant']}: test message")
     priority = (message["priority"] or "").upper() if message["is_active"] else "over"
@@ -49,19 +45,19 @@ def subject(message: Message) -> str:
 
 
 def text(message: Message) -> str:
-    """The whole mail."""
+    """Return the text of the mail."""
     lines = _test(message) if message["type"] == "test" else _alarm(message)
     return "\n".join(lines) + "\n"
 
 
 def change_words(message: Message) -> str:
-    """What has happened to the alarm."""
+    """Return the change of the alarm in words."""
     change: str = message["change"]
     return CHANGES.get(change, change.replace("_", " "))
 
 
 def value_words(message: Message) -> str | None:
-    """The value with its uncertainty, and the limit; None where there is no number."""
+    """Return the value with its uncertainty and the limit; None without a value."""
     value, limit, std = message["value"], message["limit"], message["uncertainty"]
     if value is None:
         return None
@@ -74,7 +70,7 @@ def value_words(message: Message) -> str | None:
 
 
 def _change(value: float, limit: float | None, std: float | None) -> str:
-    """A change of a stiffness in ln, in percent of the baseline."""
+    """Return a change of stiffness, given as a logarithm, in percent of the baseline."""
     percent = 100.0 * math.expm1(value)
     spread = "" if std is None else f" ± {2 * 100.0 * std * math.exp(value):.1f} (95 %)"
     edge = None if limit is None else 100.0 * math.expm1(math.copysign(limit, value))
@@ -107,7 +103,7 @@ def _alarm(message: Message) -> Iterator[str]:
 
 def _test(message: Message) -> Iterator[str]:
     yield f"This is a test message of padwatch at {printable(message['plant'])}."
-    yield "Alarms of this plant would arrive here."
+    yield "Alarms of this plant will be sent to this address."
     yield from ("", *_foot(message))
 
 
@@ -115,7 +111,7 @@ def _foot(message: Message) -> Iterator[str]:
     if message["url"]:
         yield f"Dashboard: {message['url']}"
     yield f"Event: {message['id']}"
-    yield NOT_A_SYSTEM_OF_PROTECTION
+    yield DISCLAIMER
 
 
 def _place(message: Message) -> str:
@@ -128,108 +124,84 @@ def _unit_name(message: Message) -> str:
 
 
 QUIT_S = 2.0
-"""How long a server that has taken the mail gets to say goodbye."""
+"""Longest wait for the answer to QUIT."""
 
 LOGIN_CODES = (503, 530, 534, 535, 538)
-"""Answers of 5xx that speak of the login and not of the mail."""
+"""Replies of class 5xx that concern the login and not the mail (RFC 4954, section 6)."""
 
 POLICY = SMTP_POLICY.clone(cte_type="7bit", max_line_length=76)
 
 
-@dataclass(frozen=True)
-class MailTarget:
-    """Which server, and whose mailbox.
-
-    Parameters
-    ----------
-    tls
-        "starttls" (required then), "implicit" or "none".
-    username, password
-        Both or none.
-    """
-
-    host: str
-    port: int
-    sender: str
-    recipient: str
-    tls: str = "starttls"
-    username: str | None = None
-    password: Secret | None = None
-    timeouts: Timeouts = PATIENT
-
-
 class Mail:
-    """Carries messages to one mailbox."""
+    """Sends messages to one recipient."""
 
-    def __init__(self, target: MailTarget, trust: Trust) -> None:
-        self._target, self._trust = target, trust
-        self._look_up = NameLookUp(target.host, target.port)
+    def __init__(self, settings: SmtpSettings, recipient: str, trusted: TrustedAuthorities) -> None:
+        self.address = recipient
+        self._settings, self._trusted = settings, trusted
+        self._look_up = NameLookUp(settings.host, settings.port)
 
-    async def carry(self, message: Message, body: str) -> Outcome:  # noqa: ARG002
-        """Try once."""
-        target = self._target
-        mail = mail_of(message, target.sender, target.recipient).as_bytes()
+    async def send(self, message: Message, body: str) -> Outcome:  # noqa: ARG002
+        """Make one attempt."""
+        mail = mail_of(message, self._settings.sender, self.address).as_bytes()
         try:
-            async with asyncio.timeout(target.timeouts.total_s):
-                return await self._send(mail)
+            async with asyncio.timeout(self._settings.total_timeout_s):
+                return await self._delivered(mail)
         except aiosmtplib.SMTPRecipientsRefused as error:
-            return _judged(error.recipients[0])
+            return _outcome(error.recipients[0])
         except (aiosmtplib.SMTPSenderRefused, aiosmtplib.SMTPDataError) as error:
-            return _judged(error)
+            return _outcome(error)
         except aiosmtplib.SMTPResponseException as error:
-            return Failed(_said(error))
+            return Failed(_reply(error))
         except (aiosmtplib.SMTPException, OSError, ValueError, SecretError) as error:
-            # what it stands on says why, without the library's words around it
+            # the cause states the reason without the text that the library adds
             cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
-            return Failed(printable(words(cause)))
+            return Failed(printable(error_text(cause)))
 
-    async def _send(self, mail: bytes) -> Outcome:
-        target = self._target
-        sock = await connected_socket(self._look_up, target.port, target.timeouts.connect_s)
+    async def _delivered(self, mail: bytes) -> Outcome:
+        settings = self._settings
+        sock = await connected_socket(self._look_up, settings.port, settings.connect_timeout_s)
         try:
             server = await self._client(sock)
             try:
-                await self._open(server)
-                _, answer = await server.sendmail(target.sender, [target.recipient], mail)
-                await _part(server)
+                await self._log_in(server)
+                _, reply = await server.sendmail(settings.sender, [self.address], mail)
+                with contextlib.suppress(aiosmtplib.SMTPException, OSError):
+                    async with asyncio.timeout(QUIT_S):  # the mail is accepted whatever follows
+                        await server.quit()
             finally:
                 server.close()
         finally:
             sock.close()
-        return Delivered(printable(answer))
+        return Delivered(printable(reply))
 
     async def _client(self, sock: socket.socket) -> aiosmtplib.SMTP:
-        target = self._target
-        is_tls = target.tls != "none"
+        settings = self._settings
         return aiosmtplib.SMTP(
-            hostname=target.host,
+            hostname=settings.host,
             sock=sock,
             local_hostname=printable(socket.gethostname()).replace(" ", "-") or "padwatch",
-            timeout=target.timeouts.answer_s,
-            use_tls=target.tls == "implicit",
-            start_tls=False,  # asked for below, where it is required
-            tls_context=await self._trust.context() if is_tls else None,
+            timeout=settings.answer_timeout_s,
+            use_tls=settings.tls == "implicit",
+            start_tls=False,  # `_log_in` requires it
+            tls_context=await self._trusted.context() if settings.tls != "none" else None,
         )
 
-    async def _open(self, server: aiosmtplib.SMTP) -> None:
+    async def _log_in(self, server: aiosmtplib.SMTP) -> None:
         """Connect, encrypt and log in.
 
-        Raises
-        ------
-        SecretError
-            If there is no password; the server is not troubled then.
+        Raises `SecretError` if the password cannot be read; then no connection is made.
         """
-        target = self._target
-        password = target.password.read() if target.password else None
+        settings = self._settings
+        password = read_secret(settings.password) if settings.password else None
         await server.connect()
-        if target.tls == "starttls":
+        if settings.tls == "starttls":
             await server.starttls()
-        if target.username is not None and password is not None:
-            await server.login(target.username, password)
+        if settings.username is not None and password is not None:
+            await server.login(settings.username, password)
 
 
 def mail_of(message: Message, sender: str, recipient: str) -> EmailMessage:
-    """A mail that is the same at every attempt, and tells machines that no human wrote it."""
+    """Return a mail that is identical for every attempt and marked as generated (RFC 3834)."""
     mail = EmailMessage(policy=POLICY)
     mail["From"] = sender
     mail["To"] = recipient
@@ -242,18 +214,11 @@ def mail_of(message: Message, sender: str, recipient: str) -> EmailMessage:
     return mail
 
 
-async def _part(server: aiosmtplib.SMTP) -> None:
-    """Say goodbye to a server that has taken the mail; whether it answers changes nothing."""
-    with contextlib.suppress(aiosmtplib.SMTPException, OSError):
-        async with asyncio.timeout(QUIT_S):
-            await server.quit()
+def _outcome(error: aiosmtplib.SMTPResponseException) -> Outcome:
+    """Return the outcome of a reply that rejects the mail now or permanently."""
+    is_permanent = 500 <= error.code < 600 and error.code not in LOGIN_CODES
+    return Refused(_reply(error)) if is_permanent else Failed(_reply(error))
 
 
-def _judged(error: aiosmtplib.SMTPResponseException) -> Outcome:
-    """What a server means that does not take this mail."""
-    for_ever = 500 <= error.code < 600 and error.code not in LOGIN_CODES
-    return Refused(_said(error)) if for_ever else Failed(_said(error))
-
-
-def _said(error: aiosmtplib.SMTPResponseException) -> str:
+def _reply(error: aiosmtplib.SMTPResponseException) -> str:
     return printable(f"{error.code} {error.message}")

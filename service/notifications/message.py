@@ -1,9 +1,9 @@
-"""An alarm event as a JSON message, written once and the same for every attempt."""
+"""Notification messages: JSON documents about alarm events, identical for every attempt."""
 
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from typing import Any
 from uuid import uuid4
 
@@ -16,73 +16,70 @@ from service.live.live_view import LiveView
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
 
+Message = dict[str, Any]
+"""A message as JSON values."""
+
+FORMAT = 1
+"""Version of the format; raised when a key is removed or changes its meaning, not for new keys."""
+
+ALARMS_PAGE = "#/alarms"
+
 CONDITION = ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
-"""What a film's stiffness depends on, as far as it is measured."""
+"""Quantities of the operating condition."""
+
+QUANTITIES = {quantity.name: quantity for quantity in CATALOGUE}
 
 
 @dataclass(frozen=True)
-class Fact:
-    """One number.
+class AlarmContext:
+    """Context of an alarm beside its own value.
 
     Parameters
     ----------
     uncertainty
-        Standard uncertainty in the unit of the value; None where it is not known.
-    """
-
-    name: str
-    label: str
-    value: float
-    unit: str
-    uncertainty: float | None = None
-
-
-@dataclass(frozen=True)
-class Surroundings:
-    """What goes with an alarm beside its own value.
-
-    Parameters
-    ----------
-    uncertainty
-        Standard uncertainty of the alarm's value; None where it is not known.
+        Standard uncertainty of the alarm's value; None if unknown.
     state
-        Operating state in a word; None where it is not known.
+        Name of the operating state; None if unknown.
     condition
-        Speed, power, eccentricity and oil temperature, those that are measured.
+        Operating condition by quantity, as in the message.
     """
 
     uncertainty: float | None = None
     state: str | None = None
-    condition: Sequence[Fact] = ()
+    condition: Mapping[str, Message] = field(default_factory=dict)
 
 
-LookAround = Callable[[AlarmIdentity], Surroundings]
+FindContext = Callable[[AlarmIdentity], AlarmContext]
 
 NewestFilm = Callable[[str, str], FilmNews | None]
-"""What is said of the films of a bearing of a unit."""
+"""Returns the newest film verdict of a bearing by unit and bearing."""
 
 
-class Around:
-    """Finds it in the newest results of the alarm's bearing, if the alarm is about one."""
+class LiveContext:
+    """Reads the context of an alarm from the newest results of its bearing."""
 
     def __init__(self, live: LiveView) -> None:
         self._live = live
         self._newest_film: NewestFilm = lambda unit, bearing: None  # noqa: ARG005
 
     def watch_films(self, newest: NewestFilm) -> None:
-        """Look also at what is said of films, once they are watched."""
+        """Set the source of film verdicts, once films are monitored."""
         self._newest_film = newest
 
-    def __call__(self, identity: AlarmIdentity) -> Surroundings:
-        """Look around one alarm."""
+    def __call__(self, identity: AlarmIdentity) -> AlarmContext:
+        """Return the context of an alarm; empty if the alarm is not about a bearing."""
         assessment = self._live.assessment(identity.unit, identity.subject)
         if assessment is None:
-            return Surroundings()
+            return AlarmContext()
         condition = assessment.condition
-        return Surroundings(
+        return AlarmContext(
             uncertainty=self._uncertainty(identity, assessment),
             state=condition.state.name.lower() if condition else None,
-            condition=list(_facts(assessment)),
+            condition={
+                name: _fact(name, reading.value, reading.u_random)
+                for name in CONDITION
+                if (reading := assessment.readings[name]).value is not None
+            },
         )
 
     def _uncertainty(self, identity: AlarmIdentity, assessment: Assessment) -> float | None:
@@ -94,135 +91,86 @@ class Around:
         return measured.u_random if measured else None
 
 
-def _facts(assessment: Assessment) -> Iterator[Fact]:
-    for name in CONDITION:
-        reading = assessment.readings[name]
-        if reading.value is not None:
-            yield Fact(name, LABELS[name], reading.value, UNITS[name], reading.u_random)
-
-
-LABELS = {quantity.name: quantity.label for quantity in CATALOGUE}
-UNITS = {quantity.name: quantity.unit for quantity in CATALOGUE}
-
-
-FORMAT = 1
-"""Raised when a key changes its meaning or goes; new ones may come at any time."""
-
-ALARMS_PAGE = "#/alarms"
-
-
-@dataclass(frozen=True)
-class Plant:
-    """The plant as a message names it.
-
-    Parameters
-    ----------
-    url
-        Of the dashboard; None if nobody can reach it.
-    """
-
-    name: str
-    url: str | None
-    unit_names: dict[str, str]
-
-
-Message = dict[str, Any]
-"""A message as a receiver reads it."""
-
-
 class Composer:
-    """Writes messages.
-
-    Parameters
-    ----------
-    new_id
-        Makes identifiers that nobody else has.
-    """
+    """Composes messages about a plant; ``url`` is the dashboard, ``new_id`` returns unique ids."""
 
     def __init__(
-        self, plant: Plant, look: LookAround, new_id: Callable[[], str] = lambda: str(uuid4())
+        self,
+        plant: str,
+        url: str | None,
+        unit_names: Mapping[str, str],
+        context: FindContext,
+        new_id: Callable[[], str] = lambda: str(uuid4()),
     ) -> None:
-        self._plant, self._look, self._new_id = plant, look, new_id
+        self._plant, self._unit_names = plant, unit_names
+        self._url = None if url is None else f"{url.rstrip('/')}/{ALARMS_PAGE}"
+        self._context, self._new_id = context, new_id
 
     def alarm(self, alarm: Alarm, event: AlarmEvent, is_active: bool, now_ns: int) -> Message:
-        """Tell of an event of an alarm."""
-        found = self._look(event.identity)
+        """Return the message about an event of an alarm."""
+        identity, context = event.identity, self._context(event.identity)
         return {
             **self._head("alarm", now_ns),
-            **_what(event, is_active),
+            "alarm": identity.id,
+            "unit": identity.unit,
+            "subject": identity.subject,
+            "kind": identity.kind,
+            "number": event.number,
+            "change": event.change.value,
+            "priority": None if event.level is None else event.level.name.lower(),
+            "is_active": is_active,
+            "state": event.state_after.value,
+            "occurrence": event.occurrence,
+            "time": rfc3339(event.time_ns),
+            "actor": event.actor,
+            "reason": str(event.reason),
             "raised": None if alarm.raised_ns is None else rfc3339(alarm.raised_ns),
-            **_numbers(event, found),
-            "unit_name": self._plant.unit_names.get(event.identity.unit),
+            "value": _finite(event.value),
+            "uncertainty": _finite(context.uncertainty),
+            "limit": _finite(event.limit),
+            "value_unit": value_unit(identity.kind),
+            "value_is": "ln_change" if identity.kind in FILM_KINDS else "reading",
+            "operating_state": context.state,
+            "condition": dict(context.condition),
+            "unit_name": self._unit_names.get(identity.unit),
         }
 
     def test(self, now_ns: int) -> Message:
-        """Tell of nothing, to see whether it arrives."""
+        """Return a test message."""
         return self._head("test", now_ns)
 
     def _head(self, type_: str, now_ns: int) -> Message:
-        url = self._plant.url
         return {
             "format": FORMAT,
             "id": self._new_id(),
             "type": type_,
-            "plant": self._plant.name,
+            "plant": self._plant,
             "written": rfc3339(now_ns),
-            "url": None if url is None else f"{url.rstrip('/')}/{ALARMS_PAGE}",
+            "url": self._url,
         }
 
 
 def dumps(message: Message) -> str:
-    """Write a message down, in the bytes in which it will be signed and sent."""
+    """Serialize a message to the text that is signed and sent."""
     return json.dumps(message, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
 def loads(body: str) -> Message:
-    """Read a message that was written down."""
+    """Parse a serialized message."""
     message: Message = json.loads(body)
     return message
 
 
-def _what(event: AlarmEvent, is_active: bool) -> Message:
-    identity = event.identity
+def _fact(name: str, value: float | None, uncertainty: float | None) -> Message:
+    quantity = QUANTITIES[name]
     return {
-        "alarm": identity.id,
-        "unit": identity.unit,
-        "subject": identity.subject,
-        "kind": identity.kind,
-        "number": event.number,
-        "change": event.change.value,
-        "priority": None if event.level is None else event.level.name.lower(),
-        "is_active": is_active,
-        "state": event.state_after.value,
-        "occurrence": event.occurrence,
-        "time": rfc3339(event.time_ns),
-        "actor": event.actor,
-        "reason": str(event.reason),
-    }
-
-
-def _numbers(event: AlarmEvent, found: Surroundings) -> Message:
-    kind = event.identity.kind
-    return {
-        "value": _finite(event.value),
-        "uncertainty": _finite(found.uncertainty),
-        "limit": _finite(event.limit),
-        "value_unit": value_unit(kind),
-        "value_is": "ln_change" if kind in FILM_KINDS else "reading",
-        "operating_state": found.state,
-        "condition": {fact.name: _fact(fact) for fact in found.condition},
-    }
-
-
-def _fact(fact: Fact) -> Message:
-    return {
-        "label": fact.label,
-        "value": _finite(fact.value),
-        "unit": fact.unit,
-        "uncertainty": _finite(fact.uncertainty),
+        "label": quantity.label,
+        "value": _finite(value),
+        "unit": quantity.unit,
+        "uncertainty": _finite(uncertainty),
     }
 
 
 def _finite(number: float | None) -> float | None:
-    """Nothing, where JSON has no number for it."""
+    """Return a number that JSON can represent, otherwise None."""
     return number if number is not None and math.isfinite(number) else None

@@ -1,95 +1,80 @@
-"""A receiver's letters, in order, one at a time, each until it is settled."""
+"""Senders: deliver the letters of each receiver in order, one at a time."""
 
 import asyncio
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 import structlog
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
 from core.units import ns_from_s
-from service.notifications.channel import Carrier, Delivered, Failed, Outcome
+from service.notifications.channel import Channel, Delivered, Failed, Outcome
 from service.notifications.message import loads
-from service.notifications.routing import QuietHours
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
+from service.settings.notifications import AnyReceiver
 from service.store.outbox import Backlog, LetterState, Outbox, StoredLetter
 from service.store.port import StoreError
 
-FIRST_S = 1.0
+FIRST_WAIT_S = 1.0
 
 
 def wait_s(
     n_failures: int,
     retry_after_s: float | None,
-    longest_s: float,
+    max_s: float,
     share: Callable[[], float] = random.random,
 ) -> float:
-    """Twice as long after each failure, up to a limit, less up to half of it by chance.
-
-    Receivers that failed together are so not tried together.
+    """Return the wait after a failure: exponential back-off with random jitter of up to half.
 
     Parameters
     ----------
     n_failures
-        In a row, 1 or more.
+        Consecutive failures, 1 or more.
     retry_after_s
-        What the receiver has asked for: waited for in full, up to the limit.
+        Delay requested by the receiver, without jitter; up to the limit.
     share
-        Chance, 0 to 1.
+        Returns a random number from 0 to 1.
     """
-    doubled_s = FIRST_S * 2.0 ** min(n_failures - 1, 30)
-    drawn_s = min(doubled_s, longest_s) * (1.0 - 0.5 * share())
-    return max(drawn_s, min(retry_after_s or 0.0, longest_s))
+    doubled_s = FIRST_WAIT_S * 2.0 ** min(n_failures - 1, 30)
+    drawn_s = min(doubled_s, max_s) * (1.0 - 0.5 * share())
+    return max(drawn_s, min(retry_after_s or 0.0, max_s))
 
 
 log = structlog.get_logger()
 
 BATCH = 50
-"""Letters that are in memory at once, whatever waits in the store."""
+"""Maximum number of letters in memory."""
 
 LOOK_S = 30.0
-"""How long it waits for news before it looks by itself: another process may have revived letters,
-quiet hours may have ended."""
+"""Interval of checks without a wake-up: another process may have revived letters, or quiet hours
+may have ended."""
 
 STORE_RETRY_S = 1.0
 
-MAX_CARRY_S = 600.0
-"""Longest that a receiver may take, whatever time-outs its settings allow."""
+MAX_SEND_S = 600.0
+"""Longest time-out of one attempt that the settings allow."""
 
 T = TypeVar("T")
 
 
+S_PER_H = 3600.0
+
+
 @dataclass(frozen=True)
 class Receiver:
-    """Somebody who is told of alarms.
-
-    Parameters
-    ----------
-    name
-        Of its letters in the outbox.
-    kind, address
-        "webhook" or "smtp", and where that is, fit to be shown.
-    max_retry_s
-        Longest wait between attempts.
-    max_age_s
-        What is older when an attempt fails is given up.
-    """
+    """A receiver of notifications."""
 
     name: str
-    kind: Literal["webhook", "smtp"]
-    address: str
-    carrier: Carrier
-    max_retry_s: float = 900.0
-    max_age_s: float = 259_200.0
-    quiet: QuietHours | None = None
+    settings: AnyReceiver
+    channel: Channel
 
 
 class SenderState(StrEnum):
-    """What a sender does."""
+    """State of a sender."""
 
     IDLE = "idle"
     SENDING = "sending"
@@ -100,18 +85,18 @@ class SenderState(StrEnum):
 
 @dataclass(frozen=True)
 class SenderStatus:
-    """How a sender fares.
+    """Status of a sender.
 
     Parameters
     ----------
     n_failures
-        Attempts in vain since the last answer that was of use.
+        Failed attempts since the last one that succeeded.
     failing_since_ns
-        When the first of them was; None if there is none.
+        Time of the first of them; None without failures.
     reason
-        Why the newest attempt failed.
+        Reason of the newest failure.
     next_attempt_ns
-        When the next one is due; None unless it waits for that.
+        Time of the next attempt; None unless the sender waits for it.
     """
 
     state: SenderState = SenderState.IDLE
@@ -122,7 +107,7 @@ class SenderStatus:
 
 
 class Sender:
-    """Delivers what waits for one receiver, for ever."""
+    """Delivers the waiting letters of one receiver."""
 
     def __init__(self, receiver: Receiver, outbox: Outbox, clock: Clock) -> None:
         self.receiver, self.status = receiver, SenderStatus()
@@ -132,22 +117,22 @@ class Sender:
         self._pulse: Pulse = UNHEARD
 
     def wake(self) -> None:
-        """Look into the outbox now."""
+        """Check the outbox now."""
         self._news.set()
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Deliver whatever comes, until cancelled."""
+        """Deliver until cancelled."""
         self._pulse = pulse
         while True:
             self._news.clear()
             if not await self._deliver_batch():
                 pulse.beat(LOOK_S)
-                await self._news_or(LOOK_S)
+                await self._wake_up_or(LOOK_S)
 
     async def _deliver_batch(self) -> bool:
-        """Deliver some letters; return whether it is worth looking for more at once."""
+        """Deliver some letters; return whether more may be waiting."""
         name = self.receiver.name
-        letters = await self._kept(lambda: self._outbox.waiting(name, BATCH))
+        letters = await self._stored(lambda: self._outbox.waiting(name, BATCH))
         for letter in letters:
             if await self._is_held():
                 self._note(SenderState.QUIET)
@@ -159,16 +144,16 @@ class Sender:
         return bool(letters)
 
     async def _is_held(self) -> bool:
-        quiet = self.receiver.quiet
-        if quiet is None or not quiet.hold_at(self._clock.now_ns()):
+        quiet = self.receiver.settings.quiet
+        if quiet is None or not quiet.include(self._clock.now_ns()):
             return False
-        return not await self._kept(lambda: self._outbox.urgent(self.receiver.name))
+        return not await self._stored(lambda: self._outbox.urgent(self.receiver.name))
 
     async def _deliver(self, letter: StoredLetter) -> bool:
-        """Try a letter once; return whether the receiver is done with it."""
+        """Make one attempt; return whether the letter is settled."""
         self._note(SenderState.SENDING)
-        self._pulse.beat(MAX_CARRY_S)
-        outcome = await self.receiver.carrier.carry(loads(letter.body), letter.body)
+        self._pulse.beat(MAX_SEND_S)
+        outcome = await self.receiver.channel.send(loads(letter.body), letter.body)
         if isinstance(outcome, Failed):
             await self._wait_after(letter, outcome)
             return False
@@ -176,27 +161,27 @@ class Sender:
         return True
 
     async def _finish(self, letter: StoredLetter, outcome: Outcome) -> None:
-        """Write down what has come of it, also if the service is being stopped meanwhile."""
+        """Store the outcome, even if the service stops meanwhile."""
         is_delivered = isinstance(outcome, Delivered)
         state = LetterState.DELIVERED if is_delivered else LetterState.REFUSED
         now_ns = self._clock.now_ns()
-        await self._kept(
+        await self._stored(
             lambda: self._outbox.finish(letter.id, state, outcome.answer, now_ns), to_the_end=True
         )
-        tell = log.info if is_delivered else log.error
+        write = log.info if is_delivered else log.error
         if not is_delivered or self.status.n_failures:
-            words = "delivered again" if is_delivered else "refused for ever"
-            tell(words, receiver=self.receiver.name, id=letter.event_id, answer=outcome.answer)
+            event = "delivered again" if is_delivered else "permanently rejected"
+            write(event, receiver=self.receiver.name, id=letter.event_id, answer=outcome.answer)
         self.status = SenderStatus(SenderState.SENDING)
 
     async def _wait_after(self, letter: StoredLetter, failed: Failed) -> None:
         now_ns, before = self._clock.now_ns(), self.status
         if before.n_failures == 0:
             log.warning("not delivered", receiver=self.receiver.name, reason=failed.answer)
-        await self._kept(lambda: self._outbox.fail(letter.id, failed.answer))
+        await self._stored(lambda: self._outbox.fail(letter.id, failed.answer))
         await self._expire(failed.answer)
         n_failures = before.n_failures + 1
-        pause_s = wait_s(n_failures, failed.retry_after_s, self.receiver.max_retry_s)
+        pause_s = wait_s(n_failures, failed.retry_after_s, self.receiver.settings.max_retry_s)
         self.status = SenderStatus(
             state=SenderState.RETRYING,
             n_failures=n_failures,
@@ -208,28 +193,30 @@ class Sender:
         await self._clock.sleep(pause_s)
 
     async def _expire(self, answer: str) -> None:
-        """Give up what is too old, all of it at once: the receiver has just shown that it fails.
+        """Expire all letters above the maximum age, after a failed attempt.
 
-        A host's clock that was set forward since the start makes nothing older.
+        A step of the host's clock since the start does not count as age.
         """
         now = Arrival.now(self._clock)
         set_forward_s = max(0.0, now.step_s_since(self._begun))
-        before_ns = now.host_ns - ns_from_s(set_forward_s + self.receiver.max_age_s)
+        before_ns = now.host_ns - ns_from_s(
+            set_forward_s + S_PER_H * self.receiver.settings.max_age_h
+        )
         name = self.receiver.name
         words = f"too old after: {answer}"
-        n_given_up = await self._kept(
+        n_given_up = await self._stored(
             lambda: self._outbox.expire(name, before_ns, words, now.host_ns)
         )
         if n_given_up:
-            log.error("given up", receiver=name, n_messages=n_given_up, reason=answer)
+            log.error("letters expired", receiver=name, n_messages=n_given_up, reason=answer)
 
-    async def _kept(self, work: Callable[[], T], to_the_end: bool = False) -> T:
-        """Work on the store in a thread until it succeeds: nothing is sent on a guess.
+    async def _stored(self, work: Callable[[], T], to_the_end: bool = False) -> T:
+        """Run an operation of the store in a thread until it succeeds.
 
         Parameters
         ----------
         to_the_end
-            Whether it is finished even when this task is cancelled meanwhile.
+            Whether the operation is completed even if this task is cancelled.
         """
         while True:
             self._pulse.beat(STORE_RETRY_S)
@@ -237,11 +224,13 @@ class Sender:
                 return await (_finished(work) if to_the_end else asyncio.to_thread(work))
             except StoreError as error:
                 if self.status.state is not SenderState.STORE_FAILS:
-                    log.error("outbox out of reach", receiver=self.receiver.name, reason=str(error))
+                    log.error(
+                        "the outbox cannot be used", receiver=self.receiver.name, reason=str(error)
+                    )
                 self._note(SenderState.STORE_FAILS)
                 await self._clock.sleep(STORE_RETRY_S)
 
-    async def _news_or(self, duration_s: float) -> None:
+    async def _wake_up_or(self, duration_s: float) -> None:
         waiting = [
             asyncio.create_task(self._news.wait(), name="news"),
             asyncio.create_task(self._clock.sleep(duration_s), name="look"),
@@ -258,27 +247,27 @@ class Sender:
 
 
 async def _finished(work: Callable[[], T]) -> T:
-    """Work in a thread that is waited for even by a task that is cancelled."""
+    """Run an operation in a thread and wait for its end even if this task is cancelled."""
     working = asyncio.ensure_future(asyncio.to_thread(work))
     try:
         return await asyncio.shield(working)
     except asyncio.CancelledError:
         await asyncio.wait([working])
         if not working.cancelled():
-            working.exception()  # it is being stopped: the letter is tried again after the restart
+            working.exception()  # the letter is sent again after the restart
         raise
 
 
 @dataclass(frozen=True)
 class ReceiverView:
-    """A receiver as it is shown.
+    """Public state of a receiver.
 
     Parameters
     ----------
     receiver, status
-        None of one that is in the plant file no longer; what waits for it goes on waiting.
+        None for a receiver that is no longer in the plant file; its letters keep waiting.
     backlog
-        None if there never was anything for it.
+        None for a receiver without letters.
     """
 
     name: str
@@ -287,23 +276,37 @@ class ReceiverView:
     backlog: Backlog | None
 
 
-class Deliveries:
-    """Runs a sender for each receiver; one never waits for another.
+def receiver_views(
+    receivers: Mapping[str, Receiver], outbox: Outbox, status: Callable[[str], SenderStatus]
+) -> list[ReceiverView]:
+    """Return the state of all receivers: those of the plant file, then others with letters.
 
-    Parameters
-    ----------
-    receivers
-        None in a replay, which tells nobody.
+    Raises
+    ------
+    StoreError
+        If the outbox cannot be read.
     """
+    backlogs = {backlog.receiver: backlog for backlog in outbox.backlogs()}
+    others = [
+        ReceiverView(name, None, None, b) for name, b in backlogs.items() if name not in receivers
+    ]
+    return [
+        *(ReceiverView(name, r, status(name), backlogs.get(name)) for name, r in receivers.items()),
+        *others,
+    ]
+
+
+class Deliveries:
+    """Runs an independent sender for each receiver."""
 
     def __init__(self, receivers: Sequence[Receiver], outbox: Outbox, clock: Clock) -> None:
-        self._senders = [Sender(receiver, outbox, clock) for receiver in receivers]
+        self._senders = {each.name: Sender(each, outbox, clock) for each in receivers}
         self._outbox, self._clock = outbox, clock
 
     async def run(self, beats: Heartbeats | None = None) -> None:
-        """Deliver for ever."""
+        """Deliver until cancelled."""
         beats = beats or Heartbeats(self._clock)
-        loops = {f"deliver {sender.receiver.name}": sender.run for sender in self._senders}
+        loops = {f"deliver {name}": sender.run for name, sender in self._senders.items()}
         try:
             async with asyncio.TaskGroup() as tasks:
                 for name, loop in loops.items():
@@ -313,27 +316,13 @@ class Deliveries:
             raise
 
     def wake(self) -> None:
-        """Say that there may be something new in the outbox."""
-        for sender in self._senders:
+        """Check the outbox for new letters now."""
+        for sender in self._senders.values():
             sender.wake()
 
     async def look(self) -> list[ReceiverView]:
-        """Look at all receivers.
-
-        Raises
-        ------
-        StoreError
-            If the outbox cannot be read.
-        """
-        backlogs = {b.receiver: b for b in await asyncio.to_thread(self._outbox.backlogs)}
-        senders = {sender.receiver.name: sender for sender in self._senders}
-        return [
-            ReceiverView(
-                name,
-                sender.receiver if sender else None,
-                sender.status if sender else None,
-                backlogs.get(name),
-            )
-            for name in (*senders, *(other for other in backlogs if other not in senders))
-            for sender in [senders.get(name)]
-        ]
+        """Return the state of all receivers. Raises `StoreError` if the outbox cannot be read."""
+        receivers = {name: sender.receiver for name, sender in self._senders.items()}
+        return await asyncio.to_thread(
+            receiver_views, receivers, self._outbox, lambda name: self._senders[name].status
+        )

@@ -1,4 +1,4 @@
-"""Messages as signed POST requests; answers are read in small pieces and to a limit."""
+"""Webhook: signed POST requests, with a limit on the size of the response."""
 
 import asyncio
 import contextlib
@@ -6,7 +6,6 @@ import hashlib
 import hmac
 import ssl
 from collections.abc import Iterable
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 from importlib.metadata import version
@@ -19,25 +18,24 @@ from acquisition.clock import Clock
 from acquisition.delivery.network import NameLookUp
 from core.units import NS_PER_S
 from service.notifications.channel import (
-    PATIENT,
     Delivered,
     Failed,
     Outcome,
     Refused,
-    Secret,
     SecretError,
-    Timeouts,
-    Trust,
+    TrustedAuthorities,
+    error_text,
     printable,
-    words,
+    read_secret,
 )
 from service.notifications.message import Message
+from service.settings.notifications import WebhookSettings
 
 PIECE_BYTES = 1024
-"""Most that is parsed without giving the event loop to others."""
+"""Bytes that are parsed before the event loop runs other tasks."""
 
 MAX_BYTES = 32_768
-"""Most that is read of one answer, headers included."""
+"""Bytes that are read of one response, including its headers."""
 
 SocketOption = (
     tuple[int, int, int] | tuple[int, int, bytes | bytearray] | tuple[int, int, None, int]
@@ -45,38 +43,26 @@ SocketOption = (
 
 
 class BoundedStream(httpcore2.AsyncNetworkStream):
-    """A connection of which at most so much is read.
-
-    Parameters
-    ----------
-    n_left
-        Bytes that may still be read.
-    """
+    """A connection with a limit on the bytes that are read."""
 
     def __init__(self, stream: httpcore2.AsyncNetworkStream, n_left: int = MAX_BYTES) -> None:
         self._stream, self._n_left = stream, n_left
 
     async def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
-        """Read a piece.
-
-        Raises
-        ------
-        httpcore2.ReadError
-            If there was too much already.
-        """
+        """Read some bytes. Raises `httpcore2.ReadError` if the limit is exceeded."""
         if self._n_left <= 0:
-            raise httpcore2.ReadError(f"the answer is longer than {MAX_BYTES} bytes")
+            raise httpcore2.ReadError(f"the response is longer than {MAX_BYTES} bytes")
         found = await self._stream.read(min(max_bytes, PIECE_BYTES), timeout)
         self._n_left -= len(found)
-        await asyncio.sleep(0)  # what has been received already is handed out without waiting
+        await asyncio.sleep(0)  # received bytes are returned without waiting
         return found
 
     async def write(self, buffer: bytes, timeout: float | None = None) -> None:
-        """Send."""
+        """Write some bytes."""
         await self._stream.write(buffer, timeout)
 
     async def aclose(self) -> None:
-        """Close."""
+        """Close the connection."""
         await self._stream.aclose()
 
     async def start_tls(
@@ -85,17 +71,17 @@ class BoundedStream(httpcore2.AsyncNetworkStream):
         server_hostname: str | None = None,
         timeout: float | None = None,
     ) -> httpcore2.AsyncNetworkStream:
-        """Encrypt."""
+        """Encrypt the connection."""
         encrypted = await self._stream.start_tls(ssl_context, server_hostname, timeout)
         return BoundedStream(encrypted, self._n_left)
 
     def get_extra_info(self, info: str) -> Any:
-        """What the connection beneath knows of itself."""
+        """Return information about the underlying connection."""
         return self._stream.get_extra_info(info)
 
 
 class BoundedNetwork(httpcore2.AsyncNetworkBackend):
-    """Connects to a name by its own look-up."""
+    """Network backend that resolves one host name with `NameLookUp`."""
 
     def __init__(self, look_up: NameLookUp) -> None:
         self._look_up, self._network = look_up, httpcore2.AnyIOBackend()
@@ -108,14 +94,10 @@ class BoundedNetwork(httpcore2.AsyncNetworkBackend):
         local_address: str | None = None,
         socket_options: Iterable[SocketOption] | None = None,
     ) -> httpcore2.AsyncNetworkStream:
-        """Connect to the first address that answers.
+        """Connect to the first address that accepts a connection.
 
-        Raises
-        ------
-        OSError
-            If the name has no address.
-        httpcore2.ConnectError, httpcore2.ConnectTimeout
-            If none of its addresses answers.
+        Raises `OSError` if the name cannot be resolved. Raises `httpcore2.ConnectError` or
+        `httpcore2.ConnectTimeout` if no address accepts a connection.
         """
         failure: Exception = httpcore2.ConnectError(f"{host} has no address")
         async with asyncio.timeout(timeout):
@@ -134,95 +116,77 @@ class BoundedNetwork(httpcore2.AsyncNetworkBackend):
 
 EXCERPT_BYTES = 1024
 EXCERPT_S = 2.0
-"""How much of a refusal is read, to be shown, and for how long; of a consent nothing is."""
+"""Limits of the part of an error response that is read in order to be shown."""
 
 FAULTS = (httpcore2.NetworkError, httpcore2.ProtocolError, httpcore2.UnsupportedProtocol)
-"""What the library calls what goes wrong on the network, time-outs apart."""
+"""Network errors of the library, without time-outs."""
 
-TRY_AGAIN = (408, 425, 429)
-"""Answers of 4xx that do not say that the message is wrong."""
-
-
-@dataclass(frozen=True)
-class WebhookTarget:
-    """Where messages go.
-
-    Parameters
-    ----------
-    secret
-        Signs them, if there is one.
-    authorization
-        Value of the Authorization header, if there is one.
-    """
-
-    url: str
-    secret: Secret | None = None
-    authorization: Secret | None = None
-    timeouts: Timeouts = PATIENT
+RETRY_STATUSES = (408, 425, 429)
+"""Statuses of class 4xx that do not reject the message."""
 
 
 class Webhook:
-    """Carries messages to a web server; a connection for each."""
+    """Posts messages to a web server, each over a new connection."""
 
-    def __init__(self, target: WebhookTarget, trust: Trust, clock: Clock) -> None:
-        self._target, self._trust, self._clock = target, trust, clock
-        url = urlsplit(target.url)
+    def __init__(self, settings: WebhookSettings, clock: Clock) -> None:
+        self._settings, self._trusted = settings, TrustedAuthorities(settings.ca_file)
+        self._clock = clock
+        url = urlsplit(settings.url)
+        self.address = f"{url.scheme}://{url.netloc}"
+        """URL without its path, which may contain a token."""
         port = url.port or (443 if url.scheme == "https" else 80)
         self._look_up = NameLookUp(url.hostname or "", port)
 
-    async def carry(self, message: Message, body: str) -> Outcome:
-        """Try once."""
+    async def send(self, message: Message, body: str) -> Outcome:
+        """Make one attempt."""
         try:
-            async with asyncio.timeout(self._target.timeouts.total_s):
+            async with asyncio.timeout(self._settings.total_timeout_s):
                 return await self._post(message["id"], body.encode())
         except httpcore2.TimeoutException:
-            return Failed(words(TimeoutError()))
+            return Failed(error_text(TimeoutError()))
         except (*FAULTS, OSError, ValueError, SecretError) as error:
-            return Failed(printable(words(error)))
+            return Failed(printable(error_text(error)))
 
     async def _post(self, id_: str, body: bytes) -> Outcome:
-        headers, timeouts = self._headers(id_, body), self._target.timeouts
-        limits = dict.fromkeys(("read", "write", "pool"), timeouts.answer_s)
-        # a bare pool: no redirects, cookies, proxies or netrc, whatever an answer says
+        headers, settings = self._headers(id_, body), self._settings
+        limits = dict.fromkeys(("read", "write", "pool"), settings.answer_timeout_s)
+        # without redirects, cookies, proxies and netrc, whatever the response contains
         async with (
             httpcore2.AsyncConnectionPool(
-                ssl_context=await self._trust.context(),
+                ssl_context=await self._trusted.context(),
                 network_backend=BoundedNetwork(self._look_up),
             ) as pool,
             pool.stream(
                 "POST",
-                self._target.url,
+                settings.url,
                 headers=list(headers.items()),
                 content=body,
-                extensions={"timeout": {**limits, "connect": timeouts.connect_s}},
+                extensions={"timeout": {**limits, "connect": settings.connect_timeout_s}},
             ) as response,
         ):
-            return await self._judged(response)
+            return await self._outcome(response)
 
-    async def _judged(self, response: httpcore2.Response) -> Outcome:
+    async def _outcome(self, response: httpcore2.Response) -> Outcome:
         status = response.status
-        said = {name.lower(): text.decode("latin-1") for name, text in response.headers}
+        headers = {name.lower(): text.decode("latin-1") for name, text in response.headers}
         if 200 <= status < 300:
             return Delivered(f"{status}")
         if 300 <= status < 400:
-            where = said.get(b"location", "elsewhere")
-            return Failed(printable(f"{status}: sends on to {where}, which is not followed"))
+            where = headers.get(b"location", "an unknown place")
+            return Failed(printable(f"{status}: redirects to {where}, which is not followed"))
         answer = printable(f"{status} {await _excerpt(response)}")
-        if 400 <= status < 500 and status not in TRY_AGAIN:
+        if 400 <= status < 500 and status not in RETRY_STATUSES:
             return Refused(answer)
-        return Failed(answer, retry_after_s(said.get(b"retry-after"), self._clock))
+        return Failed(answer, retry_after_s(headers.get(b"retry-after"), self._clock))
 
     def _headers(self, id_: str, body: bytes) -> dict[str, str]:
-        """What goes with a message.
+        """Return the headers of a request.
 
-        Raises
-        ------
-        SecretError
-            If a secret is not to be had: nothing is sent without what should prove it.
+        Raises `SecretError` if a secret cannot be read; then nothing is sent.
         """
         time_s = str(self._clock.now_ns() // NS_PER_S)
         headers = {
-            "Host": urlsplit(self._target.url).netloc,
+            "Host": urlsplit(self._settings.url).netloc,
             "Content-Type": "application/json",
             "Accept-Encoding": "identity",
             "Connection": "close",
@@ -231,21 +195,21 @@ class Webhook:
             "Idempotency-Key": f'"{id_}"',
             "Padwatch-Timestamp": time_s,
         }
-        if self._target.secret is not None:
-            headers["Padwatch-Signature"] = signature(self._target.secret.read(), time_s, body)
-        if self._target.authorization is not None:
-            headers["Authorization"] = self._target.authorization.read()
+        if (secret := self._settings.secret) is not None:
+            headers["Padwatch-Signature"] = signature(read_secret(secret), time_s, body)
+        if (authorization := self._settings.authorization) is not None:
+            headers["Authorization"] = read_secret(authorization)
         return headers
 
 
 def signature(secret: str, time_s: str, body: bytes) -> str:
-    """HMAC-SHA-256 over time stamp, a dot and body, so that an old message cannot be sent anew."""
+    """Return the HMAC-SHA-256 of time stamp, dot and body, which prevents replay."""
     signed = time_s.encode() + b"." + body
     return "v1=" + hmac.new(secret.encode(), signed, hashlib.sha256).hexdigest()
 
 
 def retry_after_s(text: str | None, clock: Clock) -> float | None:
-    """When a server wants to be asked again (RFC 9110, 10.2.3): seconds or a date; else None."""
+    """Return the delay in a Retry-After header, seconds or a date (RFC 9110, 10.2.3), or None."""
     if text is None:
         return None
     if text.isascii() and text.isdigit():
@@ -260,7 +224,7 @@ def retry_after_s(text: str | None, clock: Clock) -> float | None:
 
 
 async def _excerpt(response: httpcore2.Response) -> str:
-    """Read the beginning of what it says; an answer that never ends, or breaks off, will do."""
+    """Read the start of an error response, which may be endless or incomplete."""
     found = b""
     with contextlib.suppress(*FAULTS, httpcore2.TimeoutException, TimeoutError):
         async with asyncio.timeout(EXCERPT_S):

@@ -11,6 +11,7 @@ from acquisition.clock import Clock
 from core.limits import WITHIN, AlarmLevel, Judgement, Limits, judge, unknown
 from core.quality import Reading
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import periodic
 
 
 @dataclass(frozen=True)
@@ -43,10 +44,7 @@ Measure = Callable[[Path], DiskSpace]
 def measure_disk(folder: Path) -> DiskSpace:
     """Measure the file system of a folder, or of its nearest parent that exists.
 
-    Raises
-    ------
-    OSError
-        If the file system cannot be read.
+    Raises `OSError` if the file system cannot be read.
     """
     there = folder.absolute()
     while not there.exists() and there != there.parent:
@@ -62,10 +60,11 @@ def measure_disk(folder: Path) -> DiskSpace:
 
 EVERY_S = 600.0
 OVER_S = 86_400.0
-"""The pace is a day's mean: captures follow alarms, backups run at night."""
+"""Interval of the stored measurements, and length of the history: the mean of a day includes
+captures and nightly backups."""
 
-LEAST_S = 3600.0
-"""Shortest time that a pace is estimated from."""
+MIN_HISTORY_S = 3600.0
+"""Shortest history that a pace is estimated from."""
 
 S_PER_DAY = 86_400.0
 
@@ -89,12 +88,12 @@ class Growth:
             return None
         since_s, free_then = self._seen[0]
         lasted_s, taken = now_s - since_s, free_then - space.free_bytes
-        if lasted_s < LEAST_S or taken <= 0:
+        if lasted_s < MIN_HISTORY_S or taken <= 0:
             return None
         return space.free_bytes / taken * lasted_s / S_PER_DAY
 
 
-MOST_ALERT, MOST_DANGER = 0.25, 0.125
+MAX_ALERT, MAX_DANGER = 0.25, 0.125
 """Shares at which limits in bytes are capped, so that a small disk can be within limits."""
 
 DEADBAND_SHARE = 0.2
@@ -103,15 +102,7 @@ DEADBAND_SHARE = 0.2
 
 @dataclass(frozen=True)
 class SpaceLimits:
-    """Limits of free space; the limit that is reached first counts.
-
-    Parameters
-    ----------
-    alert_share, danger_share
-        Share of the disk, 0 to 1.
-    alert_bytes, danger_bytes
-        Bytes, for a disk of any size.
-    """
+    """Limits of free space in shares and in bytes; the limit that is reached first applies."""
 
     alert_share: float = 0.1
     danger_share: float = 0.05
@@ -121,8 +112,8 @@ class SpaceLimits:
     def of(self, total_bytes: int) -> Limits:
         """Return the limits of the free share of a disk of this size."""
         whole = max(total_bytes, 1)
-        alert = max(self.alert_share, min(self.alert_bytes / whole, MOST_ALERT))
-        danger = max(self.danger_share, min(self.danger_bytes / whole, MOST_DANGER))
+        alert = max(self.alert_share, min(self.alert_bytes / whole, MAX_ALERT))
+        danger = max(self.danger_share, min(self.danger_bytes / whole, MAX_DANGER))
         return Limits(alert_below=alert, danger_below=danger, deadband=DEADBAND_SHARE * danger)
 
 
@@ -153,15 +144,7 @@ class DiskView:
 
 
 class SpaceWatch:
-    """Measures the disks of some folders periodically, in a thread, since a disk may not answer.
-
-    Parameters
-    ----------
-    folders
-        Folders that padwatch writes to, by name.
-    measure
-        Measures the disk of a folder.
-    """
+    """Measures the disks of some folders periodically, in a thread, since a disk may not answer."""
 
     def __init__(
         self,
@@ -178,10 +161,7 @@ class SpaceWatch:
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Measure until cancelled."""
-        while True:
-            pulse.beat(PERIOD_S)
-            await self.look()
-            await self._clock.sleep(PERIOD_S)
+        await periodic(self.look, PERIOD_S, self._clock, pulse)
 
     async def look(self) -> None:
         """Measure all disks once."""
@@ -198,13 +178,7 @@ class SpaceWatch:
         self.disks = tuple(first.values())
 
     def condition(self, held: AlarmLevel | None) -> Judgement:
-        """Judge the fullest disk.
-
-        Parameters
-        ----------
-        held
-            Level of the condition before.
-        """
+        """Judge the fullest disk."""
         if self._trouble is not None:
             return unknown(self._trouble)
         found = [(self._judged(disk, held), disk) for disk in self.disks]

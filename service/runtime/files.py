@@ -61,10 +61,7 @@ def zipped(files: Mapping[str, Path | bytes]) -> Generator[bytes, None, None]:
 
     All files are opened first, so a file that is removed meanwhile is still sent whole.
 
-    Raises
-    ------
-    OSError
-        If a file cannot be read.
+    Raises `OSError` if a file cannot be read.
     """
     sink = Sink()
     with ExitStack() as opened:

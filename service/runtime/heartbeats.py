@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Awaitable, Callable
-from typing import Protocol, runtime_checkable
 
 from acquisition.clock import Clock
 
@@ -10,67 +9,40 @@ PATIENCE_S = 60.0
 """Tolerance for a late beat: a slow disk does not make a loop stuck."""
 
 
-class Pulse(Protocol):
-    """Receiver of the heartbeats of one loop."""
+class Pulse:
+    """Receiver of the heartbeats of one loop; this base class ignores them."""
 
     def beat(self, after_s: float = 0.0) -> None:
-        """Report that the loop is alive and announce its next beat.
-
-        Parameters
-        ----------
-        after_s
-            Longest time until the next beat; `PATIENCE_S` is added.
-        """
-        ...
+        """Report that the loop is alive, and the longest time until its next beat."""
 
     def rest(self) -> None:
         """Report that the loop is alive and waits without limit."""
-        ...
 
+
+UNHEARD = Pulse()
+"""Receiver that ignores all heartbeats."""
 
 Loop = Callable[[Pulse], Awaitable[None]]
 """A coroutine function that runs until it is cancelled and sends heartbeats."""
 
 
-@runtime_checkable
-class Audible(Protocol):
-    """An object that sends heartbeats on behalf of the task that uses it."""
-
-    def listen(self, pulse: Pulse) -> None:
-        """Send the heartbeats of the calling task to ``pulse`` from now on."""
-        ...
-
-
-class Unheard:
-    """Heartbeat receiver that ignores all beats."""
-
-    def beat(self, after_s: float = 0.0) -> None:
-        """Do nothing."""
-
-    def rest(self) -> None:
-        """Do nothing."""
-
-
-UNHEARD = Unheard()
-
-
-class HeardPulse:
-    """State of one loop: its last beat and when the next is due."""
+class LoopPulse(Pulse):
+    """Last beat of one loop, and the time when the next is due."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._heard_s = clock.monotonic_s()
-        self._due_s = self._heard_s + PATIENCE_S
+        self._last_s = clock.monotonic_s()
+        self._due_s = self._last_s + PATIENCE_S
         self._has_ended = False
 
     def beat(self, after_s: float = 0.0) -> None:
-        """Record a beat."""
-        self._heard_s = self._clock.monotonic_s()
-        self._due_s = self._heard_s + after_s + PATIENCE_S
+        """Record a beat; the next is due after ``after_s`` and `PATIENCE_S`."""
+        self._last_s = self._clock.monotonic_s()
+        self._due_s = self._last_s + after_s + PATIENCE_S
 
     def rest(self) -> None:
         """Record a beat after which none is due."""
-        self._heard_s, self._due_s = self._clock.monotonic_s(), math.inf
+        self._last_s, self._due_s = self._clock.monotonic_s(), math.inf
 
     def end(self) -> None:
         """Record that the loop has ended."""
@@ -83,7 +55,7 @@ class HeardPulse:
             return "has ended"
         now_s = self._clock.monotonic_s()
         if now_s > self._due_s:
-            return f"stuck: no heartbeat for {now_s - self._heard_s:.0f} s"
+            return f"stuck: no heartbeat for {now_s - self._last_s:.0f} s"
         return None
 
 
@@ -92,11 +64,11 @@ class Heartbeats:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._pulses: dict[str, HeardPulse] = {}
+        self._pulses: dict[str, LoopPulse] = {}
 
     async def tend(self, name: str, run: Loop) -> None:
         """Run a loop and record its heartbeats; a loop that returns counts as dead."""
-        pulse = self._pulses[name] = HeardPulse(self._clock)
+        pulse = self._pulses[name] = LoopPulse(self._clock)
         try:
             await run(pulse)
         finally:

@@ -21,20 +21,8 @@ from acquisition.clock import Clock
 
 
 @dataclass(frozen=True)
-class Seen:
-    """State of a histogram at one time.
-
-    Parameters
-    ----------
-    bounds_s
-        Upper bound of each bucket except the last, which is unbounded.
-    n_up_to
-        Cumulative count at each bound; the last entry counts all.
-    sum_s
-        Sum of all durations.
-    newest_s
-        Newest duration; None before the first.
-    """
+class HistogramState:
+    """State of a histogram: upper bounds, cumulative counts (the last counts all), sum, newest."""
 
     bounds_s: tuple[float, ...]
     n_up_to: tuple[int, ...]
@@ -80,11 +68,11 @@ class Durations:
         yield
         self.observe(self._clock.monotonic_s() - began_s)
 
-    def seen(self) -> Seen:
+    def state(self) -> HistogramState:
         """Return the current state."""
         with self._lock:
             n_up_to = tuple(accumulate(self._n_in))
-            return Seen(self._bounds_s, n_up_to, self._sum_s, self._newest_s)
+            return HistogramState(self._bounds_s, n_up_to, self._sum_s, self._newest_s)
 
 
 Rows = Iterable[tuple[tuple[str, ...], float]]
@@ -111,21 +99,19 @@ def histogram(name: str, meaning: str, durations: Mapping[str, Durations]) -> Me
     """Return a histogram family with the label `unit`."""
     family = HistogramMetricFamily(f"padwatch_{name}", meaning, labels=("unit",))
     for unit, its in durations.items():
-        seen = its.seen()
-        family.add_metric((unit,), buckets(seen), seen.sum_s)
+        family.add_metric((unit,), *_buckets(its.state()))
     return family
 
 
 def plain_histogram(name: str, meaning: str, durations: Durations) -> Metric:
     """Return a histogram family without labels."""
-    seen = durations.seen()
-    return HistogramMetricFamily(f"padwatch_{name}", meaning, buckets(seen), seen.sum_s)
+    return HistogramMetricFamily(f"padwatch_{name}", meaning, *_buckets(durations.state()))
 
 
-def buckets(seen: Seen) -> list[tuple[str, float]]:
-    """Return the bounds as Prometheus writes them, each with its cumulative count."""
-    bounds = [*(repr(bound) for bound in seen.bounds_s), "+Inf"]
-    return [(bound, float(n)) for bound, n in zip(bounds, seen.n_up_to, strict=True)]
+def _buckets(state: HistogramState) -> tuple[list[tuple[str, float]], float]:
+    """Return the bounds as text, each with its cumulative count, and the sum."""
+    bounds = [*map(repr, state.bounds_s), "+Inf"]
+    return list(zip(bounds, map(float, state.n_up_to), strict=True)), state.sum_s
 
 
 TEXT = exposition.CONTENT_TYPE_PLAIN_0_0_4

@@ -1,4 +1,6 @@
-"""Shared parts of background loops: logging of failures, and pauses with heartbeats."""
+"""Shared parts of background loops: repetition, logging of failures, pauses with heartbeats."""
+
+from collections.abc import Awaitable, Callable
 
 import structlog
 
@@ -10,7 +12,7 @@ log = structlog.get_logger()
 LOOK_S = 20.0
 """Interval of heartbeats during a long pause."""
 
-MOST_REST_S = 120.0
+MAX_REST_S = 120.0
 """Longest pause after one piece of work."""
 
 
@@ -21,19 +23,32 @@ class TroubleLog:
     ----------
     failing, again
         Messages of the first failure and of the recovery.
+    trouble
+        Reason of the newest failure; None after a success.
     """
 
-    def __init__(self, failing: str, again: str) -> None:
+    def __init__(self, failing: str, again: str, trouble: str | None = None) -> None:
         self._failing, self._again = failing, again
-        self._trouble: str | None = None
+        self._is_failing = False
+        self.trouble = trouble
 
     def note(self, trouble: str | None) -> None:
         """Record the outcome of one run: the reason of its failure, or None."""
-        if trouble is not None and self._trouble is None:
+        if trouble is not None and not self._is_failing:
             log.error(self._failing, reason=trouble)
-        if trouble is None and self._trouble is not None:
+        if trouble is None and self.trouble is not None:
             log.info(self._again)
-        self._trouble = trouble
+        self.trouble, self._is_failing = trouble, trouble is not None
+
+
+async def periodic(
+    work: Callable[[], Awaitable[None]], every_s: float, clock: Clock, pulse: Pulse
+) -> None:
+    """Do a piece of work repeatedly, with a heartbeat before each and a pause after it."""
+    while True:
+        pulse.beat(every_s)
+        await work()
+        await clock.sleep(every_s)
 
 
 async def rest(duration_s: float, clock: Clock, pulse: Pulse) -> None:
@@ -49,4 +64,4 @@ async def rest_after(taken_s: float, share: float, clock: Clock, pulse: Pulse) -
 
     The pause is capped so that one slow disk access does not stall the loop.
     """
-    await rest(min(share * taken_s, MOST_REST_S), clock, pulse)
+    await rest(min(share * taken_s, MAX_REST_S), clock, pulse)

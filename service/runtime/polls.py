@@ -50,7 +50,7 @@ class PollClock:
         await self._clock.sleep(duration_s)
         self._woken_s[task] = self._clock.monotonic_s()
 
-    def listen(self, pulse: Pulse) -> None:
+    def set_pulse(self, pulse: Pulse) -> None:
         """Send a heartbeat whenever the calling task reads the clock."""
         self._pulse, self._reader = pulse, asyncio.current_task()
 
@@ -75,21 +75,15 @@ def _current_task() -> asyncio.Task[Any] | None:
 
 
 class TimedSource:
-    """A source whose polls are measured.
-
-    Parameters
-    ----------
-    make
-        Creates the source with the clock that it must wait by.
-    """
+    """A source whose polls are measured."""
 
     def __init__(self, make: Callable[[Clock], SampleSource], clock: Clock) -> None:
         self._clock = PollClock(clock)
         self._source = make(self._clock)
 
-    def listen(self, pulse: Pulse) -> None:
+    def set_pulse(self, pulse: Pulse) -> None:
         """Send the heartbeats of the calling task, which reads the source, to ``pulse``."""
-        self._clock.listen(pulse)
+        self._clock.set_pulse(pulse)
 
     @property
     def polls(self) -> Durations:

@@ -30,7 +30,7 @@ class ServiceManager:
         """Whether a service manager receives notifications."""
         return self._address is not None
 
-    def tell(self, **assignments: str) -> None:
+    def notify(self, **assignments: str) -> None:
         """Send one datagram without waiting; log the first that is not accepted.
 
         Parameters

@@ -1,4 +1,4 @@
-"""Source settings as the values that the acquisition adapters take."""
+"""Conversion of source settings to values of the acquisition adapters."""
 
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from service.settings.units import UnitSettings
 
 
 def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSettings:
-    """What the CAN adapter has to be told of a unit."""
+    """Return the settings of the CAN adapter for a unit."""
     link = can_link_of(source)
     others: dict[str, Any] = {
         "hold_s": source.hold_s,
@@ -63,7 +63,7 @@ def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSett
 
 
 def can_link_of(source: settings.CanSettings) -> CanLinkSettings:
-    """How a bus is reached."""
+    """Return the connection settings of a bus."""
     return CanLinkSettings(
         interface=source.interface,
         channel=source.channel,
@@ -75,12 +75,9 @@ def can_link_of(source: settings.CanSettings) -> CanLinkSettings:
 
 
 def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
-    """The messages of the simulated CAN DAQ for a unit's channels.
+    """Return the messages of the simulated CAN DAQ for the channels of a unit.
 
-    Raises
-    ------
-    LookupError
-        If the unit's source does not read those messages.
+    Raises `LookupError` if the source of the unit reads other messages.
     """
     if source.profile is None:
         raise LookupError(
@@ -111,19 +108,19 @@ def can_daq_of(
     *,
     patient: bool,
 ) -> DaqServer:
-    """A simulated CAN DAQ where the unit's source looks for it.
+    """Build the simulated CAN DAQ that the source of a unit connects to.
 
     Parameters
     ----------
     clock
-        Paces the device; without one it produces as fast as its reader reads.
+        Clock that paces the device; without one it produces as fast as its reader reads.
     patient
         Whether the device waits for its reader.
 
     Raises
     ------
     ConfigError, LookupError
-        If the unit's source reads something else.
+        If the source cannot read a simulated DAQ.
     """
     device = CanDevice(feed, can_shape_of(unit, source), unit.id, block_samples=unit.block_samples)
     waiting: dict[str, Any] = {"on_demand": clock is None, "patient": patient}
@@ -142,8 +139,8 @@ def can_daq_of(
     host, _, port = source.channel.removeprefix("socket://").rpartition(":")
     if not source.channel.startswith("socket://") or not port.isdecimal():
         raise LookupError(
-            f"unit {unit.id}: channel {source.channel!r} is no place for a simulated DAQ; it can"
-            ' be "socket://127.0.0.1:0", "pty" or the path of a link to a pty'
+            f"unit {unit.id}: a simulated DAQ cannot use channel {source.channel!r}; use"
+            ' "socket://127.0.0.1:0", "pty" or the path of a link to a pty'
         )
     return SlcanTcpServer(device, clock, host=host, port=int(port), **waiting)
 
@@ -153,19 +150,16 @@ def _listed(signals: str | tuple[str, ...]) -> tuple[str, ...]:
 
 
 def require_dbc_fits(unit: UnitSettings) -> None:
-    """Look into the DBC file of a unit that reads CAN, without opening a bus.
+    """Check the DBC file of a unit that reads CAN, without opening a bus.
 
-    Raises
-    ------
-    ConfigError
-        Naming file, key, what was found and what is needed.
+    Raises `ConfigError` if it does not fit the unit; the message names file and key.
     """
     if isinstance(unit.source, settings.CanSettings):
         compile_plan(can_settings_of(unit, unit.source), calibration_of(unit))
 
 
 def recorded_unit(unit: UnitSettings) -> RecordedUnit:
-    """Channels and calibration of a unit as they stand in the manifest of its recordings."""
+    """Return channels and calibration of a unit for the manifest of its recordings."""
     return RecordedUnit(
         unit=unit.id,
         rate_hz=unit.sampling_hz,
@@ -179,7 +173,7 @@ def recorded_unit(unit: UnitSettings) -> RecordedUnit:
 
 
 def identity_of(settings: IdentitySettings | None) -> Identity | None:
-    """What the device must answer; None if any will do."""
+    """Return the expected identity of a device; None if any device is accepted."""
     match settings:
         case SignatureIdentity():
             return ExpectedRegisters(
@@ -196,11 +190,11 @@ def identity_of(settings: IdentitySettings | None) -> Identity | None:
 
 
 RING_REQUESTS_IN_FLIGHT = 6
-"""What a poll of 12 channels takes."""
+"""Requests of one poll of 12 channels."""
 
 
 def transport_of(source: ModbusLinkSettings) -> Transport:
-    """Where a Modbus device is: on the network, or on a serial line."""
+    """Return the transport of a Modbus device: network or serial line."""
     if source.host is not None:
         return TcpTransport(host=source.host, port=source.port)
     return SerialTransport(
@@ -212,7 +206,7 @@ def transport_of(source: ModbusLinkSettings) -> Transport:
 
 
 def link_fields(source: ModbusLinkSettings) -> dict[str, Any]:
-    """How a device is reached and known, as every source's settings take it."""
+    """Return connection and identity of a device, which all Modbus settings share."""
     is_per_reply = isinstance(source, MappedDeviceSettings) and source.connection == "per_reply"
     return {
         "transport": transport_of(source),

@@ -1,4 +1,4 @@
-"""`ALARM_KINDS`: all kinds of alarms, those of units and those about the service itself."""
+"""Table of all kinds of alarms: those of units and those about the service."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -9,12 +9,12 @@ from core.alarms.kinds import AlarmKind, kind_table
 
 STORE, SERVICE, CAPTURES, DISK = "store", "service", "captures", "disk"
 RECORDINGS, STREAM, UNIT = "recordings", "stream", "unit"
-"""Subjects of alarms about the service; in the place of `UNIT`, the name of a unit."""
+"""Subjects of alarms about the service; an alarm has the name of a unit instead of `UNIT`."""
 
 SAMPLES_LOST, ANALYSIS_GONE, MESSAGES_REFUSED = "samples_lost", "analysis_gone", "messages_refused"
 """Kinds with one alarm for each unit."""
 
-END_OTHERS = "This computer does not keep up; end what else runs on it."
+OVERLOAD_ADVICE = "This computer is overloaded; stop other programs on it."
 
 SERVICE_KINDS = kind_table(
     AlarmKind(
@@ -23,7 +23,7 @@ SERVICE_KINDS = kind_table(
         "1",
         UNIT,
         "loss",
-        advice="Look at the network and at the load of the DAQ and of this computer.",
+        advice="Check the network, and the load of the DAQ and of this computer.",
     ),
     AlarmKind("results_not_stored", "Results are not being stored", "s", STORE, "store_behind"),
     AlarmKind("results_lost", "Results lost", "findings", STORE, "lasting"),
@@ -34,7 +34,7 @@ SERVICE_KINDS = kind_table(
         SERVICE,
         "waiting",
         "waiting_share",
-        advice=END_OTHERS,
+        advice=OVERLOAD_ADVICE,
     ),
     AlarmKind(
         "analysis_late",
@@ -43,7 +43,7 @@ SERVICE_KINDS = kind_table(
         SERVICE,
         "delay",
         "analysis_delay_s",
-        advice=END_OTHERS,
+        advice=OVERLOAD_ADVICE,
     ),
     AlarmKind(
         "captures_not_kept",
@@ -76,38 +76,39 @@ SERVICE_KINDS = kind_table(
     ),
     AlarmKind(MESSAGES_REFUSED, "Messages on the stream refused", None, STREAM, "lasting"),
     AlarmKind("stream_away", "Stream does not answer", None, STREAM, "steady", "stream_trouble"),
-    AlarmKind(ANALYSIS_GONE, "Nobody analyses this unit", None, UNIT, "at_once"),
+    AlarmKind(ANALYSIS_GONE, "No process analyses this unit", None, UNIT, "at_once"),
 )
-"""The service's own kinds. `rule` is a field of `ServiceRules`, `reading` one of `ServiceHealth`:
-a value that is compared with limits, or the words of a trouble that raises the alarm."""
+"""Kinds of alarms about the service. `rule` is a field of `ServiceRules`, `reading` one of
+`ServiceHealth`: a value that is compared with limits, or the text of a fault that raises the
+alarm."""
 
 ALARM_KINDS: Mapping[str, AlarmKind] = MappingProxyType({**units.ALARM_KINDS, **SERVICE_KINDS})
 
 SAMPLED_KINDS = frozenset(
     kind.name for kind in ALARM_KINDS.values() if kind.subject in (units.CHANNEL, units.BEARING)
 )
-"""Kinds of alarms that samples can explain."""
+"""Kinds of alarms about measured samples."""
 
 if TYPE_CHECKING:
     AlarmKindName = str
 else:
     AlarmKindName = Literal[tuple(ALARM_KINDS)]
-"""Name of a kind; anything else is refused where it is read."""
+"""Name of a kind, checked on input."""
 
 
 def kind_label(kind: str) -> str:
-    """Words for people; of a kind that is not in the table, its name as words."""
+    """Return the label of a kind; the name in words if the kind is unknown."""
     found = ALARM_KINDS.get(kind)
     return kind.replace("_", " ") if found is None else found.label
 
 
 def kind_words(kind: str) -> str:
-    """The label within a sentence: "shaft vibration 1×, x"."""
+    """Return the label for use within a sentence, such as "shaft vibration 1×, x"."""
     label = kind_label(kind)
     return label[:1].lower() + label[1:]
 
 
 def value_unit(kind: str) -> str | None:
-    """Unit of the value of a kind's alarms."""
+    """Return the unit of the values of a kind."""
     found = ALARM_KINDS.get(kind)
     return None if found is None else found.unit

@@ -20,7 +20,7 @@ from service.settings.limits import (
 
 
 class BearingAlarmSettings(Settings):
-    """What raises an alarm on a bearing; nothing unless its limits are given."""
+    """Limits of a bearing; a quantity without limits raises no alarm."""
 
     shaft_order1_um_pk: AmplitudeLimitSettings | None = None
     """Limits of the relative shaft vibration at 1×, in x and in y each."""
@@ -38,13 +38,13 @@ class BearingAlarmSettings(Settings):
     """Limits of the mean gap of each probe, above and below."""
 
     shaft_order1_change_um_pk: VectorChangeLimitSettings | None = None
-    """Limits of how far the shaft's 1× vector may move from its reference, in x and in y each."""
+    """Limits of the distance of the shaft's 1× vector from its reference, in x and in y each."""
 
     bearing_order1_change_um_pk: VectorChangeLimitSettings | None = None
-    """Limits of how far the bearing's 1× vector may move, in x and in y each."""
+    """Limits of the distance of the bearing's 1× vector from its reference, in x and in y each."""
 
     order1_reference: Annotated[tuple[VectorReferenceSettings, ...], Field(max_length=6)] = ()
-    """Where 1× vectors are when all is well, by operating state. One that an engineer has set on
+    """1× vectors of the healthy machine by operating state. A reference that an engineer has set on
     the running machine takes precedence in its state."""
 
     zones: ZonesSettings = ZonesSettings()
@@ -64,75 +64,74 @@ class BearingAlarmSettings(Settings):
 
 
 class AlarmSettings(Settings):
-    """What raises an alarm on every unit."""
+    """Delays and limits of the alarms of every unit."""
 
     channel_on_delay_s: DelayS = 0.5
-    """For how long a channel must be bad, seconds of the samples' time."""
+    """Time for which a channel must be bad, in seconds of the samples' time."""
 
     slow_channel_on_delay_s: DelayS = 5.0
-    """For how long a slow channel that a limit needs must be bad, s of the samples' time."""
+    """Time for which a slow channel that a limit needs must be bad, s of the samples' time."""
 
     channel_off_delay_s: DelayS = 10.0
-    """For how long it must be good again for the alarm to return, s."""
+    """Time for which a channel must be good again for the alarm to return, s."""
 
     link_lost_after_s: Annotated[float, Field(ge=1.0, le=86_400.0)] = 10.0
-    """For how long no samples may arrive from a device, s."""
+    """Time without samples after which the link to a device counts as lost, s."""
 
     clock: Literal["judged", "ignored"] = "judged"
-    """Whether the devices' clocks are "judged" against this host's or "ignored"."""
+    """Whether the clocks of the devices are "judged" against that of this host or "ignored"."""
 
     max_clock_offset_s: Annotated[float, Field(gt=0.0, le=1e9)] = 2.0
-    """Most that a device's time stamps may be off the host's clock, s, for half a minute."""
+    """Maximum offset of a device's time stamps from the host's clock for half a minute, s."""
 
     max_clock_drift_ppm: Annotated[float, Field(gt=0.0, le=1e6)] = 200.0
-    """Most that a device may sample faster or slower than nominal by the host's clock, parts per
-    million, after its uncertainty; for a minute."""
+    """Maximum deviation of a device's sampling rate from its nominal rate for a minute, by the
+    host's clock and beyond the uncertainty, parts per million."""
 
     chattering_activations: Annotated[int, Field(ge=2, le=100)] = 3
-    """An alarm that is raised so often within chattering_window_s is chattering; ISA-18.2 says 3
-    or more in a minute."""
+    """Number of activations within chattering_window_s that make an alarm chattering; ISA-18.2
+    defines 3 or more in a minute."""
 
     chattering_window_s: Annotated[float, Field(ge=1.0, le=3600.0)] = 60.0
-    """Within which time, s; an alarm that is active for less is fleeting."""
+    """Window of these activations, s; an alarm that is active for less is fleeting."""
 
     store_failing_after_s: DelayS = 10.0
-    """For how long results may wait for a store that does not take them, s."""
+    """Time for which results may wait for a failing store, s."""
 
     max_analysis_delay_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 5.0
-    """Longest that samples may wait for their analysis, s."""
+    """Maximum delay of the analysis, s."""
 
     max_waiting_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
-    """Share of the queue from acquisition to analysis that may be filled; at nine tenths it is a
-    danger."""
+    """Maximum filled share of the queue from acquisition to analysis; above 0.9 it is a danger."""
 
     max_samples_lost_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
-    """Share of a unit's samples that may get lost or be refused in ten minutes: half a minute."""
+    """Maximum share of a unit's samples lost or refused in ten minutes; 0.05 is half a minute."""
 
     max_shelf_h: Annotated[float, Field(gt=0.0, le=8760.0)] = 24.0
-    """Longest time for which an alarm can be shelved at once, hours."""
+    """Longest time for which an alarm can be shelved, hours."""
 
 
 class CaptureSettings(Settings):
-    """Samples that are kept around an alarm, as recordings in the data folder."""
+    """Captures: recordings of the samples around an alarm, in the data folder."""
 
     samples: Literal["kept", "not_kept"] = "kept"
     """Whether samples are "kept" or "not_kept" when an alarm of a channel, an amplitude or a
     temperature is raised."""
 
     pre_s: Annotated[float, Field(ge=0.0, le=600.0)] = 60.0
-    """From how long before the alarm, s; as many samples of every unit are held in memory: 12
-    channels at 600 Hz take 1.7 MB a minute. Where films are watched, it is at least an averaging
-    window, as far as max_s allows: their alarms stand on all of it."""
+    """Time before the alarm, s. Samples of this length are held in memory for every unit: 12
+    channels at 600 Hz take 1.7 MB a minute. With monitored films the time is at least one averaging
+    window, as far as max_s allows, because their alarms depend on all of it."""
 
     post_s: Annotated[float, Field(ge=1.0, le=3600.0)] = 120.0
-    """Until how long after it, s."""
+    """Time after the alarm, s."""
 
     max_s: Annotated[float, Field(ge=1.0, le=7200.0)] = 600.0
-    """Longest recording, s: alarms that come while one is being written prolong it up to this."""
+    """Longest recording, s; further alarms prolong a recording up to this length."""
 
     max_gb: Annotated[float, Field(gt=0.0, le=100_000.0)] = 10.0
-    """Space of all of them together, GB (10^9 bytes); beyond it the oldest are removed, those last
-    that evidence of an alarm refers to."""
+    """Total size, GB (10^9 bytes); above it the oldest are removed, and those that evidence refers
+    to last."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

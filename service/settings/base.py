@@ -1,4 +1,4 @@
-"""What all settings models share."""
+"""Base class of settings, errors and shared checks."""
 
 import re
 from collections.abc import Iterable
@@ -7,16 +7,16 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, StringConstraints, field_validator
 
 CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f-\x9f]")
-"""All but the tab, by which columns of a file to import may be separated."""
+"""Control characters except the tab, which may separate columns of an imported file."""
 
 
 class MisfitError(ValueError):
-    """A value that does not fit what stands elsewhere in the file.
+    """A value that contradicts other values of the file.
 
     Parameters
     ----------
     at
-        Where the value stands, seen from the model that found it: keys and element numbers.
+        Location of the value relative to the model that refuses it: keys and element numbers.
     """
 
     def __init__(self, message: str, *at: int | str) -> None:
@@ -25,19 +25,19 @@ class MisfitError(ValueError):
 
 
 class MissingError(MisfitError):
-    """A key that is needed beside others that stand in the file."""
+    """A key that other keys of the file require."""
 
 
 class SecretMisfitError(MisfitError):
-    """A value that does not fit and may hold a secret: it is not shown."""
+    """A wrong value that may contain a secret and is not shown."""
 
 
 Identifier = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
-"""Letters, digits, dot, dash and underscore; at most 32; fit for a URL."""
+"""Letters, digits, dot, dash and underscore; at most 32 characters."""
 
 
 class Settings(BaseModel):
-    """Frozen, no unknown keys, no NaN or infinity; a field's docstring is its documentation."""
+    """Base of all settings: frozen, no unknown keys, no NaN or infinity; fields have docstrings."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
@@ -46,16 +46,23 @@ class Settings(BaseModel):
     @field_validator("*")
     @classmethod
     def _has_no_control_characters(cls, value: Any) -> Any:
-        """Refuse them in names, which are printed, and in paths, which cannot have a NUL."""
+        """Refuse control characters in names, which are printed, and NUL in paths."""
         if isinstance(value, str) and CONTROL.search(value):
             raise SecretMisfitError("must not have control characters")
         return value
 
 
 def refuse_twice(entries: Iterable[tuple[int | str, ...]]) -> None:
-    """Refuse a value that was already given elsewhere; entries are its place, then the value."""
+    """Refuse duplicate values; each entry is the location of a value and the value."""
     seen: set[int | str] = set()
     for *at, value in entries:
         if value in seen:
             raise MisfitError("is used twice; each must be unique", *at)
         seen.add(value)
+
+
+def refuse_unknown_units(units: Iterable[str], known: Iterable[str], *at: int | str) -> None:
+    """Refuse a unit that the plant does not have."""
+    for n, unit in enumerate(units):
+        if unit not in known:
+            raise MisfitError(f"is no unit of this plant, it has {', '.join(known)}", *at, n)

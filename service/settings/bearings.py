@@ -16,14 +16,14 @@ CHANNEL_KEYS = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
 """The keys of a bearing that name waveform channels."""
 
 OPTIONAL_CHANNEL_KEYS = ("opposite_x", "opposite_y")
-"""Those that may be absent."""
+"""Optional keys that name waveform channels."""
 
 GAP_KEYS = ("gap_x", "gap_y", "opposite_gap_x", "opposite_gap_y")
 """The keys that name slow channels of gaps."""
 
 
 class BearingSettings(Settings):
-    """A guide bearing: its bracket, its clearance and the channels that watch it."""
+    """A guide bearing: bracket, clearance and channels."""
 
     id: Identifier
     """Unique within the unit: "UJB", "LJB", "TJB" for upper, lower and turbine journal bearing."""
@@ -61,12 +61,11 @@ class BearingSettings(Settings):
     """Slow channel (mm) of the y gap; example: "ujb_gap_y"."""
 
     opposite_x: Identifier | None = None
-    """Proximity probe across the shaft from shaft_x, if there is one: with it the shaft's motion
-    is told from thermal growth; example: "ujb_shaft_minus_x"."""
+    """Proximity probe opposite to shaft_x, which separates shaft motion from thermal growth;
+    example: "ujb_shaft_minus_x"."""
 
     opposite_y: Identifier | None = None
-    """Proximity probe across the shaft from shaft_y, if there is one; example:
-    "ujb_shaft_minus_y"."""
+    """Proximity probe opposite to shaft_y; example: "ujb_shaft_minus_y"."""
 
     opposite_gap_x: Identifier | None = None
     """Slow channel (mm) of the gap opposite x; without it the mean of opposite_x is the gap;
@@ -80,66 +79,65 @@ class BearingSettings(Settings):
     [1980.0, 2010.0]."""
 
     gap_reference_uncertainty_um: Annotated[float, Field(ge=0.0, le=1000.0)] = 5.0
-    """Half-width of what a reference gap may be off, µm."""
+    """Half-width of the error of the reference gaps, µm."""
 
     thermal_growth_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 50.0
-    """Half-width of what all gaps may have grown alike since the reference, µm; counts where
-    opposite probes do not measure it."""
+    """Half-width of the common thermal growth of all gaps since the reference, µm; used without
+    opposite probes."""
 
     thermal_growth_change_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 20.0
-    """Half-width of what growth may have changed since opposite probes last measured it, µm."""
+    """Half-width of the change of growth since opposite probes last measured it, µm."""
 
     clearance_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.05
-    """Half-width of what the clearance may be off, as a share."""
+    """Half-width of the relative error of the clearance."""
 
     bracket_stiffness_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.10
-    """Half-width of what the bracket's stiffness may be off, as a share; example: 0.10."""
+    """Half-width of the relative error of the bracket's stiffness; example: 0.10."""
 
     bracket_mass_kg: Annotated[float, Field(gt=0.0, le=1e7)] | None = None
-    """Effective mass of bracket and bearing in kg; without it dynamic fits it with the film, which
-    makes its result less certain. Equation (5) leaves it out. Example: 45.0e3."""
+    """Effective mass of bracket and bearing, kg; by default the estimator "dynamic" fits it with
+    the film, with a larger uncertainty. Equation (5) does not use it. Example: 45.0e3."""
 
     bracket_mass_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.2
-    """Half-width of what bracket_mass_kg may be off, as a share; example: 0.2."""
+    """Half-width of the relative error of bracket_mass_kg; example: 0.2."""
 
     bracket_damping_n_s_per_m: Annotated[float, Field(ge=0.0, le=1e10)] = 0.0
-    """Damping of the bracket in N·s/m; 0 if not known."""
+    """Damping of the bracket in N·s/m; 0 if unknown."""
 
     bracket_damping_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.02
-    """Half-width of what the damping of the bracket may be off, as a share of critical damping;
-    example: 0.02."""
+    """Half-width of the error of the bracket's damping, as a share of critical damping; example:
+    0.02."""
 
     cross_coupling_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.3
-    """Half-width of the film's cross-coupled over its direct stiffness, which transfer and equation
-    (5) do not see; example: 0.3."""
+    """Half-width of the ratio of cross-coupled to direct film stiffness, which transfer and
+    equation (5) neglect; example: 0.3."""
 
     delay_uncertainty_s: Annotated[float, Field(ge=0.0, le=0.1)] = 2e-4
-    """Half-width of what the bearing channels may be late or early by against the shaft channels,
-    s; the delay_s of a channel takes out what is known. Example: 0.0002."""
+    """Half-width of the unknown delay of the bearing channels against the shaft channels, s; known
+    delays are set by delay_s of a channel. Example: 0.0002."""
 
     runout_um_pk: Annotated[float, Field(ge=0.0, le=1000.0)] = 6.0
-    """Largest runout of the shaft's surface at 1×, µm zero-to-peak; widens the uncertainty of what
-    is read at 1×, where a shaft that moves by less than four times as much gives no stiffness.
-    Example: 10.0."""
+    """Largest runout of the shaft's surface at 1×, µm zero-to-peak. It increases the uncertainty of
+    1×; a shaft motion below four times the runout gives no stiffness. Example: 10.0."""
 
     preference: Annotated[tuple[Estimator, ...], Field(min_length=1, max_length=5)] = PREFERENCE
-    """Estimators that the stiffness for trends and alarms is taken from, best first: the first
-    whose result is good, otherwise the first of those that are doubted least. "dynamic",
-    "transfer_vortex", "transfer_order1", "ratio_vortex", "ratio_order1"."""
+    """Estimators of the stiffness for trends and alarms, best first; the first with the best
+    quality is used. "dynamic", "transfer_vortex", "transfer_order1", "ratio_vortex",
+    "ratio_order1"."""
 
     watched_estimator: Estimator | None = None
-    """Whose stiffness is compared with its baseline; without it the first of preference, and
-    "ratio_order1" where a rack gives amplitudes. Another one needs another baseline."""
+    """Estimator whose stiffness is compared with its baseline; by default the first of preference,
+    or "ratio_order1" for a rack with amplitudes. Another estimator needs another baseline."""
 
     alarms: BearingAlarmSettings = BearingAlarmSettings()
-    """Limits that raise alarms; none unless given."""
+    """Limits of alarms; none by default."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         probes = (self.opposite_x, self.opposite_y)
         if any(probes) != (self.opposite_reference_um is not None):
             raise MisfitError(
-                "opposite probes and their reference need each other", "opposite_reference_um"
+                "must be given with opposite probes, and only with them", "opposite_reference_um"
             )
         if self.alarms.oil_temperature_c is not None and self.oil_temperature is None:
             raise MisfitError(

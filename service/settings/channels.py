@@ -14,11 +14,11 @@ from service.settings.base import Identifier, MisfitError, MissingError, Setting
 from service.settings.transducers import ResponseSettings
 
 ProbeName = Annotated[str, StringConstraints(min_length=1, max_length=80)]
-"""Serial number or any other mark that tells one probe from the next."""
+"""Serial number or another unique mark of a probe."""
 
 
 class SlowRollSettings(Settings):
-    """A slow-roll vector: what a probe read at 1× while the shaft turned too slowly to vibrate."""
+    """Slow-roll vector: reading of a probe at 1× at a speed too low for vibration."""
 
     um_pk: Annotated[float, Field(ge=0.0, le=1000.0)]
     """Amplitude, µm zero-to-peak; example: 8.0."""
@@ -29,18 +29,17 @@ class SlowRollSettings(Settings):
     the next positive peak (API 670), gives this with the other sign. Example: 30.0."""
 
     speed_rpm: Annotated[float, Field(gt=0.0, le=1500.0)]
-    """Speed at which it was read, r/min; used only up to a quarter of the rated speed; example:
+    """Speed of the measurement, r/min, at most a quarter of the rated speed to be used; example:
     8.0."""
 
     taken: AwareDatetime
-    """When it was read, with offset; example: 2026-03-01T10:00:00Z."""
+    """Time of the measurement, with offset; example: 2026-03-01T10:00:00Z."""
 
     probe: ProbeName
-    """The probe that read it. Another one sees another surface: then it is not used. Example:
-    "SN123"."""
+    """Probe of the measurement; the vector is not used with another probe. Example: "SN123"."""
 
     def vector(self, channel: str) -> SlowRollVector:
-        """The vector as the numerics see it."""
+        """Return the vector as a value of core."""
         return SlowRollVector(
             channel=channel,
             probe=self.probe,
@@ -51,7 +50,7 @@ class SlowRollSettings(Settings):
 
 
 class Transducer(StrEnum):
-    """What kind of transducer feeds a waveform channel."""
+    """Kind of the transducer of a waveform channel."""
 
     PROXIMITY_PROBE = "proximity_probe"
     DISPLACEMENT = "displacement"
@@ -61,7 +60,7 @@ class Transducer(StrEnum):
 
 
 class SensitivityUnit(StrEnum):
-    """In which unit a sensitivity is given; never guessed from the number."""
+    """Unit of a sensitivity."""
 
     V_PER_MM = "V/mm"
     MV_PER_UM = "mV/um"
@@ -101,7 +100,7 @@ PLAUSIBLE_V_PER_UNIT = {
     Transducer.VELOCITY: (0.5e-3, 2.0),
     Transducer.ACCELEROMETER: (0.5e-3, 2.0),
 }
-"""Sensitivities outside these are mistakes of unit: no such transducer is sold."""
+"""Range of the sensitivities of available transducers; others are mistakes of unit."""
 
 LINE_FLOORS = {
     Transducer.PROXIMITY_PROBE: 0.1,
@@ -110,19 +109,19 @@ LINE_FLOORS = {
     Transducer.ACCELEROMETER: 2e-5,
     Transducer.KEY_PHASE: 0.0,
 }
-"""Amplitude of a line that a transducer's noise has, 0-to-peak in µm, mm/s or m/s²."""
+"""Amplitude of the noise of a transducer in a line, 0-to-peak in µm, mm/s or m/s²."""
 
 SHAFT_TRANSDUCERS = (Transducer.PROXIMITY_PROBE, Transducer.DISPLACEMENT)
-"""What a shaft may be looked at with, and so what may see its runout."""
+"""Transducers that measure the shaft, including its runout."""
 
-OF_VOLTS = ("full_scale_v", "ok_min_v", "ok_max_v")
-OF_COUNTS = ("unit_per_count", "ok_min", "ok_max")
-OF_A_VOLTAGE = ("sensitivity", "sensitivity_unit")
-NOT_OF_A_KEY_PHASE = (
+SCALE_KEYS_V = ("full_scale_v", "ok_min_v", "ok_max_v")
+SCALE_KEYS_COUNTS = ("unit_per_count", "ok_min", "ok_max")
+VOLTAGE_KEYS = ("sensitivity", "sensitivity_unit")
+NO_KEY_PHASE_KEYS = (
     *("sensitivity", "sensitivity_unit", "response", "delay_s", "line_floor", "probe"),
     "slow_roll",
 )
-"""Keys that say nothing of pulses: their angle counts, not their height."""
+"""Keys that do not apply to pulses, whose height has no meaning."""
 
 
 class ChannelSettings(Settings):
@@ -136,15 +135,15 @@ class ChannelSettings(Settings):
     "key_phase" (one pulse a turn)."""
 
     sensitivity: float | None = None
-    """In ``sensitivity_unit``; negative if the voltage falls as the measured quantity grows; a
-    key_phase has none, all others need it; example: 4.0."""
+    """Sensitivity in ``sensitivity_unit``, negative if the voltage falls while the measured
+    quantity increases; required except for a key_phase; example: 4.0."""
 
     sensitivity_unit: SensitivityUnit | None = None
     """"V/mm" or "mV/um" for probes and displacement, "mV/(mm/s)" for velocity, "mV/g" or
     "mV/(m/s2)" for accelerometers."""
 
     full_scale_v: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
-    """Converter input in volts that reads 32768 counts; example: 12.0."""
+    """Converter input in volts at 32768 counts; example: 12.0."""
 
     ok_min_v: Annotated[float, Field(ge=-100.0, le=100.0)] | None = None
     """Lowest mean voltage of a healthy transducer (gap OK limit); example: 1.0."""
@@ -153,8 +152,8 @@ class ChannelSettings(Settings):
     """Highest mean voltage of a healthy transducer (gap OK limit); example: 11.0."""
 
     unit_per_count: float | None = None
-    """For a device that gives scaled counts, in place of the sensitivity and of all keys in volts:
-    µm, mm/s or m/s² per count (V of a key_phase), negative if counts fall; example: 0.0625."""
+    """Scale of a device with scaled counts, instead of the sensitivity and all keys in volts: µm,
+    mm/s or m/s² per count (V for a key_phase), negative if counts fall; example: 0.0625."""
 
     ok_min: float | None = None
     """With unit_per_count: lowest mean of a healthy transducer, in µm, mm/s, m/s² or V; example:
@@ -164,35 +163,34 @@ class ChannelSettings(Settings):
     """With unit_per_count: highest mean of a healthy transducer; example: 2750.0."""
 
     gain_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.05
-    """Half-width of what the sensitivity may be off, as a share: the transducer's class; example:
+    """Half-width of the relative error of the sensitivity, by the class of the transducer; example:
     0.05."""
 
     response: Annotated[tuple[ResponseSettings, ...], Field(max_length=8)] = ()
-    """How the transducer changes the signal with frequency, in parts that work one after the
-    other; nothing is a flat response. Example: [{ kind = "high_pass", corner_hz = 0.5 }]."""
+    """Frequency response of the transducer as a chain of parts; flat by default. Example:
+    [{ kind = "high_pass", corner_hz = 0.5 }]."""
 
     delay_s: Annotated[float, Field(ge=-1.0, le=1.0)] = 0.0
-    """What the channel is read late by, against the others, in s: a converter that samples its
-    channels one after the other, or a filter that others do not have; example: 0.00167."""
+    """Delay of the channel against the others, s, from sequential sampling or from a filter that
+    other channels do not have; example: 0.00167."""
 
     line_floor: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
-    """Amplitude of a line, 0-to-peak in µm, mm/s or m/s², below which it may be the transducer's
-    own noise: a bearing line below has no stiffness. Default: 2e-5 m/s² for an accelerometer, which
-    is 5 µg/√Hz in a line of 0.07 Hz, 0.001 mm/s for a velocity transducer, 0.1 µm for others."""
+    """Amplitude of a line, 0-to-peak in µm, mm/s or m/s², below which it may be noise of the
+    transducer and gives no stiffness. Default: 2e-5 m/s² for an accelerometer, which is 5 µg/√Hz in
+    a line of 0.07 Hz, 0.001 mm/s for a velocity transducer, 0.1 µm for others."""
 
     direction: Literal[1, -1] | None = None
-    """+1 if a growing reading is motion along the positive bearing axis, -1 if against it. Default:
-    -1 for a proximity probe, which sits on the positive axis and sees its gap shrink; else +1. Of a
-    key_phase, -1 if its pulses fall."""
+    """+1 if an increasing reading is motion along the positive bearing axis, -1 if against it.
+    Default: -1 for a proximity probe, which is on the positive axis; otherwise +1. For a key_phase,
+    -1 if its pulses are negative."""
 
     probe: ProbeName | None = None
-    """Serial number or mark of the shaft probe that is there, which its slow_roll must be of;
-    example: "SN123"."""
+    """Serial number or mark of the installed shaft probe, as in its slow_roll; example: "SN123"."""
 
     slow_roll: SlowRollSettings | None = None
-    """Runout of the shaft under this probe, taken off 1× as long as a key-phase gives the shaft's
-    angle. Example: { um_pk = 8.0, phase_deg = 30.0, speed_rpm = 8.0, taken = 2026-03-01T10:00:00Z,
-    probe = "SN123" }."""
+    """Runout of the shaft under this probe, subtracted from 1× while a key-phase gives the angle of
+    the shaft. Example: { um_pk = 8.0, phase_deg = 30.0, speed_rpm = 8.0, taken =
+    2026-03-01T10:00:00Z, probe = "SN123" }."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -206,12 +204,16 @@ class ChannelSettings(Settings):
         return self
 
     def _check_scale(self) -> None:
-        """Of a channel in volts, or of one in scaled counts; never of both."""
+        """Check that the scale is either in volts or in scaled counts."""
         in_counts = self.unit_per_count is not None
-        keys, others = (OF_COUNTS, OF_VOLTS) if in_counts else (OF_VOLTS, OF_COUNTS)
-        for key in (*others, *(OF_A_VOLTAGE if in_counts else ())):
+        keys, others = (
+            (SCALE_KEYS_COUNTS, SCALE_KEYS_V) if in_counts else (SCALE_KEYS_V, SCALE_KEYS_COUNTS)
+        )
+        for key in (*others, *(VOLTAGE_KEYS if in_counts else ())):
             if getattr(self, key) is not None:
-                raise MisfitError("a channel is in volts or in scaled counts, not in both", key)
+                raise MisfitError(
+                    "must not be given: a channel is either in volts or in scaled counts", key
+                )
         for key in keys:
             if getattr(self, key) is None:
                 raise MissingError("is missing", key)
@@ -222,40 +224,40 @@ class ChannelSettings(Settings):
             raise MisfitError(f"must be below {high} {getattr(self, high):g}", low)
 
     def _check_key_phase(self) -> None:
-        for key in NOT_OF_A_KEY_PHASE:
+        for key in NO_KEY_PHASE_KEYS:
             if getattr(self, key) not in (None, (), 0.0):
-                raise MisfitError("a key_phase has none; leave it out", key)
+                raise MisfitError("does not apply to a key_phase; remove it", key)
 
     def _check_runout(self) -> None:
         for key in ("probe", "slow_roll"):
             if getattr(self, key) is not None and self.transducer not in SHAFT_TRANSDUCERS:
                 words = " or ".join(SHAFT_TRANSDUCERS)
-                raise MisfitError(f"is for a {words}; this is a {self.transducer}", key)
+                raise MisfitError(f"applies to a {words}; this is a {self.transducer}", key)
         if self.slow_roll is not None and self.probe is None:
-            raise MisfitError("must be given with slow_roll, which is of one probe alone", "probe")
+            raise MisfitError("must be given with slow_roll, which belongs to one probe", "probe")
 
     def _check_sensitivity(self) -> None:
         allowed = ALLOWED_UNITS[self.transducer]
         if self.sensitivity_unit not in allowed:
             words = " or ".join(f'"{unit}"' for unit in allowed)
-            raise MisfitError(f"that of a {self.transducer} is {words}", "sensitivity_unit")
+            raise MisfitError(f"must be {words} for a {self.transducer}", "sensitivity_unit")
         low, high = PLAUSIBLE_V_PER_UNIT[self.transducer]
         scale = V_PER_ENGINEERING_UNIT[self.sensitivity_unit]
         if self.sensitivity is None or not low <= abs(self.sensitivity) * scale <= high:
             raise MisfitError(
-                f"a {self.transducer} has {low / scale:g} to {high / scale:g}"
-                f" {self.sensitivity_unit}, or as much below zero",
+                f"must be {low / scale:g} to {high / scale:g} {self.sensitivity_unit} for a"
+                f" {self.transducer}, positive or negative",
                 "sensitivity",
             )
 
     @property
     def measurand(self) -> Measurand:
-        """What the channel's samples are, in engineering units."""
+        """Measured quantity in engineering units."""
         return MEASURANDS[self.transducer]
 
     @property
     def unit_per_v(self) -> float:
-        """Engineering units per volt; pulses stay volts; per count where a count is a volt."""
+        """Engineering units per volt, or per count if scaled in counts; 1 for pulses."""
         if self.unit_per_count is not None:
             return self.unit_per_count
         if self.sensitivity is None or self.sensitivity_unit is None:
@@ -264,10 +266,12 @@ class ChannelSettings(Settings):
 
     @property
     def scale(self) -> dict[str, float]:
-        """Full scale, units per volt and OK limits; scaled counts are taken for volts."""
-        full_scale, low, high = (getattr(self, key) for key in OF_VOLTS)
+        """Full scale, units per volt and OK limits; scaled counts are treated as volts."""
+        full_scale, low, high = (getattr(self, key) for key in SCALE_KEYS_V)
         if self.unit_per_count is not None:
-            limits = (float(getattr(self, key)) / self.unit_per_count for key in OF_COUNTS[1:])
+            limits = (
+                float(getattr(self, key)) / self.unit_per_count for key in SCALE_KEYS_COUNTS[1:]
+            )
             full_scale, (low, high) = float(COUNTS_FULL_SCALE), sorted(limits)
         return {
             "full_scale_v": full_scale,
@@ -278,12 +282,12 @@ class ChannelSettings(Settings):
 
     @property
     def floor(self) -> float:
-        """Line floor with its default filled in."""
+        """Line floor, or its default."""
         return LINE_FLOORS[self.transducer] if self.line_floor is None else self.line_floor
 
     @property
     def sign(self) -> int:
-        """Direction with its default filled in."""
+        """Direction, or its default."""
         if self.direction is not None:
             return self.direction
         return -1 if self.transducer is Transducer.PROXIMITY_PROBE else 1
@@ -296,7 +300,7 @@ class SlowChannelSettings(Settings):
     """Unique within the unit; example: "ujb_oil_temperature"."""
 
     unit: Literal["r/min", "MW", "degC", "mm"]
-    """Unit in which the device gives it: "r/min", "MW", "degC" or "mm"."""
+    """Unit of the values of the device: "r/min", "MW", "degC" or "mm"."""
 
     minimum: float
     """Readings below are refused as out of range; example: -10.0."""

@@ -1,4 +1,4 @@
-"""`Configuration`: the settings of the plant file under a name that changes with each of them."""
+"""Configuration: the settings of the plant file without secrets, identified by their hash."""
 
 import hashlib
 import json
@@ -14,42 +14,30 @@ FORMAT = "padwatch-configuration"
 LEFT_OUT = "left out"
 
 SECRETS = ("secret", "authorization", "password", "username")
-"""Keys whose values do not leave the plant file, wherever they stand."""
+"""Keys of secret values in any table."""
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """A configuration in full, and its version: the SHA-256 of that.
-
-    Parameters
-    ----------
-    text
-        Canonical JSON: keys sorted, no spaces, UTF-8.
-    """
+    """A configuration and its version, the SHA-256 of its text."""
 
     text: bytes
 
     @property
     def version(self) -> str:
-        """Its name."""
+        """SHA-256 of the text."""
         return hashlib.sha256(self.text).hexdigest()
 
 
 def configuration_of(plant: PlantFile, program: str, commit: str | None) -> Configuration:
-    """The configuration of a plant file, without its secrets.
-
-    Parameters
-    ----------
-    program, commit
-        Version of padwatch, and the commit that it was built from, if that is known.
-    """
+    """Return the configuration of a plant file without its secrets."""
     settings = without_secrets(plant.model_dump(mode="json"))
     document = {"format": FORMAT, "version": 1, "padwatch": program, "commit": commit}
     return Configuration(canonical(document | {"settings": settings}))
 
 
 def canonical(document: object) -> bytes:
-    """One and the same text for one and the same document."""
+    """Return the canonical text of a document."""
     text = json.dumps(
         document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
     )
@@ -57,7 +45,7 @@ def canonical(document: object) -> bytes:
 
 
 def without_secrets(value: Any) -> Any:
-    """The same settings without what only the plant should know."""
+    """Return the settings without secrets."""
     if isinstance(value, dict):
         return {key: _shown(key, each) for key, each in value.items()}
     if isinstance(value, list | tuple):
@@ -66,7 +54,7 @@ def without_secrets(value: Any) -> Any:
 
 
 def built_from() -> str | None:
-    """The commit that padwatch was installed from; None if it was not installed from one."""
+    """Return the commit that padwatch was installed from, if known."""
     try:
         text = distribution("padwatch").read_text("direct_url.json")
     except PackageNotFoundError:
@@ -79,6 +67,6 @@ def _shown(key: str, value: Any) -> Any:
     if key in SECRETS and value is not None:
         return LEFT_OUT
     if key == "url" and isinstance(value, str):
-        parts = urlsplit(value)  # its path may be as good as a password
+        parts = urlsplit(value)  # its path may contain a token
         return f"{parts.scheme}://{parts.hostname}/ ({LEFT_OUT})"
     return without_secrets(value)

@@ -1,4 +1,6 @@
-"""Settings of units as values of core: machine, calibration, analysis, alarm and film rules."""
+"""Conversion of settings to values of core: machine, calibration, analysis and rules."""
+
+from collections.abc import Mapping
 
 from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
@@ -19,7 +21,6 @@ from service.settings.films import FilmAlarmSettings
 from service.settings.limits import (
     GapLimitSettings,
     LimitSettings,
-    VectorReferenceSettings,
     ZoneSettings,
     ZoneTableSettings,
     states_of,
@@ -41,11 +42,11 @@ ACCURACY_KEYS = {
     "thermal_growth_change_um",
     "clearance_uncertainty",
 }
-"""Keys of a bearing that say how well something is known."""
+"""Keys of a bearing that state uncertainties."""
 
 
 def machine_of(settings: UnitSettings) -> Unit:
-    """The unit as the numerics see it."""
+    """Return the unit as a value of core."""
     return Unit(
         id=settings.id,
         rated_speed_rpm=settings.rated_speed_rpm,
@@ -62,7 +63,7 @@ def machine_of(settings: UnitSettings) -> Unit:
 
 
 def _channel(settings: ChannelSettings) -> Channel:
-    calibration = _calibration(settings)
+    calibration = ChannelCalibration(**settings.scale)
     return Channel(
         id=settings.id,
         measurand=settings.measurand,
@@ -77,20 +78,16 @@ def _channel(settings: ChannelSettings) -> Channel:
     )
 
 
-def _calibration(settings: ChannelSettings) -> ChannelCalibration:
-    return ChannelCalibration(**settings.scale)
-
-
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
+    gain = {channel.id: channel.gain_uncertainty for channel in unit.channel}
     return Bearing(
         **settings.model_dump(exclude=ACCURACY_KEYS | {"alarms", "watched_estimator"}),
-        accuracy=_accuracy(settings, unit),
-        gap_accuracy=_gap_accuracy(settings, unit),
+        accuracy=_accuracy(settings, gain),
+        gap_accuracy=_gap_accuracy(settings, gain),
     )
 
 
-def _gap_accuracy(settings: BearingSettings, unit: UnitSettings) -> GapAccuracy:
-    gain = _gains(unit)
+def _gap_accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> GapAccuracy:
     return GapAccuracy(
         gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
         reference_um=settings.gap_reference_uncertainty_um,
@@ -100,13 +97,8 @@ def _gap_accuracy(settings: BearingSettings, unit: UnitSettings) -> GapAccuracy:
     )
 
 
-def _gains(unit: UnitSettings) -> dict[str, float]:
-    return {channel.id: channel.gain_uncertainty for channel in unit.channel}
-
-
-def _accuracy(settings: BearingSettings, unit: UnitSettings) -> BearingAccuracy:
-    """The worse of two transducers stands for both directions."""
-    gain = _gains(unit)
+def _accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> BearingAccuracy:
+    """Return the accuracy of both directions, by the less accurate transducer."""
     return BearingAccuracy(
         shaft_gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
         bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),
@@ -119,18 +111,18 @@ def _accuracy(settings: BearingSettings, unit: UnitSettings) -> BearingAccuracy:
 
 
 def calibration_of(settings: UnitSettings) -> UnitCalibration:
-    """How the counts of the unit's device become engineering units."""
+    """Return the calibration from the device's counts to engineering units."""
     return UnitCalibration(
         unit=settings.id,
         rate_hz=settings.rate_hz,
-        channels=tuple(_calibration(c) for c in settings.channel),
+        channels=tuple(ChannelCalibration(**c.scale) for c in settings.channel),
         slow=tuple(SlowCalibration(c.id, c.minimum, c.maximum) for c in settings.slow_channel),
         block_samples=settings.block_samples,
     )
 
 
 def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
-    """How samples are segmented, averaged and judged."""
+    """Return the settings of segments, averaging and assessment."""
     dynamic = settings.dynamic
     noise = dynamic.probe_noise_um2_per_hz
     return AnalysisSettings(
@@ -151,11 +143,11 @@ def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
 
 
 ZONE_DEADBAND = 0.05
-"""Of the boundary between A and B, where no deadband is given."""
+"""Default deadband as a share of the boundary between A and B."""
 
 
 def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitRules:
-    """What is watched on a unit; of a replay neither the link nor the clock."""
+    """Return the alarm rules of a unit; a replay has no rules of link and clock."""
     is_live = origin is Origin.LIVE
     is_judged = is_live and alarms.clock == "judged"
     return UnitRules(
@@ -170,22 +162,19 @@ def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitR
 
 
 def chatter_rule_of(alarms: AlarmSettings) -> ChatterRule:
-    """What counts as chattering."""
+    """Return the rule of chattering alarms."""
     return ChatterRule(alarms.chattering_activations, ns_from_s(alarms.chattering_window_s))
 
 
 def references_of(unit: UnitSettings) -> list[VectorReference]:
-    """Vectors of the plant file that 1× is compared with."""
+    """Return the 1× reference vectors of the plant file."""
     return [
-        VectorReference(unit.id, bearing.id, state, _vectors(reference))
+        VectorReference(unit.id, bearing.id, state, vectors)
         for bearing in unit.bearing
         for reference in bearing.alarms.order1_reference
+        for vectors in [{at: OrderVector(*vector) for at, vector in reference.vectors().items()}]
         for state in states_of(reference.states)
     ]
-
-
-def _vectors(reference: VectorReferenceSettings) -> dict[str, OrderVector]:
-    return {place: OrderVector(*vector) for place, vector in reference.vectors().items()}
 
 
 def _bearing_rules(bearing: BearingSettings) -> BearingRules:
@@ -238,12 +227,12 @@ def _table(table: ZoneTableSettings) -> ZoneLimits:
 
 
 def _clock_limit(limit: float, delay_s: float) -> LimitRule:
-    """A tenth of the limit is its deadband."""
+    """Return a limit of the clock with a deadband of a tenth."""
     return LimitRule(Limits(limit, deadband=limit / 10), rule_of(delay_s, delay_s))
 
 
 def film_rules_of(unit: UnitSettings, settings: FilmAlarmSettings) -> FilmRules | str:
-    """How the films of a unit are watched, or why they cannot be."""
+    """Return the film rules of a unit, or why its films cannot be watched."""
     if unit.power_channel is None or unit.rated_power_mw is None:
         return "operating states need power_channel and rated_power_mw"
     estimators = {
@@ -264,9 +253,9 @@ def film_rules_of(unit: UnitSettings, settings: FilmAlarmSettings) -> FilmRules 
 
 
 def watched_estimator(unit: UnitSettings, bearing: BearingSettings) -> Estimator:
-    """Whose stiffness is compared: one and the same, so that like meets like."""
+    """Return the estimator whose stiffness is compared with its baseline."""
     if bearing.watched_estimator is not None:
         return bearing.watched_estimator
     if isinstance(unit.source, ModbusVectorSettings):
-        return Estimator.RATIO_ORDER1  # all that amplitudes alone can give
+        return Estimator.RATIO_ORDER1  # the only estimator from amplitudes alone
     return bearing.preference[0]

@@ -1,4 +1,4 @@
-"""How films are compared with what they were like: conditions, baselines, limits of change."""
+"""Monitoring of film stiffness: conditions, baselines and limits of change."""
 
 from typing import Annotated, Literal, Self
 
@@ -15,32 +15,32 @@ Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
 class ChangeLimitSettings(Settings):
-    """How large, how sure and how lasting a change of stiffness must be to be an alarm."""
+    """Magnitude, significance and duration of a change of stiffness that raise an alarm."""
 
     alert_change: Share = ChangeLimits.alert_change
-    """Change of stiffness, either way, that is an alert once it is surely exceeded, by one standard
-    uncertainty of the change; in ln: 0.035 is 3.5 %."""
+    """Change of stiffness in either direction that is an alert when exceeded by one standard
+    uncertainty; a natural logarithm: 0.035 is 3.5 %."""
 
     danger_change: Share = ChangeLimits.danger_change
-    """The same for danger, by three; must be above alert_change; example: 0.15."""
+    """Change that is a danger when exceeded by three; must be above alert_change; example: 0.15."""
 
     deadband: Share = ChangeLimits.deadband
-    """How far below its limit a change must fall for a level to be left; example: 0.01."""
+    """How far below its limit a change must fall to leave a level; example: 0.01."""
 
     significance: Annotated[float, Field(gt=0.0, le=100.0)] = ChangeLimits.significance
-    """Standard uncertainties that a mean change over four hours must be away from none."""
+    """Minimum ratio of the mean change over four hours to its standard uncertainty."""
 
     significance_fall: Annotated[float, Field(gt=0.0, le=10.0)] = ChangeLimits.significance_fall
-    """By how many fewer are enough whenever the time is four times as long."""
+    """Reduction of that ratio for each fourfold averaging time."""
 
     min_evidence_h: Annotated[float, Field(gt=0.0, le=1000.0)] = ChangeLimits.min_evidence_h
-    """Running hours with a baseline before a film is called normal."""
+    """Running hours with a baseline before a film counts as normal."""
 
     on_delay_h: Annotated[float, Field(gt=0.0, le=1000.0)] = ChangeLimits.on_delay_h
-    """Running hours that a change must last to count."""
+    """Running hours that a change must last to raise an alarm."""
 
     off_delay_h: Annotated[float, Field(gt=0.0, le=1000.0)] = ChangeLimits.off_delay_h
-    """Running hours that it must be gone for to count no longer."""
+    """Running hours without the change after which the alarm returns."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -51,12 +51,12 @@ class ChangeLimitSettings(Settings):
         return self
 
     def limits(self) -> ChangeLimits:
-        """As the decision takes them; the latch is the alarm's."""
+        """Return the limits of core's decision; latching belongs to the alarm."""
         return ChangeLimits(**self.model_dump())
 
 
 class BaselineModel(Settings):
-    """What a baseline needs to be learned."""
+    """Requirements for learning a baseline."""
 
     eccentricity_width: Annotated[float, Field(ge=0.005, le=0.5)] = CellGrid.eccentricity_width
     """Width of a cell in eccentricity ratio; example: 0.05."""
@@ -65,23 +65,23 @@ class BaselineModel(Settings):
     """Width of a cell in oil temperature, K; example: 2.5."""
 
     attitude_width_deg: Annotated[float, Field(ge=1.0, le=360.0)] | None = None
-    """Width of a cell in attitude angle, degrees, a divisor of 360; without it the attitude does
-    not part cells; example: 45.0."""
+    """Width of a cell in attitude angle, degrees, a divisor of 360; without it cells do not depend
+    on the attitude; example: 45.0."""
 
     uses_attitude: bool = BaselineSettings.uses_attitude
-    """Whether stiffness may depend on the attitude angle, too."""
+    """Whether the baseline depends on the attitude angle."""
 
     min_readings: Annotated[int, Field(ge=1, le=100_000)] = BaselineSettings.min_readings
-    """Readings below which a cell knows nothing by itself."""
+    """Minimum number of readings of a cell with a baseline of its own."""
 
     min_days: Annotated[int, Field(ge=1, le=1000)] = BaselineSettings.min_days
-    """Days with readings below which a cell knows nothing by itself."""
+    """Minimum number of days with readings of such a cell."""
 
     min_learning_days: Annotated[int, Field(ge=1, le=3650)] = BaselineSettings.min_learning_days
-    """Days with readings before there is a baseline at all."""
+    """Minimum number of days with readings before the first baseline."""
 
     max_surface_std: Annotated[float, Field(gt=0.0, le=1.0)] = BaselineSettings.max_surface_std
-    """Uncertainty of what is expected, in ln, above which a condition counts as never seen."""
+    """Uncertainty of the expected stiffness, a logarithm, above which a condition is unknown."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -91,7 +91,7 @@ class BaselineModel(Settings):
         return self
 
     def settings(self, reading_h: float = BaselineSettings.reading_h) -> BaselineSettings:
-        """As learning takes them, for readings that stand for so many running hours."""
+        """Return the settings of core's learning, for readings of this many running hours."""
         rest = self.model_dump(exclude=set(GRID_KEYS))
         grid = CellGrid(*(getattr(self, key) for key in GRID_KEYS))
         return BaselineSettings(grid=grid, reading_h=reading_h, **rest)
@@ -102,10 +102,10 @@ GRID_KEYS = ("eccentricity_width", "temperature_width_c", "attitude_width_deg")
 
 
 class OperatingModel(Settings):
-    """At which shares of rated speed and power an operating state begins."""
+    """Limits of the operating states, as shares of rated speed and power."""
 
     standing_below: Share = OperatingLimits.standing_below
-    """Share of the rated speed below which a unit stands still."""
+    """Share of the rated speed below which a unit is stopped."""
 
     at_speed_above: Share = OperatingLimits.at_speed_above
     """Share of the rated speed above which it is at speed."""
@@ -117,28 +117,28 @@ class OperatingModel(Settings):
     """Share of the rated power above which it is at full load."""
 
     speed_hysteresis: Share = OperatingLimits.speed_hysteresis
-    """How far beyond a limit a speed must be to count as beyond, as a share of the rated one."""
+    """Hysteresis of the speed limits, as a share of the rated speed."""
 
     power_hysteresis: Share = OperatingLimits.power_hysteresis
-    """The same for power."""
+    """Hysteresis of the power limits, as a share of the rated power."""
 
     settling_s: Annotated[float, Field(gt=0.0, le=86_400.0)] = OperatingLimits.settling_s
     """Time in one state before films are compared, s."""
 
     oil_band_c: Annotated[float, Field(gt=0.0, le=50.0)] = OperatingLimits.oil_band_c
     """After a start, a bearing is warm once its oil has stayed within a band of this width for
-    `oil_settling_s` at speed, K; example: 0.5. Not narrower than what the sensor resolves."""
+    `oil_settling_s` at speed, K; example: 0.5. At least the resolution of the sensor."""
 
     oil_settling_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.oil_settling_s
-    """How long it must stay there, s: clearances close for hours after a start, later than the oil
-    warms; example: 7200."""
+    """Time for which the oil must stay within this band, s: after a start clearances decrease for
+    hours, longer than the oil warms; example: 7200."""
 
     warm_up_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.warm_up_s
-    """Time at speed after which films are compared even if the oil has not settled, s; example:
+    """Time at speed after which films are compared even if the oil temperature changes, s; example:
     21600."""
 
     longest_gap_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.longest_gap_s
-    """Time without results after which nothing is known of what the unit did, s."""
+    """Time without results after which the operating state counts as unknown, s."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -150,7 +150,7 @@ class OperatingModel(Settings):
         return self
 
     def limits(self, rated_speed_rpm: float, rated_power_mw: float) -> OperatingLimits:
-        """Limits of a machine."""
+        """Return the operating limits of a machine."""
         return OperatingLimits(rated_speed_rpm, rated_power_mw, **self.model_dump())
 
 
@@ -164,30 +164,30 @@ class FilmAlarmSettings(Settings):
     """Baselines of stiffness by operating condition, and alarms of its change."""
 
     reading_period_s: Annotated[float, Field(ge=1.0, le=3600.0)] = 600.0
-    """How often a reading is taken in, s; not less than averages take to be new ones."""
+    """Interval of readings, s; at least one averaging time, so that readings are independent."""
 
     time_lapse: Annotated[float, Field(ge=1.0, le=1000.0)] = 1.0
-    """For demonstrations only: how many times as fast running hours pass for the decision."""
+    """Acceleration of running hours for the decision, for demonstrations only."""
 
     learning_days: Annotated[float, Field(ge=1.0, le=3650.0)] = 365.0
-    """How long a baseline is learned after the first reading or a machine event, days: seasons
-    belong to what a healthy film is like. Then it stands still until an engineer renews it."""
+    """Time for which a baseline is learned after the first reading or a machine event, days. It
+    should include all seasons. Then the baseline is fixed until an engineer renews it."""
 
     learn_every_days: Annotated[float, Field(ge=0.01, le=365.0)] = 7.0
-    """How often it is learned again in that time, days."""
+    """Interval of learning in that time, days."""
 
     acceptance: Literal["automatic", "by_engineer"] = "automatic"
-    """Whether a learned baseline is put in force by padwatch ("automatic"), as long as it agrees
-    with the first that was accepted and the film did not drift meanwhile, or only "by_engineer"."""
+    """Whether a learned baseline is put in force by padwatch ("automatic") if it agrees with the
+    first accepted baseline and the film did not drift, or only "by_engineer"."""
 
     latching: bool = False
-    """Whether an alarm stays until it is reset after its change has gone."""
+    """Whether an alarm stays active after its change has gone, until it is reset."""
 
     change: ChangeLimitSettings = ChangeLimitSettings()
     """Limits of change."""
 
     baseline: BaselineModel = BaselineModel()
-    """What learning needs."""
+    """Requirements for learning."""
 
     operating: OperatingModel = OperatingModel()
     """Operating states."""
@@ -203,5 +203,5 @@ class FilmAlarmSettings(Settings):
 
     @property
     def reading_h(self) -> float:
-        """Running hours that a reading stands for."""
+        """Running hours per reading."""
         return self.reading_period_s * self.time_lapse / 3600.0

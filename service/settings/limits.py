@@ -1,5 +1,6 @@
 """Limits of alarms: alert and danger levels, tables by condition, ISO 20816-5 zones."""
 
+import math
 from collections.abc import Sequence
 from itertools import combinations, pairwise
 from typing import Annotated, Literal, Self
@@ -22,7 +23,7 @@ StateNames = Annotated[tuple[StateName, ...], Field(min_length=1, max_length=6)]
 
 
 def states_of(names: tuple[StateName, ...]) -> States:
-    """Operating states by their names."""
+    """Return operating states by their names."""
     return frozenset(OperatingState[name.upper()] for name in names)
 
 
@@ -46,14 +47,14 @@ class RegionSettings(Settings):
     @model_validator(mode="after")
     def _check_region(self) -> Self:
         refuse_twice(("states", n, name) for n, name in enumerate(self.states or ()))
-        for key, (least, most) in RANGES.items():
+        for key, (low, high) in RANGES.items():
             bounds: Bounds | None = getattr(self, key)
-            if bounds is not None and not least <= bounds[0] < bounds[1] <= most:
-                raise MisfitError(f"must rise, and lie within {least:g} to {most:g}", key)
+            if bounds is not None and not low <= bounds[0] < bounds[1] <= high:
+                raise MisfitError(f"must increase, within {low:g} to {high:g}", key)
         return self
 
     def region(self, states: StateNames) -> Region:
-        """The region as alarms know it; in these states where it gives none."""
+        """Return the region in core's terms; these states apply if it names none."""
         return Region(states_of(self.states or states), *(getattr(self, key) for key in RANGES))
 
 
@@ -62,71 +63,71 @@ RANGES = {
     "oil_temperature_c": (-50.0, 200.0),
     "attitude_deg": (0.0, 360.0),
 }
-"""Ranges of a region, with what they must lie within; in the order of `Region`."""
+"""Ranges of a region with their bounds, in the order of `Region`."""
 
 
 def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None:
-    """Refuse tables of which two may hold at once; those without states hold in these."""
+    """Refuse overlapping tables; a table without states holds in these."""
     regions = [table.region(states) for table in tables]
     for n, m in combinations(range(len(tables)), 2):
         if regions[n].overlaps(regions[m]):
-            raise MisfitError(f"holds under conditions of table {n + 1}, too", "table", m)
+            raise MisfitError(f"overlaps the conditions of table {n + 1}", "table", m)
 
 
 class WatchSettings(Settings):
     """How an alarm of a measurement behaves."""
 
     on_delay_s: DelayS = 10.0
-    """For how long the limit must be passed, seconds of the samples' time; results come once a
-    refresh."""
+    """Time for which the limit must be exceeded, in seconds of the samples' time; results come once
+    per refresh."""
 
     off_delay_s: DelayS = 30.0
-    """For how long it must be kept again for the alarm to return, s."""
+    """Time for which the value must be within the limit again for the alarm to return, s."""
 
     latching: bool = False
-    """Whether the alarm stays active after its condition has gone, until somebody resets it."""
+    """Whether the alarm stays active after its condition has gone, until it is reset."""
 
 
 class LimitTableSettings(RegionSettings):
-    """Limits in some part of the operating conditions; what is not given is as outside of it."""
+    """Limits in a part of the operating conditions; missing limits are those of the whole."""
 
     states: StateNames | None = None
     """Operating states in which these limits hold; those of the limit unless given."""
 
     alert: float | None = None
-    """As `alert` of the limit."""
+    """See `alert` of the limit."""
 
     danger: float | None = None
-    """As `danger` of the limit."""
+    """See `danger` of the limit."""
 
     alert_below: float | None = None
-    """As `alert_below` of a limit that has one."""
+    """See `alert_below` of the limit, if it has one."""
 
     danger_below: float | None = None
-    """As `danger_below` of a limit that has one."""
+    """See `danger_below` of the limit, if it has one."""
 
     deadband: float | None = None
-    """As `deadband` of the limit."""
+    """See `deadband` of the limit."""
 
 
 LIMITS = ("alert", "danger", "alert_below", "danger_below", "deadband")
 
 
 class LimitSettings(WatchSettings):
-    """Limits that a value must not pass; without alert and danger nothing is watched."""
+    """Limits of a measured value; alert, danger or both must be given."""
 
     alert: float | None
     danger: float | None
     deadband: float
 
     states: StateNames = AT_SPEED
-    """Operating states in which the limit counts: "standstill", "run_up", "speed_no_load",
-    "part_load", "full_load", "run_down". Elsewhere its alarm is suppressed by design. Where the
-    state is not known, it counts."""
+    """Operating states in which the limit applies: "standstill", "run_up", "speed_no_load",
+    "part_load", "full_load", "run_down". In other states its alarm is suppressed by design. The
+    limit also applies while the state is unknown."""
 
     table: Annotated[tuple[LimitTableSettings, ...], Field(max_length=100)] = ()
-    """Other limits in some operating states or condition cells; at most 100. Where it is not known
-    which of them hold, all count that may."""
+    """Other limits in some operating states or condition cells; at most 100. While the condition is
+    unknown, all limits that may apply do."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -140,12 +141,12 @@ class LimitSettings(WatchSettings):
                 found = error.errors()[0]
                 misfit = found.get("ctx", {}).get("error")
                 at = misfit.at if isinstance(misfit, MisfitError) else found["loc"]
-                said = str(misfit) if isinstance(misfit, MisfitError) else found["msg"]
-                raise MisfitError(said, "table", n, *at) from None
+                fault = str(misfit) if isinstance(misfit, MisfitError) else found["msg"]
+                raise MisfitError(fault, "table", n, *at) from None
         return self
 
     def within(self, table: LimitTableSettings) -> Self:
-        """The limits in the region of a table: its own, and for the rest these."""
+        """Return the limits in the region of a table; missing ones are taken from here."""
         own = {key: getattr(self, key) for key in LIMITS if hasattr(self, key)}
         given = {key: getattr(table, key) for key in LIMITS if getattr(table, key) is not None}
         return type(self).model_validate(own | given)
@@ -162,13 +163,13 @@ class LimitSettings(WatchSettings):
 
 
 class AmplitudeLimitSettings(LimitSettings):
-    """Limits of a shaft's vibration at 1×. padwatch is no protection system: these inform."""
+    """Limits of a shaft's vibration at 1×. padwatch is not a protection system: these inform."""
 
     alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
-    """Above this, µm zero-to-peak, the alarm is an alert; example: 150.0."""
+    """Value above which the alarm is an alert, µm zero-to-peak; example: 150.0."""
 
     danger: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
-    """Above this, µm zero-to-peak, it is a danger; must be above alert; example: 250.0."""
+    """Value above which it is a danger, µm zero-to-peak; must be above alert; example: 250.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=5000.0)] = 5.0
     """How far below a limit the amplitude must fall for the alarm to return, µm."""
@@ -178,10 +179,10 @@ class SpanLimitSettings(LimitSettings):
     """Limits of a shaft's broad-band vibration, peak-to-peak."""
 
     alert: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
-    """Above this, µm peak-to-peak, the alarm is an alert; example: 300.0."""
+    """Value above which the alarm is an alert, µm peak-to-peak; example: 300.0."""
 
     danger: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
-    """Above this, µm peak-to-peak, it is a danger; must be above alert; example: 500.0."""
+    """Value above which it is a danger, µm peak-to-peak; must be above alert; example: 500.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] = 10.0
     """How far below a limit the value must fall for the alarm to return, µm."""
@@ -191,63 +192,63 @@ class VelocityLimitSettings(LimitSettings):
     """Limits of a bearing's broad-band velocity."""
 
     alert: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
-    """Above this, mm/s rms, the alarm is an alert; example: 2.0."""
+    """Value above which the alarm is an alert, mm/s rms; example: 2.0."""
 
     danger: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
-    """Above this, mm/s rms, it is a danger; must be above alert; example: 4.0."""
+    """Value above which it is a danger, mm/s rms; must be above alert; example: 4.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.1
     """How far below a limit the velocity must fall for the alarm to return, mm/s."""
 
 
 class EccentricityLimitSettings(LimitSettings):
-    """Limits of the eccentricity ratio: how much of the clearance the shaft has used up."""
+    """Limits of the eccentricity ratio, the used share of the clearance."""
 
     alert: Annotated[float, Field(gt=0.0, le=5.0)] | None = None
-    """Above this share of the clearance the alarm is an alert; example: 0.7."""
+    """Value above which the alarm is an alert; example: 0.7."""
 
     danger: Annotated[float, Field(gt=0.0, le=5.0)] | None = None
-    """Above this share it is a danger; must be above alert; example: 0.9."""
+    """Value above which it is a danger; must be above alert; example: 0.9."""
 
     deadband: Annotated[float, Field(ge=0.0, le=5.0)] = 0.02
-    """How far below a limit it must fall for the alarm to return."""
+    """How far below a limit the ratio must fall for the alarm to return."""
+
+
+class VectorChangeLimitSettings(LimitSettings):
+    """Limits of the distance of a 1× vector from its reference; without phase, of its length."""
+
+    alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
+    """Value above which the alarm is an alert, µm zero-to-peak; example: 30.0."""
+
+    danger: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
+    """Value above which it is a danger, µm zero-to-peak; must be above alert; example: 60.0."""
+
+    deadband: Annotated[float, Field(ge=0.0, le=5000.0)] = 2.0
+    """How far below a limit the distance must fall for the alarm to return, µm."""
 
 
 class TemperatureLimitSettings(LimitSettings):
     """Limits of an oil temperature; the bearing must name its slow channel."""
 
     alert: Annotated[float, Field(gt=0.0, le=200.0)] | None = None
-    """Above this, °C, the alarm is an alert; example: 65.0."""
+    """Value above which the alarm is an alert, °C; example: 65.0."""
 
     danger: Annotated[float, Field(gt=0.0, le=200.0)] | None = None
-    """Above this, °C, it is a danger; must be above alert; example: 75.0."""
+    """Value above which it is a danger, °C; must be above alert; example: 75.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
     """How far below a limit the temperature must fall for the alarm to return, K."""
 
     states: StateNames = EVERY_STATE
-    """Operating states in which the limit counts; all of them unless given: oil that is too hot is
-    so at standstill as well."""
-
-
-class VectorChangeLimitSettings(LimitSettings):
-    """Limits of how far a 1× vector may move from its reference; without phase, its length."""
-
-    alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
-    """Above this length of the difference, µm zero-to-peak, the alarm is an alert; example: 30."""
-
-    danger: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
-    """Above this, µm zero-to-peak, it is a danger; must be above alert; example: 60.0."""
-
-    deadband: Annotated[float, Field(ge=0.0, le=5000.0)] = 2.0
-    """How far below a limit the difference must fall for the alarm to return, µm."""
+    """Operating states in which the limit applies; all unless given, as oil may also be too hot at
+    standstill."""
 
 
 GapUm = Annotated[float, Field(gt=0.0, le=10_000.0)]
 
 
 class GapLimitSettings(LimitSettings):
-    """Limits of the mean gap of each probe: a shaft may walk out of a probe's range."""
+    """Limits of the mean gap of each probe: the shaft may leave the range of a probe."""
 
     alert: GapUm | None = None
     """Above this gap, µm, the alarm is an alert; example: 2400.0."""
@@ -262,7 +263,7 @@ class GapLimitSettings(LimitSettings):
     """Below this gap, µm, it is a danger; must be below alert_below; example: 400.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] = 10.0
-    """How far inside a limit the gap must come back for the alarm to return, µm."""
+    """How far inside a limit the gap must be for the alarm to return, µm."""
 
     def _check_limits(self) -> None:
         named = ("danger_below", "alert_below", "alert", "danger")
@@ -275,9 +276,9 @@ class GapLimitSettings(LimitSettings):
                 raise MisfitError(f"must be above {lower}, {low:g}", upper)
         low_side = [limit for key, limit in given if key.endswith("below")]
         high_side = [limit for key, limit in given if not key.endswith("below")]
-        if low_side and high_side and self.deadband >= (high_side[0] - low_side[-1]) / 2.0:
-            room = (high_side[0] - low_side[-1]) / 2.0
-            raise MisfitError(f"must be below half the room between, {room:g}", "deadband")
+        half_range = (high_side[0] - low_side[-1]) / 2.0 if low_side and high_side else math.inf
+        if self.deadband >= half_range:
+            raise MisfitError(f"must be below half the range, {half_range:g}", "deadband")
         if high_side and self.deadband >= high_side[0]:
             raise MisfitError(f"must be below the lowest limit, {high_side[0]:g}", "deadband")
 
@@ -289,8 +290,8 @@ class ZoneTableSettings(RegionSettings):
     """Boundaries of the zones in some operating states or condition cells."""
 
     states: StateNames = AT_SPEED
-    """Operating states in which they hold. In a condition without a table the alarm is suppressed
-    by design; where it is not known, the strictest table that may hold does."""
+    """Operating states in which they apply. In a condition without a table the alarm is suppressed
+    by design; while the condition is unknown, the strictest table that may apply does."""
 
     a_b: Boundary
     """Boundary between zones A and B, in the unit of the measurement."""
@@ -302,8 +303,8 @@ class ZoneTableSettings(RegionSettings):
     """Boundary between C and D, above b_c; beyond it the alarm is a danger."""
 
     deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] | None = None
-    """How far below a boundary the value must fall for its zone to be left; without it a twentieth
-    of a_b; example: 5.0."""
+    """How far below a boundary the value must fall to leave the zone; a twentieth of a_b by
+    default; example: 5.0."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -329,13 +330,13 @@ class ZoneSettings(WatchSettings):
 
 
 class ZonesSettings(Settings):
-    """Evaluation zones by measurement. padwatch carries no numbers of the standard."""
+    """Evaluation zones by measurement; padwatch does not include the values of the standard."""
 
     shaft_um_pp: ZoneSettings | None = None
     """Relative shaft displacement, peak-to-peak, µm, in x and in y each."""
 
     shaft_max_um_pk: ZoneSettings | None = None
-    """Farthest excursion of the shaft from its mean place in any direction, µm zero-to-peak."""
+    """Largest excursion of the shaft from its mean position in any direction, µm zero-to-peak."""
 
     bearing_mm_s_rms: ZoneSettings | None = None
     """Velocity of the bearing housing, mm/s rms, in x and in y each."""
@@ -350,22 +351,22 @@ PLACES = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
 
 
 class VectorReferenceSettings(Settings):
-    """1× vectors of a bearing that is well: [µm 0-pk] or [µm 0-pk, degrees]."""
+    """1× vectors of a healthy bearing: [µm 0-pk] or [µm 0-pk, degrees]."""
 
     states: StateNames = AT_SPEED
-    """Operating states in which they hold."""
+    """Operating states in which they apply."""
 
     shaft_x: Vector | None = None
-    """Of the shaft in x; example: [60.0, 135.0]."""
+    """Vector of the shaft in x; example: [60.0, 135.0]."""
 
     shaft_y: Vector | None = None
-    """Of the shaft in y."""
+    """Vector of the shaft in y."""
 
     bearing_x: Vector | None = None
-    """Of the bearing in x; example: [12.0, 135.0]."""
+    """Vector of the bearing in x; example: [12.0, 135.0]."""
 
     bearing_y: Vector | None = None
-    """Of the bearing in y; example: [11.0, 45.0]."""
+    """Vector of the bearing in y; example: [11.0, 45.0]."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -381,6 +382,6 @@ class VectorReferenceSettings(Settings):
         return self
 
     def vectors(self) -> dict[str, Vector]:
-        """Those that are given, by place."""
+        """Return the given vectors by place."""
         found = {place: getattr(self, place) for place in PLACES}
         return {place: vector for place, vector in found.items() if vector is not None}

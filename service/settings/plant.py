@@ -7,7 +7,7 @@ from pydantic import Field, StringConstraints, model_validator
 
 from core.units import hz_from_rpm
 from service.settings.alarms import AlarmSettings, CaptureSettings
-from service.settings.base import MisfitError, Settings, refuse_twice
+from service.settings.base import MisfitError, Settings, refuse_twice, refuse_unknown_units
 from service.settings.films import FilmAlarmSettings
 from service.settings.notifications import DeliverySettings
 from service.settings.processes import (
@@ -33,25 +33,25 @@ Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 class SpectraSettings(Settings):
-    """How many spectra of each bearing are kept; the newest ones densely, and older ones sparsely.
+    """Number of spectra kept of each bearing: the newest ones densely, older ones sparsely.
 
-    A spectrum of 25 Hz at the standard settings takes 4 kB of disk with its surroundings.
+    A spectrum up to 25 Hz at the default settings takes 4 kB of disk.
     """
 
     dense_every_s: EveryS = 60.0
-    """Time from one of the densely kept spectra to the next, s."""
+    """Interval of the dense spectra, s."""
 
     n_dense: Count = 1440
-    """How many of these are kept of each bearing, the newest ones; 1440 are a day."""
+    """Number of dense spectra kept of each bearing; 1440 are a day."""
 
     sparse_every_s: EveryS = 600.0
-    """Time from one of the sparsely kept spectra to the next, s; at least dense_every_s."""
+    """Interval of the sparse spectra, s; at least dense_every_s."""
 
     n_sparse: Count = 52_560
-    """How many of these are kept; 52560 are a year, and 0.2 GB for each bearing."""
+    """Number of sparse spectra kept of each bearing; 52560 are a year and take 0.2 GB."""
 
     n_lines: Annotated[int, Field(ge=8, le=20_000)] = 1000
-    """Most lines of a spectrum that are kept, from the lowest frequency on."""
+    """Maximum number of lines kept of a spectrum, from the lowest frequency."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -62,15 +62,15 @@ class SpectraSettings(Settings):
 
 
 MIN_SEGMENT_TURNS = 8
-"""A Hann taper spreads a line over two bins to each side; the vortex is a quarter turn away from
-zero, and must lie outside that."""
+"""A Hann taper spreads a line over two bins to each side; the vortex at a quarter of the running
+speed must lie outside that range around zero."""
 
 MIN_SPECTRUM_ORDERS = 2
-"""The spectrum must hold the 1× line with its surroundings."""
+"""The spectrum must include the 1× line with its surroundings."""
 
 
 class PlantSettings(Settings):
-    """The plant as people know it."""
+    """Name of the plant."""
 
     name: Annotated[str, StringConstraints(min_length=1, max_length=80)]
     """Shown on every page; example: "Itaipu"."""
@@ -80,39 +80,41 @@ class ServiceSettings(Settings):
     """The running program."""
 
     host: Annotated[str, StringConstraints(min_length=1)] = "127.0.0.1"
-    """Address the HTTP server listens on. Any other than loopback needs [service.tls] and an
+    """Address of the HTTP server. An address other than loopback requires [service.tls] and an
     account (padwatch users add)."""
 
     port: Annotated[int, Field(ge=0, le=65535)] = 8080
     """TCP port of the HTTP server; 0 takes a free one and prints it."""
 
     socket: Annotated[str, StringConstraints(pattern=r"^/[^\x00]{1,99}$")] | None = None
-    """File of a unix socket to listen on instead of host and port, for a proxy on this computer;
-    example: "/run/padwatch/http.sock". What the proxy says of where a request comes from is
-    believed there, and only there."""
+    """Unix socket to listen on instead of host and port, for a proxy on this computer; example:
+    "/run/padwatch/http.sock". Only there padwatch trusts the client addresses that the proxy
+    adds."""
 
     tls: TlsSettings | None = None
-    """Certificate of the HTTP server; without it HTTP is plain."""
+    """Certificate of the HTTP server; without it HTTP is unencrypted."""
 
     data_folder: Annotated[str, StringConstraints(min_length=1)] = "var"
-    """Folder of the database, relative to where padwatch is started."""
+    """Folder of the database, relative to the working directory."""
 
     hosts: Annotated[tuple[HostName, ...], Field(max_length=32)] = ()
-    """Names that requests may ask for besides loopback's, the configured address and that of the
-    dashboard in messages; needed behind a proxy that hands the name on; example:
+    """Host names that requests may have besides loopback, the configured address and the host of
+    dashboard_url; needed behind a proxy that forwards the name; example:
     ["padwatch.plant.example"]."""
 
     limits: HttpLimitSettings = HttpLimitSettings()
-    """What one client may cost."""
+    """Limits of the requests of one client."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.socket is not None:
             if self.tls is not None:
-                raise MisfitError("is for a host and port: on a socket the proxy has TLS", "tls")
+                raise MisfitError(
+                    "applies to a host and port; on a socket the proxy has TLS", "tls"
+                )
         elif not is_loopback(self.host) and self.tls is None:
             raise MisfitError(
-                "is reached from other hosts, which needs a certificate and its key in"
+                "is reachable from other hosts, which requires a certificate and its key in"
                 " [service.tls]; else use 127.0.0.1, or a unix socket behind a proxy",
                 "host",
             )
@@ -120,23 +122,23 @@ class ServiceSettings(Settings):
 
 
 class DynamicModel(Settings):
-    """How all eight film coefficients are sought between the harmonics of the running speed."""
+    """Estimation of all eight film coefficients between the harmonics of the running speed."""
 
     band_hz: tuple[float, float] = (0.6, 12.0)
-    """Lines are taken from this band [low, high] in Hz."""
+    """Frequency band of the lines [low, high], Hz."""
 
     guard_bins: Annotated[float, Field(ge=1.0, le=50.0)] = 3.0
-    """Distance from each harmonic, in bins, within which lines are left out: runout lives there."""
+    """Distance from each harmonic, in bins, within which lines are excluded because of runout."""
 
     probe_noise_um2_per_hz: Annotated[float, Field(ge=0.0, le=1e3)] | None = None
-    """Known one-sided noise density of the shaft probes, µm²/Hz; without it the quiet band shows
-    it; example: 0.0048, which is white noise of 1.2 µm rms up to 300 Hz."""
+    """Known one-sided noise density of the shaft probes, µm²/Hz; estimated in the quiet band by
+    default; example: 0.0048, which is white noise of 1.2 µm rms up to 300 Hz."""
 
     quiet_band_hz: tuple[float, float] = (15.0, 25.0)
-    """Band [low, high] in Hz in which the shaft hardly moves, for the probes' noise."""
+    """Band [low, high] in Hz without shaft motion, in which the noise of the probes is measured."""
 
     max_relative_uncertainty: Annotated[float, Field(gt=0.0, le=1.0)] = 0.2
-    """Random standard uncertainty of a direct stiffness, as a share, beyond which there is no
+    """Maximum random standard uncertainty of a direct stiffness, as a share; otherwise there is no
     result."""
 
     @model_validator(mode="after")
@@ -144,7 +146,7 @@ class DynamicModel(Settings):
         for name in ("band_hz", "quiet_band_hz"):
             low, high = getattr(self, name)
             if not 0.0 < low < high:
-                raise MisfitError(f"must rise from above 0, got [{low:g}, {high:g}]", name)
+                raise MisfitError(f"must increase from above 0, got [{low:g}, {high:g}]", name)
         return self
 
 
@@ -155,10 +157,10 @@ class AnalysisModel(Settings):
     """Points of one Hann-tapered segment."""
 
     overlap: Annotated[float, Field(ge=0.0, le=0.9)] = 0.125
-    """Share of a segment that the next one repeats, 0 to 0.9."""
+    """Overlap of consecutive segments, as a share, 0 to 0.9."""
 
     n_segments: Annotated[int, Field(ge=1, le=1000)] = 24
-    """Segments that are averaged; 24 of 8192 points at 600 Hz are about five minutes."""
+    """Number of averaged segments; 24 of 8192 points at 600 Hz are about five minutes."""
 
     max_frequency_hz: Annotated[float, Field(gt=0.0, le=10_000.0)] = 25.0
     """Spectra are kept up to this frequency."""
@@ -167,43 +169,42 @@ class AnalysisModel(Settings):
     """Nominal frequency of the part-load vortex in multiples of the running speed."""
 
     vortex_band: tuple[float, float] = (0.2, 0.4)
-    """Orders within which the vortex peak is looked for."""
+    """Range of orders in which the vortex peak is searched."""
 
     min_segments: Annotated[int, Field(ge=2, le=1000)] = 4
-    """Fewer segments than this make a result uncertain."""
+    """Number of segments below which a result is uncertain."""
 
     min_coherence: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.9
     """Squared coherence of shaft and bearing motion below which no stiffness is given."""
 
     min_line_to_floor: Annotated[float, Field(ge=1.0, le=1e6)] = 10.0
-    """Power of a line over its surroundings that counts as excitation before there are enough
-    segments for a coherence."""
+    """Ratio of the power of a line to its surroundings that counts as excitation while there are
+    too few segments for a coherence."""
 
     min_coverage: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
     """Share of the possible segments below which a result is uncertain."""
 
     dynamic: DynamicModel = DynamicModel()
-    """How all eight film coefficients are sought."""
+    """Estimation of all eight film coefficients."""
 
     min_speed_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
-    """Share of the rated speed below which the machine counts as standing."""
+    """Share of the rated speed below which the machine counts as stopped."""
 
     speed_tolerance: Annotated[float, Field(ge=0.0005, le=0.05)] = 0.002
-    """Difference of the measured speed and the 1× line, as a share, beyond which results are
-    uncertain (speed_implausible): beside its line an amplitude reads low. Raise it for a speed
-    channel that is coarser; example: 0.005 for one in whole r/min at 200 r/min."""
+    """Difference of the measured speed and the 1× line, as a share, above which results are
+    uncertain (speed_implausible), since an amplitude beside its line is too low. Raise it for a
+    coarser speed channel; example: 0.005 for one in whole r/min at 200 r/min."""
 
     max_power_change: Annotated[float, Field(gt=0.0, le=1.0)] = 0.05
-    """Change of power within the averaging time, as a share of rated_power_mw, beyond which results
-    are uncertain (non_stationary); without rated_power_mw it is a share of the present power.
-    Example: 0.05, 35 MW of 700."""
+    """Change of power within the averaging time, as a share of rated_power_mw or else of the
+    present power, above which results are uncertain (non_stationary); example: 0.05, 35 MW of
+    700."""
 
     velocity_low_order: Annotated[float, Field(ge=0.05, le=20.0)] = 0.25
-    """Broad-band velocity of bearings counts from this multiple of the rated speed."""
+    """Lower limit of the broad-band velocity of bearings, as a multiple of the rated speed."""
 
     velocity_high_hz: Annotated[float, Field(gt=0.0, le=100_000.0)] = 1000.0
-    """Broad-band velocity of bearings counts up to this frequency, as far as the sampling rate
-    reaches."""
+    """Upper limit of the broad-band velocity of bearings, if the sampling rate allows it."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -215,7 +216,7 @@ class AnalysisModel(Settings):
             raise MisfitError(limits, "vortex_order")
         if self.min_segments > self.n_segments:
             raise MisfitError(
-                f"must not be above n_segments {self.n_segments}, or no result is ever certain",
+                f"must not be above n_segments {self.n_segments}, or all results are uncertain",
                 "min_segments",
             )
         return self
@@ -231,7 +232,7 @@ class PlantFile(Settings):
     """HTTP server and data folder of the running program."""
 
     access: AccessSettings = AccessSettings()
-    """Logins: who needs one, and how long it lasts."""
+    """Logins of people and programs."""
 
     analysis: AnalysisModel = AnalysisModel()
     """Segments and averaging."""
@@ -240,34 +241,35 @@ class PlantFile(Settings):
     """Delays and limits of the alarms of all units."""
 
     films: FilmAlarmSettings = FilmAlarmSettings()
-    """How films are compared with what they were like, and which changes are alarms."""
+    """Monitoring of film stiffness against its baseline."""
 
     capture: CaptureSettings = CaptureSettings()
-    """Samples that are kept around an alarm."""
+    """Captures of samples around alarms."""
 
     recording: RecordingSettings = RecordingSettings()
-    """All samples, kept for a while."""
+    """Continuous recording of all samples."""
 
     evidence: EvidenceSettings = EvidenceSettings()
-    """What is kept of alarms beside their samples."""
+    """Evidence of alarms beside their samples."""
 
     spectra: SpectraSettings = SpectraSettings()
-    """Spectra that are kept over time."""
+    """History of spectra."""
 
     store: StoreSettings = StoreSettings()
     """Database of results."""
 
     space: SpaceSettings = SpaceSettings()
-    """How little room on the disk is an alarm."""
+    """Free disk space below which an alarm is raised."""
 
     retention: RetentionSettings = RetentionSettings()
-    """For how long results are kept how finely."""
+    """Retention of results by resolution."""
 
     stream: StreamSettings | None = None
-    """Where `padwatch acquire` hands blocks to `padwatch analyse`; `padwatch run` needs none."""
+    """Stream of blocks from `padwatch acquire` to `padwatch analyse`; not used by `padwatch
+    run`."""
 
     delivery: DeliverySettings = DeliverySettings()
-    """Receivers of messages about alarms, besides the dashboard."""
+    """Receivers of notifications about alarms."""
 
     unit: Annotated[tuple[UnitSettings, ...], Field(min_length=1, max_length=200)]
     """Generating units."""
@@ -280,8 +282,10 @@ class PlantFile(Settings):
             for n, unit in enumerate(self.unit)
             for key in ("source", "slow_source")
         )
-        self.delivery.require_units(tuple(unit.id for unit in self.unit))
-        self.recording.require_units(tuple(unit.id for unit in self.unit))
+        units = tuple(unit.id for unit in self.unit)
+        refuse_unknown_units(self.recording.units, units, "recording", "units")
+        for n, receiver in enumerate(self.delivery.receiver):
+            refuse_unknown_units(receiver.units or (), units, "delivery", "receiver", n, "units")
         for unit in self.unit:
             if not isinstance(unit.source, ModbusVectorSettings):
                 self._check_analysis(unit)
@@ -301,7 +305,7 @@ class PlantFile(Settings):
         if self.analysis.segment_samples < n_needed:
             raise MisfitError(
                 f"for unit {unit.id} must hold {MIN_SEGMENT_TURNS} turns at rated speed,"
-                f" {n_needed} samples, to tell the vortex from 1×",
+                f" {n_needed} samples, to separate the vortex from 1×",
                 *("analysis", "segment_samples"),
             )
 

@@ -1,6 +1,5 @@
 """Stored data: database, retention, recordings, evidence, disk limits, origin."""
 
-from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -14,27 +13,26 @@ Conninfo = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
 
 
 class StoreSettings(Settings):
-    """Database of results. Without anything here it is a SQLite file in the data folder."""
+    """Database of results; by default a SQLite file in the data folder."""
 
     postgresql: Conninfo | None = None
-    """A PostgreSQL database instead, as libpq's keywords or URI, never with a password; example:
+    """PostgreSQL database to use instead, as libpq keywords or URI without a password; example:
     "host=db.plant.example dbname=padwatch user=padwatch sslmode=verify-full"."""
 
     password_file: FilePath | None = None
-    """File that holds the password of the PostgreSQL role and nothing else, for padwatch's user
-    alone (chmod 600); example: "/etc/padwatch/postgresql.password". Without it `~/.pgpass` is
-    asked, if a password is needed."""
+    """File with the password of the PostgreSQL role only, readable by padwatch's user alone (chmod
+    600); example: "/etc/padwatch/postgresql.password". Without it libpq reads `~/.pgpass`."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         if self.postgresql is None:
             if self.password_file is not None:
-                raise MisfitError("is for postgresql, which is not given", "password_file")
+                raise MisfitError("requires postgresql, which is not given", "password_file")
             return self
         keywords = _keywords(self.postgresql)
         if "password" in keywords or "sslpassword" in keywords:
             raise SecretMisfitError(
-                "must not hold a password: put it into a file and name that as password_file",
+                "must not contain a password; write it to a file and set password_file",
                 "postgresql",
             )
         if "passfile" in keywords and self.password_file is not None:
@@ -48,14 +46,14 @@ class StoreSettings(Settings):
 
 
 def _keywords(conninfo: str) -> dict[str, Any]:
-    from psycopg import ProgrammingError  # only here: whoever has a file need not wait for it
+    from psycopg import ProgrammingError  # imported late: SQLite does not need it
     from psycopg.conninfo import conninfo_to_dict
 
     try:
         return conninfo_to_dict(conninfo)
-    except ProgrammingError:  # whose message may show a password
+    except ProgrammingError:  # its message may contain the password
         raise SecretMisfitError(
-            'is no connection string of libpq, such as "host=db.plant.example dbname=padwatch"',
+            'is not a libpq connection string such as "host=db.plant.example dbname=padwatch"',
             "postgresql",
         ) from None
 
@@ -68,15 +66,15 @@ FINER = (
 
 
 class RetentionSettings(Settings):
-    """Ages beyond which results are kept coarser only, in days; 0 keeps them for ever.
+    """Retention: ages in days above which results are kept in coarser form only; 0 for no limit.
 
     One bearing takes 3 GB a year as single results, 2.2 GB as minutes, 0.25 GB as ten minutes and
-    0.05 GB as hours, at the default refresh of 12 s. Kept for ever: hours with minimum, maximum,
+    0.05 GB as hours, at the default refresh of 12 s. Never removed: hours with minimum, maximum,
     mean, count and worst quality; alarms and their history; baselines, references, the audit trail.
     """
 
     readings_days: Days = 400.0
-    """Single results of bearings: a year and a month, so that every season has its counterpart."""
+    """Single results of bearings; the default of 13 months allows comparing seasons."""
 
     minutes_days: Days = 400.0
     """Results by the minute; not below readings_days."""
@@ -88,8 +86,8 @@ class RetentionSettings(Settings):
     """Readings of films, which baselines are learned from, 0.8 GB a year for each bearing."""
 
     messages_days: Days = 400.0
-    """Messages to receivers that were delivered, refused or given up. What waits, waits; of each
-    alarm the last one is kept."""
+    """Delivered, rejected and expired notifications. Waiting ones, and the last one of each alarm,
+    are kept."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -102,70 +100,56 @@ class RetentionSettings(Settings):
 
 
 class RecordingSettings(Settings):
-    """All samples of units, kept one after the other as recordings."""
+    """Continuous recording of all samples of units."""
 
     samples: Literal["kept", "not_kept"] = "not_kept"
-    """Whether all samples are "kept" or "not_kept"; those around alarms are kept in either case,
+    """Whether all samples are "kept" or "not_kept"; captures around alarms are independent of it,
     see [capture]."""
 
     units: Annotated[tuple[Identifier, ...], Field(max_length=200)] = ()
-    """Only of these units; empty for all. Example: ["U1", "U3"]."""
+    """Units to record; all if empty. Example: ["U1", "U3"]."""
 
     folder: Annotated[str, StringConstraints(min_length=1)] | None = None
-    """Where they are kept, relative to where padwatch is started; without it "recordings" in the
-    data folder. Best on a disk of its own; example: "/srv/padwatch/recordings"."""
+    """Folder of the recordings, relative to the working directory; "recordings" in the data folder
+    by default. A separate disk is recommended; example: "/srv/padwatch/recordings"."""
 
     length_min: Annotated[int, Field(ge=1, le=60)] = 10
     """Length of each recording, minutes; a new one begins at every full multiple of it, UTC."""
 
     sync_s: Annotated[float, Field(ge=1.0, le=60.0)] = 30.0
-    """How often what was recorded is brought to the disk, s: a power cut costs no more than this
-    and what a slow disk has let wait, at most 20 s."""
+    """Interval of syncs to the disk, s. A power cut loses at most the samples of this time, and up
+    to 20 s that wait for a slow disk."""
 
     max_gb: Annotated[float, Field(gt=0.0, le=1_000_000.0)] = 100.0
-    """Space of all of them together, GB (10^9 bytes); beyond it the oldest are removed. Twelve
-    channels at 600 Hz take about half a GB a day."""
+    """Total size, GB (10^9 bytes); above it the oldest are removed. Twelve channels at 600 Hz take
+    about half a GB a day."""
 
     max_days: Annotated[float, Field(gt=0.0, le=36_500.0)] = 30.0
-    """Those are removed that are older than this, days, counted from the moment that a day of
-    recordings of the unit lies behind: no clock makes anything old before."""
-
-    def require_units(self, units: Sequence[str]) -> None:
-        """Refuse a unit that the plant does not have.
-
-        Raises
-        ------
-        MisfitError
-            If there is one.
-        """
-        for n, unit in enumerate(self.units):
-            if unit not in units:
-                words = f"is no unit of this plant, it has {', '.join(units)}"
-                raise MisfitError(words, "recording", "units", n)
+    """Age above which recordings are removed, days. It applies once a day of recordings of the unit
+    exists, so that a wrong clock removes nothing."""
 
     def keeps(self, unit: str) -> bool:
-        """Whether all samples of a unit are kept."""
+        """Return whether all samples of a unit are recorded."""
         return self.samples == "kept" and (not self.units or unit in self.units)
 
 
 class EvidenceSettings(Settings):
-    """Evidence of alarms, in the data folder: what was known when one was raised."""
+    """Evidence: the state of the plant when an alarm was raised, in the data folder."""
 
     max_gb: Annotated[float, Field(gt=0.0, le=10_000.0)] = 2.0
-    """Space of all of it together, GB (10^9 bytes); beyond it the oldest is removed that is older
-    than keep_days."""
+    """Total size, GB (10^9 bytes); above it the oldest evidence older than keep_days is removed."""
 
     hard_max_gb: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
-    """Beyond this the oldest is removed however young it is, GB; must not be below max_gb."""
+    """Size above which the oldest is removed at any age, GB; must not be below max_gb."""
 
     keep_days: Annotated[float, Field(ge=0.0, le=36_500.0)] = 30.0
-    """Younger evidence stays as long as there is room below hard_max_gb, days."""
+    """Age up to which evidence is kept below hard_max_gb, days."""
 
     max_per_alarm: Annotated[int, Field(ge=1, le=100_000)] = 200
-    """Occurrences that are kept of one alarm, so that one that chatters pushes out no other."""
+    """Number of occurrences kept of one alarm; limits the evidence of a chattering alarm."""
 
     trend_days: Annotated[float, Field(ge=0.1, le=366.0)] = 14.0
-    """How long before an alarm the readings of its film are kept with it, days."""
+    """Length of the film history that is kept with an alarm, days."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -179,19 +163,19 @@ Gigabytes = Annotated[float, Field(gt=0.0, le=1_000_000.0)]
 
 
 class SpaceSettings(Settings):
-    """Free room on the disks of the data folder, below which the alarm disk_nearly_full is raised.
+    """Free disk space below which the alarm disk_nearly_full is raised.
 
-    What is reached first counts: the share of the disk, or the gigabytes.
+    The limit that is reached first applies, the share of the disk or the gigabytes.
     """
 
     alert_free_share: Share = 0.1
-    """Free share of a disk below which it is an alert."""
+    """Free share of a disk below which the alarm is an alert."""
 
     danger_free_share: Share = 0.05
     """Free share below which it is a danger; must be below alert_free_share."""
 
     alert_free_gb: Gigabytes = 2.0
-    """Free GB (10^9 bytes) below which it is an alert; never more than a quarter of the disk."""
+    """Free GB (10^9 bytes) below which the alarm is an alert, at most a quarter of the disk."""
 
     danger_free_gb: Gigabytes = 1.0
     """Free GB below which it is a danger, at most an eighth of the disk; must be below
@@ -200,10 +184,7 @@ class SpaceSettings(Settings):
     @model_validator(mode="after")
     def _check(self) -> Self:
         for unit in ("share", "gb"):
-            alert, danger = (
-                getattr(self, f"alert_free_{unit}"),
-                getattr(self, f"danger_free_{unit}"),
-            )
+            alert, danger = (getattr(self, f"{level}_free_{unit}") for level in ("alert", "danger"))
             if not danger < alert:
                 limit = f"must be below alert_free_{unit}, {alert:g}"
                 raise MisfitError(limit, f"danger_free_{unit}")
@@ -211,7 +192,7 @@ class SpaceSettings(Settings):
 
 
 class Origin(StrEnum):
-    """Where samples come from; a replay never shares a database with the live plant."""
+    """Origin of samples; a replay never shares a database with the live plant."""
 
     LIVE = "live"
     REPLAY = "replay"

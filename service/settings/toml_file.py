@@ -1,9 +1,11 @@
-"""TOML files: parsing, and the line of each key."""
+"""TOML files: parsing, validation, and one message with its line for each mistake."""
 
 import json
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping
+from datetime import datetime
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -11,7 +13,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from acquisition.delivery.small_file import read_small_file
-from service.settings.base import MisfitError, Settings
+from service.settings.base import MisfitError, MissingError, SecretMisfitError, Settings
 
 Location: TypeAlias = tuple[int | str, ...]
 """Keys, and after each array the number of the element."""
@@ -21,14 +23,14 @@ KEY = re.compile(r"^\s*([A-Za-z0-9_.-]+)\s*=")
 
 
 def line_of(location: Location, text: str) -> int:
-    """Line of a key, or of the innermost table around it that stands on a line of its own."""
+    """Return the line of a key, or of the innermost table around it with its own line."""
     lines = dict(_lines(text))
     starts = (location[:n] for n in range(len(location), 0, -1))
     return next((lines[start] for start in starts if start in lines), 1)
 
 
 def _lines(text: str) -> Iterator[tuple[Location, int]]:
-    """Line numbers of tables and keys, as far as they stand at the start of a line."""
+    """Yield the line numbers of the tables and keys at the start of a line."""
     table: Location = ()
     counts: dict[Location, int] = {}
     for number, line in enumerate(text.split("\n"), start=1):
@@ -42,7 +44,7 @@ def _lines(text: str) -> Iterator[tuple[Location, int]]:
 
 
 def _table_location(names: list[str], is_array: bool, counts: dict[Location, int]) -> Location:
-    """Where a header leads: names, and after each array of tables the number of its element."""
+    """Return the location of a header: names, and the element number after array tables."""
     location: Location = ()
     for position, name in enumerate(names):
         location = (*location, name.strip('"'))
@@ -53,64 +55,200 @@ def _table_location(names: list[str], is_array: bool, counts: dict[Location, int
     return location
 
 
-MAX_BYTES = 1_000_000
-_MAX_SHOWN = 60
+Schema: TypeAlias = dict[str, Any]
+"""JSON schema, or a part of it."""
+
+
+@cache
+def schema_of(model: type[Settings]) -> Schema:
+    """Return the JSON schema of a file, with meaning, limits and defaults of every key."""
+    return model.model_json_schema()
+
+
+def description(schema: Schema, location: Location) -> str:
+    """Return the meaning of a key in one line; empty if the key is unknown."""
+    node, text = schema, ""
+    for part in location:
+        step = _step(schema, node, part)
+        if step is None:
+            return ""
+        text = str(step.get("description", ""))
+        node = step
+    return " ".join(text.split())
+
+
+def known_keys(schema: Schema, location: Location) -> list[str]:
+    """Return the keys that a table may have."""
+    node: Schema | None = schema
+    for part in location:
+        node = _step(schema, node, part) if node is not None else None
+    return sorted(
+        {key for option in _options(schema, node or {}) for key in option.get("properties", {})}
+    )
+
+
+def _step(schema: Schema, node: Schema, part: int | str) -> Schema | None:
+    for option in _options(schema, node):
+        if isinstance(part, int) and "items" in option:
+            items: Schema = option["items"]
+            return items
+        if isinstance(part, str) and part in option.get("properties", {}):
+            properties: dict[str, Schema] = option["properties"]
+            return properties[part]
+    return None
+
+
+def _options(schema: Schema, node: Schema) -> list[Schema]:
+    """Resolve references and alternatives to the schemas behind them."""
+    if "$ref" in node:
+        name = str(node["$ref"]).rsplit("/", 1)[-1]
+        return _options(schema, schema["$defs"][name])
+    alternatives = [*node.get("anyOf", ()), *node.get("oneOf", ())]
+    if alternatives:
+        return [leaf for option in alternatives for leaf in _options(schema, option)]
+    return [node]
+
+
+MAX_SHOWN = 60
+"""Characters of a wrong value that are shown."""
+
+UNION_ERRORS = ("union_tag_invalid", "union_tag_not_found")
+
+
+def is_echo(error: ErrorDetails) -> bool:
+    """Return whether a list is too short only because its elements are reported as wrong."""
+    return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
+
+
+def located(error: ErrorDetails, data: Mapping[str, Any]) -> Location:
+    """Return the place of a mistake in the file."""
+    location = _without_tags(error["loc"], data)
+    reason = error.get("ctx", {}).get("error")
+    if isinstance(reason, MisfitError):
+        location += reason.at
+    return (*location, "kind") if error["type"] in UNION_ERRORS else location
+
+
+def sentence(
+    schema: Schema, error: ErrorDetails, location: Location, data: Mapping[str, Any]
+) -> str:
+    """Return the message of a mistake."""
+    key = "".join(_entry(part) for part in location).lstrip(".")
+    found, value = _value(data, location)
+    shown = f"{key} = {_shown(value)}"
+    meaning = description(schema, location)
+    if error["type"] == "extra_forbidden":
+        return f"{shown}: unknown key; known here: {', '.join(known_keys(schema, location[:-1]))}"
+    is_missing = isinstance(error.get("ctx", {}).get("error"), MissingError)
+    if error["type"] == "value_error" and not is_missing:
+        if isinstance(error["ctx"]["error"], SecretMisfitError):
+            return f"{key}: {error['ctx']['error']}"
+        return f"{shown if found else f'{key} (by default)'}: {error['ctx']['error']}"
+    if not found:
+        problem = f"{key} is missing"
+    elif error["type"] == "union_tag_invalid":
+        problem = f"{shown}: must be {error['ctx']['expected_tags'].replace(', ', ' or ')}"
+    else:
+        problem = f"{shown}: {error['msg']}"
+    return f"{problem} — {meaning}" if meaning else problem
+
+
+def _entry(part: int | str) -> str:
+    """Format one step of a place on one line; a key may be any text."""
+    if isinstance(part, int):
+        return f"[{part + 1}]"
+    return f".{part}" if part.isprintable() else f".{part!r}"
+
+
+def _shown(value: Any) -> str:
+    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    text = value.isoformat() if isinstance(value, datetime) else text
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
+
+
+def _value(data: Any, location: Location) -> tuple[bool, Any]:
+    """Return whether the file has a value at a place, and the value."""
+    for part in location:
+        inside = isinstance(data, dict) and part in data
+        listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
+        if not inside and not listed:
+            return False, None
+        data = data[part]
+    return True, data
+
+
+def _without_tags(location: Location, data: Any) -> Location:
+    """Remove the union tags that pydantic adds to the keys of the file."""
+    kept: Location = ()
+    for part in location:
+        _, table = _value(data, kept)
+        if not (isinstance(table, dict) and part not in table and table.get("kind") == part):
+            kept = (*kept, part)
+    return kept
+
+
+MAX_FILE_BYTES = 4_000_000
+"""Limits memory if the path is wrong (a device, a recording); far above the size of any file."""
+
+FOLDER = "folder"
+"""Key of the validation context: the folder of the file, to which paths in it are relative."""
+
+TOO_DEEP = "nested too deeply"
+
+SYNTAX_PLACE = re.compile(r"^(.*) \(at line (\d+), (column \d+)\)$", re.DOTALL)
 
 Model = TypeVar("Model", bound=Settings)
 
 
 class TomlFileError(Exception):
-    """A file that cannot be used; the message has one line for each mistake."""
+    """A file cannot be used; the message has one line for each mistake."""
 
 
-def load_toml(path: Path, model: type[Model], tags: Sequence[str] = ()) -> Model:
-    """Read and check a file.
+def load_toml(path: Path, model: type[Model]) -> Model:
+    """Read and validate a file.
 
-    Parameters
-    ----------
-    tags
-        What pydantic puts into a place for the kinds of a union, and the file does not have.
-
-    Raises
-    ------
-    TomlFileError
-        If it cannot be read or anything in it is wrong.
+    Raises `TomlFileError` if the file cannot be read or is wrong; the message names every mistake.
     """
     text = _read(path)
+    data = _parsed(path, text)
     try:
-        data = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise TomlFileError(f"{path}: not TOML: {error}") from error
-    try:
-        # JSON, because only there strict (no text for a number) lets a list be a tuple
-        return model.model_validate_json(json.dumps(data, default=str), strict=True)
-    except RecursionError as error:  # of dotted keys, which TOML reads without going deep
-        raise TomlFileError(f"{path}: nested too deeply") from error
+        # only in JSON does strict mode (no text or boolean for a number) accept a list as a tuple
+        return model.model_validate_json(
+            json.dumps(data, default=str), strict=True, context={FOLDER: path.parent}
+        )
+    except RecursionError as error:  # from dotted keys, which TOML parses without recursion
+        raise TomlFileError(f"{path}: {TOO_DEEP}") from error
     except ValidationError as error:
-        mistakes = error.errors(include_url=False)
-        raise TomlFileError("\n".join(_line(path, text, e, tags) for e in mistakes)) from error
+        if error.errors()[0]["type"] == "json_invalid":
+            raise TomlFileError(f"{path}: {TOO_DEEP}") from error
+        schema = schema_of(model)
+        mistakes = [(located(e, data), e) for e in error.errors() if not is_echo(e)]
+        lines = (
+            f"{path}:{line_of(at, text)}: {sentence(schema, e, at, data)}" for at, e in mistakes
+        )
+        raise TomlFileError("\n".join(lines)) from error
 
 
 def _read(path: Path) -> str:
     try:
-        content = read_small_file(path, MAX_BYTES)
+        content = read_small_file(path, MAX_FILE_BYTES)
+        return content.decode()
     except OSError as error:
         raise TomlFileError(f"{path}: {error.strerror}") from error
-    try:
-        return content.decode()
     except UnicodeDecodeError as error:
-        raise TomlFileError(f"{path}: not UTF-8 text at byte {error.start}") from error
+        line = content.count(b"\n", 0, error.start) + 1
+        raise TomlFileError(f"{path}:{line}: not UTF-8 text at byte {error.start}") from error
 
 
-def _line(path: Path, text: str, error: ErrorDetails, tags: Sequence[str]) -> str:
-    at: Location = tuple(part for part in error["loc"] if part not in tags)
-    reason: Any = error.get("ctx", {}).get("error")
-    at += reason.at if isinstance(reason, MisfitError) else ()
-    key = "".join(f"[{p + 1}]" if isinstance(p, int) else f".{p}" for p in at).lstrip(".")
-    words = str(reason) if isinstance(reason, MisfitError) else error["msg"]
-    value = error["input"]
-    for part in reason.at if isinstance(reason, MisfitError) else ():
-        value = value.get(part) if isinstance(value, dict) else None
-    shown = f" = {value!r}"[:_MAX_SHOWN] if isinstance(value, int | float | str) else ""
-    said = f"{key}{shown}: {words}".replace("\n", "\\n")  # a key may hold anything
-    return f"{path}:{line_of(at, text)}: {said}"
+def _parsed(path: Path, text: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        place = SYNTAX_PLACE.match(str(error))
+        last = text.count("\n") + 1
+        line, words = (place[2], f"{place[1]} ({place[3]})") if place else (last, error)
+        raise TomlFileError(f"{path}:{line}: not TOML: {words}") from error
+    except ValueError as error:
+        raise TomlFileError(f"{path}: an integer of thousands of digits") from error
+    except RecursionError as error:
+        raise TomlFileError(f"{path}: {TOO_DEEP}") from error

@@ -18,25 +18,23 @@ from core.machine.response import (
     ResponseTable,
 )
 from service.settings.base import MisfitError, Settings
+from service.settings.toml_file import FOLDER
 
 COLUMNS = ("frequency_hz", "magnitude", "phase_deg")
 MAX_SHEET_BYTES = 1_000_000
 
 
 class SheetError(Exception):
-    """A calibration sheet that cannot be used; the message has file, line and what is wrong."""
+    """A calibration sheet cannot be used; the message has file, line and fault."""
 
 
 def read_calibration_sheet(path: Path) -> ResponseTable:
-    """Read a sheet whose first line names its columns and whose others are points.
+    """Read a sheet: a line with the names of the columns, then one line per point.
 
-    Lines that begin with # and empty lines at the end count for nothing.
+    Lines that begin with # and empty lines at the end are ignored.
 
-    Raises
-    ------
-    SheetError
-        If the file cannot be read, a column or a value is missing, a number is none or not finite,
-        frequencies do not rise from above zero, or a magnitude is not above zero.
+    Raises `SheetError` if the file cannot be read, a column or a value is missing, a value is not a
+    finite number, frequencies do not increase from above zero, or a magnitude is not above zero.
     """
     rows = _rows(path, _read(path))
     number, header = next(rows, (1, []))
@@ -45,9 +43,12 @@ def read_calibration_sheet(path: Path) -> ResponseTable:
         raise SheetError(f"{path}:{number}: columns must be {wanted}, got {', '.join(header)}")
     points: list[tuple[float, ...]] = []
     for number, cells in rows:
-        values = dict(zip(header, _numbers(path, number, header, cells), strict=True))
-        point = tuple(values[name] for name in COLUMNS)
-        _check(f"{path}:{number}", point, points)
+        place = f"{path}:{number}"
+        if len(cells) != len(header):
+            raise SheetError(f"{place}: needs {len(header)} values, got {len(cells)}")
+        row = dict(zip(header, cells, strict=True))
+        point = tuple(_number(f"{place}: {name}", row[name]) for name in COLUMNS)
+        _check(place, point, points)
         points.append(point)
     if len(points) < 2:
         raise SheetError(f"{path}:{number}: needs two points or more, got {len(points)}")
@@ -67,7 +68,7 @@ def _read(path: Path) -> str:
 
 
 def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
-    """Line numbers and cells."""
+    """Yield line numbers and cells."""
     for number, line in enumerate(text.splitlines(), start=1):
         if line.startswith("#"):
             continue
@@ -77,21 +78,12 @@ def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
             raise SheetError(f"{path}:{number}: {error}") from error
 
 
-def _numbers(path: Path, number: int, header: list[str], cells: list[str]) -> list[float]:
-    if len(cells) != len(header):
-        raise SheetError(f"{path}:{number}: needs {len(header)} values, got {len(cells)}")
-    return [
-        _number(f"{path}:{number}: {name}", cell) for name, cell in zip(header, cells, strict=True)
-    ]
-
-
 def _number(place: str, cell: str) -> float:
-    if not cell:
-        raise SheetError(f"{place} is missing; leave out the whole point, or measure it")
     try:
         value = float(cell)
     except ValueError as error:
-        raise SheetError(f"{place} must be a number, got {cell!r}") from error
+        fault = f"must be a number, got {cell!r}" if cell else "is missing; complete the point"
+        raise SheetError(f"{place} {fault}") from error
     if not math.isfinite(value):
         raise SheetError(f"{place} must be finite, got {cell}")
     return value
@@ -99,19 +91,11 @@ def _number(place: str, cell: str) -> float:
 
 def _check(place: str, point: tuple[float, ...], before: list[tuple[float, ...]]) -> None:
     frequency_hz, magnitude, _ = point
-    if frequency_hz <= 0.0:
-        raise SheetError(f"{place}: frequency_hz must be above 0, got {frequency_hz:g}")
-    if before and frequency_hz <= before[-1][0]:
-        raise SheetError(
-            f"{place}: frequency_hz must rise from line to line,"
-            f" got {frequency_hz:g} after {before[-1][0]:g}"
-        )
+    if frequency_hz <= (before[-1][0] if before else 0.0):
+        lowest = f"the one before, {before[-1][0]:g}" if before else "0"
+        raise SheetError(f"{place}: frequency_hz must be above {lowest}, got {frequency_hz:g}")
     if magnitude <= 0.0:
         raise SheetError(f"{place}: magnitude must be above 0, got {magnitude:g}")
-
-
-FOLDER = "folder"
-"""Key of the validation context: where the plant file lies, and so the sheets it names."""
 
 
 class HighPassSettings(Settings):
@@ -121,16 +105,16 @@ class HighPassSettings(Settings):
     """Always "high_pass"."""
 
     corner_hz: Annotated[float, Field(ge=0.001, le=100.0)]
-    """Of order 1 the -3 dB frequency, of order 2 the natural frequency, Hz; example: 0.5."""
+    """The -3 dB frequency of order 1, the natural frequency of order 2, Hz; example: 0.5."""
 
     order: Literal[1, 2] = 1
     """1 for a single time constant, 2 for a seismic mass or a double time constant."""
 
     damping: Annotated[float, Field(ge=0.05, le=5.0)] = BUTTERWORTH_DAMPING
-    """Share of critical damping, of order 2 alone; default: -3 dB at the natural frequency."""
+    """Share of critical damping, for order 2; default: -3 dB at the natural frequency."""
 
     def response(self) -> Response:
-        """Describe the part as the numerics see it."""
+        """Return the part in core's terms."""
         return HighPass(self.corner_hz, self.order, self.damping)
 
 
@@ -147,7 +131,7 @@ class ResonanceSettings(Settings):
     """Share of critical damping; example: 0.02."""
 
     def response(self) -> Response:
-        """Describe the part as the numerics see it."""
+        """Return the part in core's terms."""
         return Resonance(self.natural_hz, self.damping)
 
 
@@ -158,9 +142,9 @@ class SheetSettings(Settings):
     """Always "sheet"."""
 
     file: Annotated[str, Field(min_length=1, max_length=1000)]
-    """CSV with columns frequency_hz, magnitude and phase_deg, seen from the plant file's folder;
-    magnitude is 1 where the nominal sensitivity is exact, phase is positive where the reading leads
-    the motion; example: "ujb_bearing_x.csv"."""
+    """CSV with columns frequency_hz, magnitude and phase_deg, relative to the folder of the plant
+    file. The magnitude is 1 if the nominal sensitivity is exact; the phase is positive if the
+    reading leads the motion. Example: "ujb_bearing_x.csv"."""
 
     _table: ResponseTable = PrivateAttr()
 
@@ -174,7 +158,7 @@ class SheetSettings(Settings):
         return self
 
     def response(self) -> Response:
-        """Describe the part as the numerics see it."""
+        """Return the part in core's terms."""
         return self._table
 
 
@@ -185,7 +169,7 @@ ResponseSettings: TypeAlias = Annotated[
 
 
 def response_of(parts: Sequence[ResponseSettings]) -> Response | None:
-    """Describe all parts together as the numerics see them; none is a flat response."""
+    """Return all parts in core's terms; an empty tuple is a flat response."""
     if not parts:
         return None
     return ResponseChain(tuple(part.response() for part in parts))

@@ -1,4 +1,4 @@
-"""A generating unit, and whether its source, channels and alarms fit each other."""
+"""A generating unit, and checks that its source, channels and alarms are consistent."""
 
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Literal, Self
@@ -29,20 +29,7 @@ def require_source_fit(
     channels: Sequence[str],
     slow: Sequence[str],
 ) -> None:
-    """Refuse a source that lacks a channel, or a second device that gives none.
-
-    Parameters
-    ----------
-    beside
-        The device that slow channels are polled from, if there is one.
-    channels, slow
-        Ids of the unit's waveform and slow channels.
-
-    Raises
-    ------
-    MisfitError
-        Saying which, and what is needed.
-    """
+    """Refuse a source, or a second device beside it, that does not fit the ids of the channels."""
     if beside is not None:
         beside.require_fit(slow)
     own = [id_ for id_ in slow if beside is None or id_ not in beside.mapped_channels]
@@ -56,18 +43,7 @@ def require_source_fit(
 
 
 def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]]) -> None:
-    """Refuse a serial line that two devices of the plant file are read on: it has one master.
-
-    Parameters
-    ----------
-    readers
-        Where in the file each device stands, and its settings.
-
-    Raises
-    ------
-    MisfitError
-        Naming who reads it already.
-    """
+    """Refuse a serial line of two devices (location, settings): a line has one master."""
     taken: dict[str, tuple[int | str, ...]] = {}
     for at, device in readers:
         if not isinstance(device, ModbusLinkSettings) or device.device in (None, "pty"):
@@ -76,8 +52,8 @@ def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]])
         if line in taken:
             _, number, key = taken[line]
             raise MisfitError(
-                f"is read by {key} of unit[{int(number) + 1}] already: a serial line has one"
-                " source; give each its own, or read the others over a gateway, with host",
+                f"is read by {key} of unit[{int(number) + 1}] already; a line has one source,"
+                " so use another line, or a gateway with host",
                 *at,
                 "device",
             )
@@ -85,7 +61,7 @@ def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]])
 
 
 FROM_WAVEFORMS = ("shaft_overall_um_pp", "bearing_overall_mm_s_rms")
-"""Limits of what a rack that gives amplitudes does not give."""
+"""Limits of quantities that a vector rack does not measure."""
 
 ZONES = ("shaft_um_pp", "shaft_max_um_pk", "bearing_mm_s_rms")
 
@@ -97,15 +73,9 @@ def require_alarm_fit(
     channels: Iterable[ChannelSettings],
     bearings: Sequence[BearingSettings],
 ) -> None:
-    """Refuse limits of what is not measured.
-
-    Raises
-    ------
-    MisfitError
-        With the place of the first.
-    """
+    """Refuse limits of quantities that are not measured."""
     if unit == PLANT:
-        raise MisfitError("is kept for alarms of the whole plant; choose another", "id")
+        raise MisfitError("is reserved for alarms of the whole plant; choose another", "id")
     is_rack = isinstance(source, ModbusVectorSettings)
     probes = {c.id for c in channels if c.transducer is Transducer.PROXIMITY_PROBE}
     for number, bearing in enumerate(bearings):
@@ -154,30 +124,29 @@ class UnitSettings(Settings):
     """Unique within the plant; example: "U07"."""
 
     name: Annotated[str, StringConstraints(min_length=1, max_length=80)]
-    """As people call it; example: "Unit 7"."""
+    """Display name; example: "Unit 7"."""
 
     rated_speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)]
     """Rated running speed in r/min, 20 to 1500; example: 92.3."""
 
     rated_power_mw: Annotated[float, Field(gt=0.0, le=2000.0)] | None = None
-    """Rated active power in MW, at most 2000; with it and power_channel, operating states are told
-    apart, films compared under like conditions, and changes of load judged as a share of it.
-    Example: 700.0."""
+    """Rated active power in MW, at most 2000; needed with power_channel for operating states and
+    for monitoring films, and as the reference of load changes; example: 700.0."""
 
     rate_hz: Annotated[float, Field(ge=20.0, le=100_000.0)] = 600.0
-    """Samples per second and channel; example: 600.0. Without effect where registers are polled:
-    there it is one over poll_period_s."""
+    """Samples per second and channel; example: 600.0. No effect on polled registers, whose rate is
+    one over poll_period_s."""
 
     block_samples: Annotated[int, Field(ge=1, le=10_000)] = BLOCK_SAMPLES
-    """Samples of each channel that share one verdict on the channel and one set of slow values; a
-    DAQ's slots should be as long. Example: 50, a twelfth of a second at 600 Hz."""
+    """Samples of each channel in a block, which has one quality per channel and one set of slow
+    values; should equal the slot length of the DAQ. Example: 50, 1/12 s at 600 Hz."""
 
     turbine: Literal["francis", "kaplan"] = "francis"
-    """"francis" or "kaplan". A Kaplan turbine has no part-load vortex: that order is off."""
+    """"francis" or "kaplan"; the order of the part-load vortex is evaluated for Francis only."""
 
     rotation: Literal["x_to_y", "y_to_x"] = "x_to_y"
-    """Which way the shaft turns, seen in the bearings' axes: "x_to_y" or "y_to_x". An orbit that
-    turns the other way is a sign of exchanged transducers."""
+    """Direction of rotation in the axes of the bearings: "x_to_y" or "y_to_x". An orbit in the
+    other direction may show exchanged transducers."""
 
     speed_channel: Identifier | None = None
     """Slow channel (r/min) of the running speed; without it and a key-phase, the 1× line
@@ -188,16 +157,15 @@ class UnitSettings(Settings):
     and the shaft's angle that slow_roll needs; example: "kp"."""
 
     power_channel: Identifier | None = None
-    """Slow channel (MW) of the active power. While it has no value, results are uncertain
-    (power_unknown); without it a unit counts as steady by its speed alone."""
+    """Slow channel (MW) of the active power. Results are uncertain while it has no value
+    (power_unknown); without the channel, only the speed decides whether a unit is steady."""
 
     source: SourceSettings
-    """Where the samples come from, by kind: "modbus_ring" (a streaming DAQ), "modbus_fifo"
-    (queues), "modbus_polled" (registers), "modbus_vector" (a rack that gives amplitudes) or
-    "can" or "simulated"."""
+    """Source of the samples, by kind: "modbus_ring" (a streaming DAQ), "modbus_fifo" (queues),
+    "modbus_polled" (registers), "modbus_vector" (a rack with amplitudes), "can" or "simulated"."""
 
     slow_source: SlowDeviceSettings | None = None
-    """A second device that slow channels are polled from, where the first has none."""
+    """Second device from which slow channels are polled."""
 
     channel: Annotated[tuple[ChannelSettings, ...], Field(min_length=1, max_length=32)]
     """Waveform channels in wire order, at most 32."""
@@ -213,7 +181,7 @@ class UnitSettings(Settings):
 
     @property
     def sampling_hz(self) -> float:
-        """Samples of each channel in a second: polls, where registers are polled."""
+        """Samples of each channel per second; polls per second for polled registers."""
         if isinstance(self.source, ModbusPolledSettings | ModbusVectorSettings):
             return self.source.rate_hz
         return self.rate_hz
@@ -250,7 +218,9 @@ class UnitSettings(Settings):
             if id_ not in known:
                 raise MisfitError(_not_among(known), "bearing", number, key)
             if id_ in self._key_phases():
-                raise MisfitError("is a key_phase channel, no vibration", "bearing", number, key)
+                raise MisfitError(
+                    "is a key_phase channel, not a vibration channel", "bearing", number, key
+                )
         refuse_twice(("bearing", number, key, id_) for key, id_ in used)
 
     def _key_phases(self) -> list[str]:
@@ -260,7 +230,7 @@ class UnitSettings(Settings):
         if self.key_phase is not None and self.key_phase not in self._key_phases():
             words = ", ".join(self._key_phases()) or "none"
             raise MisfitError(
-                f'needs a channel with transducer "key_phase"; there is {words}', "key_phase"
+                f'must have transducer "key_phase"; such channels: {words}', "key_phase"
             )
 
     def _check_slow(self, id_: str | None, unit: str, *at: int | str) -> None:
@@ -268,7 +238,7 @@ class UnitSettings(Settings):
         if id_ is not None and id_ not in units:
             raise MisfitError(_not_among(units), *at)
         if id_ is not None and units[id_] != unit:
-            raise MisfitError(f"is a slow channel in {units[id_]}, needed is one in {unit}", *at)
+            raise MisfitError(f"is a slow channel in {units[id_]}, must be one in {unit}", *at)
 
     def _check_simulation(self) -> None:
         simulation = self.simulation

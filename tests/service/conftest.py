@@ -22,9 +22,10 @@ from core.condition.cells import BearingCondition
 from core.condition.operating_state import OperatingLimits, OperatingState
 from core.machine.unit import Estimator
 from core.quality import Reason
-from service.settings.loading import PlantFileError, load_plant_file
+from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
+from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
 from service.store.postgres.address import PostgresAddress
 from service.store.postgres.database import PostgresDatabase
@@ -91,7 +92,7 @@ def mistakes(tmp_path: Path) -> Callable[[str | bytes], list[str]]:
     def refused(text: str | bytes) -> list[str]:
         path = tmp_path / "plant.toml"
         path.write_bytes(text.encode() if isinstance(text, str) else text)
-        with pytest.raises(PlantFileError) as refusal:
+        with pytest.raises(TomlFileError) as refusal:
             load_plant_file(path)
         lines = str(refusal.value).split("\n")
         assert all(line.startswith(f"{path}:") for line in lines)

@@ -12,6 +12,7 @@ from service.api.problems import problem_responses
 from service.api.values import ApiModel, Time
 from service.notifications.sender import ReceiverView, SenderStatus
 from service.runtime.times import rfc3339
+from service.settings.notifications import ChannelKind
 from service.store.access.identities import Permission
 from service.store.outbox import Backlog, LetterState, StoredLetter
 
@@ -42,7 +43,7 @@ class ReceiverModel(ApiModel):
     id: Annotated[str, Field(examples=["control-room"])]
     """Name in the plant file; for mail, with the recipient."""
 
-    kind: Literal["webhook", "smtp"] | None
+    kind: ChannelKind | None
     """Channel; null if the receiver is no longer in the plant file."""
 
     address: Annotated[str | None, Field(examples=["https://alarms.example"])]
@@ -139,8 +140,8 @@ def _receiver(view: ReceiverView) -> ReceiverModel:
     status = view.status or SenderStatus()
     return ReceiverModel(
         id=view.name,
-        kind=receiver.kind if receiver else None,
-        address=receiver.address if receiver else None,
+        kind=receiver.settings.kind if receiver else None,
+        address=receiver.channel.address if receiver else None,
         state=status.state.value if view.status else "not_in_the_plant_file",
         is_failing=status.n_failures > 0,
         n_failures=status.n_failures,

@@ -16,7 +16,7 @@ from service.api.parameters import TimeRange
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.values import ApiModel, Time
 from service.live.live_view import UnitStatus
-from service.runtime.metrics import Seen
+from service.runtime.metrics import HistogramState
 from service.runtime.times import rfc3339
 from service.settings.loading import plant_file_schema
 from service.settings.units import UnitSettings
@@ -278,16 +278,16 @@ def _health(context: Context, settings: UnitSettings) -> SourceHealthModel:
         n_failed=context.live.status(settings.id).n_failed,
         rate_hz=settings.sampling_hz,
         poll_period_s=getattr(settings.source, "poll_period_s", None),
-        polls=None if source is None else _polls(source.polls.seen()),
+        polls=None if source is None else _polls(source.polls.state()),
         refused_frames={} if source is None else dict(source.refused_frames),
     )
 
 
-def _polls(seen: Seen) -> PollsModel | None:
-    if seen.newest_s is None:
+def _polls(state: HistogramState) -> PollsModel | None:
+    if state.newest_s is None:
         return None
-    n_polls = seen.n_up_to[-1]
-    return PollsModel(n=n_polls, newest_s=seen.newest_s, mean_s=seen.sum_s / n_polls)
+    n_polls = state.n_up_to[-1]
+    return PollsModel(n=n_polls, newest_s=state.newest_s, mean_s=state.sum_s / n_polls)
 
 
 def gap_router(context: Context) -> APIRouter:

@@ -7,15 +7,15 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, PrivateAttr, StringConstraints, ValidationInfo, model_validator
 
 from service.settings.base import Identifier, MisfitError, Settings
-from service.settings.transducers import FOLDER
+from service.settings.toml_file import FOLDER
 
 DBC_NAME = "[A-Za-z_][A-Za-z0-9_]{0,127}"
 
 SignalPath = Annotated[str, StringConstraints(pattern=rf"^{DBC_NAME}\.{DBC_NAME}$")]
-"""A signal of the DBC as "Message.Signal"."""
+"""Signal of the DBC file, as "Message.Signal"."""
 
 SampleSignals = SignalPath | Annotated[tuple[SignalPath, ...], Field(min_length=1, max_length=64)]
-"""One signal, or one for each sample that a frame carries, the oldest first."""
+"""One signal, or one for each sample of a frame, the oldest first."""
 
 OF_A_DBC = (
     "signals",
@@ -27,31 +27,31 @@ OF_A_DBC = (
     "seconds",
     "microseconds",
 )
-"""Keys that name signals, which a profile does by itself."""
+"""Keys with names of signals; not used with a profile."""
 
 LISTENING_IS_SET = ("socketcan",)
-"""Interfaces whose bit rates are set in the system, not by who listens."""
+"""Interfaces whose bit rates are set in the operating system."""
 
 WITHOUT_STAMPS = ("slcan",)
-"""Interfaces that do not say when frames came."""
+"""Interfaces without time stamps of frames."""
 
 
 class CanSettings(Settings):
     """A measuring device on a CAN or CAN FD bus; padwatch only listens."""
 
     kind: Literal["can"]
-    """This source's kind."""
+    """Always "can"."""
 
     interface: Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
-    """python-can's name of the interface; example: "socketcan", "slcan", "pcan", "kvaser"."""
+    """Name of the interface in python-can; example: "socketcan", "slcan", "pcan", "kvaser"."""
 
     channel: Annotated[str, StringConstraints(min_length=1, max_length=255)]
-    """What that interface calls a channel; example: "can0", "/dev/ttyACM0",
-    "socket://192.0.2.17:4001", "PCAN_USBBUS1"."""
+    """Channel of the interface; example: "can0", "/dev/ttyACM0", "socket://192.0.2.17:4001",
+    "PCAN_USBBUS1"."""
 
     bitrate: Annotated[int, Field(ge=5_000, le=1_000_000)] | None = None
-    """Bits per second of the bus; not for socketcan, whose rate the system sets. Example: 500000.
-    """
+    """Bits per second of the bus; not for socketcan, whose rate is set in the operating system.
+    Example: 500000."""
 
     fd: bool = False
     """Whether the bus carries CAN FD frames."""
@@ -60,67 +60,66 @@ class CanSettings(Settings):
     """Bits per second of the data phase of CAN FD frames; example: 2000000."""
 
     options: dict[Identifier, str | int | float | bool] = Field(default={}, max_length=32)
-    """Further arguments of python-can's interface, handed on as they are; example:
-    { tty_baudrate = 2000000 }."""
+    """Further arguments of python-can's interface; example: { tty_baudrate = 2000000 }."""
 
     dbc: Annotated[str, StringConstraints(min_length=1, max_length=1000)] | None = None
-    """DBC file that describes the frames, seen from the plant file's folder; example:
-    "unit7.dbc"."""
+    """DBC file of the frames, relative to the folder of the plant file; example: "unit7.dbc"."""
 
     profile: Literal["padwatch_int16", "padwatch_float32"] | None = None
-    """Instead of dbc and signals: the messages of padwatch's own simulated DAQ for this unit's
-    channels, as counts or as engineering units."""
+    """Messages of padwatch's simulated DAQ for the channels of the unit, as counts or as
+    engineering units, instead of dbc and signals."""
 
     signals: dict[Identifier, SampleSignals] = Field(default={}, max_length=32)
-    """For each waveform channel its signal, "Message.Signal", or a list of them where a frame has
-    several samples; example: { ujb_shaft_x = "WAVE_0.ujb_shaft_x" }."""
+    """Signal of each waveform channel, "Message.Signal", or a list if a frame has several samples;
+    example: { ujb_shaft_x = "WAVE_0.ujb_shaft_x" }."""
 
     slow: dict[Identifier, SignalPath] = Field(default={}, max_length=50)
-    """For each slow channel its signal; example: { speed = "STATUS.speed" }."""
+    """Signal of each slow channel; example: { speed = "STATUS.speed" }."""
 
     counters: Annotated[tuple[SignalPath, ...], Field(max_length=128)] = ()
-    """Counter signals, at most one for each message: all waveform messages have one, or none has.
-    Without, frames are counted and losses are found by the clock alone."""
+    """Counter signals, at most one for each message; all waveform messages have one, or none.
+    Without them frames are counted, and losses are detected by the clock."""
 
     counter_counts: Literal["samples", "frames"] = "samples"
     """Whether these counters count "samples" or "frames"."""
 
     frame_samples: Annotated[tuple[SignalPath, ...], Field(max_length=32)] = ()
-    """Signals that say how many samples of a multi-sample frame are there, if it can be fewer."""
+    """Signals with the number of samples in a frame, if it varies."""
 
     epoch: SignalPath | None = None
-    """Signal that changes when the device begins to count anew."""
+    """Signal that changes when the device restarts its counters."""
 
     ok_bits: SignalPath | None = None
     """Signal whose bit c, the lowest first, is set while waveform channel c is healthy."""
 
     seconds: SignalPath | None = None
-    """Signal with the UTC seconds since 1970 of the sample that its message belongs to."""
+    """Signal with the UTC seconds since 1970 of the sample of its message."""
 
     microseconds: SignalPath | None = None
-    """Signal with the microseconds to it; needed with seconds."""
+    """Signal with the microseconds of that time; required with seconds."""
 
     hold_samples: Annotated[int, Field(ge=1, le=1_000_000)] | SignalPath = 50
-    """For how many samples, from the one its counter names, a message without waveforms is valid:
-    a number, or the signal that says so."""
+    """Number of samples for which a message without waveforms is valid, from the sample of its
+    counter: a number, or the signal with it."""
 
     hold_s: Annotated[float, Field(ge=0.01, le=3600.0)] = 5.0
-    """For how many seconds a message without waveforms and without counter is valid."""
+    """Seconds for which a message without waveforms and without counter is valid."""
 
     stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 1.0
-    """A bus without a complete new sample for this long counts as not connected; at least the time
-    of three samples, or of three frames that have several."""
+    """Time without a complete new sample after which the bus counts as not connected, s; at least
+    three samples, or three frames with several samples."""
 
     stamps: Literal["host", "interface"] = "host"
-    """What tells when frames came: the "host", which reads them, or the clock of the "interface",
-    which is led to the host's; that one knows better where the host is busy at times."""
+    """Clock of the time stamps: that of the "host", or that of the "interface" synchronized with
+    it, which is more accurate if the host is busy."""
 
     receive_buffer: Annotated[int, Field(ge=100, le=10_000_000)] = 65_536
-    """Frames that may wait to be worked on; example: 65536, half a minute of twelve channels."""
+    """Maximum number of frames waiting to be decoded; example: 65536, half a minute of 12
+    channels."""
 
     when_full: Literal["drop", "wait"] = "drop"
-    """What happens when that many wait: "drop" new frames and count them, or "wait", so that a
-    device that can wait, as one that replays a recording, loses nothing."""
+    """Action when the buffer is full: "drop" and count new frames, or "wait" for a device that can
+    be delayed, such as the replay of a recording."""
 
     _folder: Path = PrivateAttr(default=Path())
 
@@ -138,16 +137,13 @@ class CanSettings(Settings):
 
     @property
     def dbc_path(self) -> Path:
-        """The DBC file, if there is one."""
+        """Path of the DBC file."""
         return self._folder / (self.dbc or "")
 
     def check_channels(self, channels: Iterable[str], slow_channels: Iterable[str]) -> None:
         """Refuse signals that do not fit a unit's channels, one to one.
 
-        Raises
-        ------
-        MisfitError
-            Naming the channel.
+        Raises `MisfitError` if a channel is unknown or has no signal.
         """
         if self.profile is not None:
             return
@@ -167,7 +163,7 @@ class CanSettings(Settings):
         if self.profile is not None:
             for key in OF_A_DBC:
                 if getattr(self, key):
-                    raise MisfitError("is for a dbc; the profile knows its own", key)
+                    raise MisfitError("requires dbc; a profile has its own", key)
         elif not self.signals:
             raise MisfitError("must name a signal for each waveform channel", "signals")
         if (self.seconds is None) != (self.microseconds is None):
@@ -178,10 +174,10 @@ class CanSettings(Settings):
 
     def _check_speed(self) -> None:
         if self.data_bitrate is not None and not self.fd:
-            raise MisfitError("is for CAN FD; set fd = true, or leave it out", "data_bitrate")
+            raise MisfitError("requires CAN FD; set fd = true, or remove it", "data_bitrate")
         if self.interface in LISTENING_IS_SET:
             for key in ("bitrate", "data_bitrate"):
                 if getattr(self, key) is not None:
                     raise MisfitError(
-                        "is set by the system here: ip link set can0 type can bitrate …", key
+                        "is set in the operating system: ip link set can0 type can bitrate …", key
                     )

@@ -14,8 +14,7 @@ from service.settings.base import MisfitError, Settings
 from service.settings.sources.can import CanSettings
 from service.settings.sources.modbus import ModbusLinkSettings
 from service.settings.sources.register_map import RegisterMapSettings, load_map_file
-from service.settings.toml_file import TomlFileError
-from service.settings.transducers import FOLDER
+from service.settings.toml_file import FOLDER, TomlFileError
 
 MIN_STALE_POLLS = 2
 
@@ -24,23 +23,23 @@ class MappedDeviceSettings(ModbusLinkSettings):
     """A device that is read by a register map."""
 
     map: RegisterMapSettings | None = None
-    """What stands where in it; or a file that says so."""
+    """Register map of the device, unless map_file is given."""
 
     map_file: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
-    """A register map in a file of its own, seen from the plant file's folder; example:
+    """File with the register map, relative to the folder of the plant file; example:
     "maps/vector-rack.toml"."""
 
     poll_period_s: Annotated[float, Field(ge=0.01, le=86_400.0)]
-    """Time between polls in seconds; not below what the map asks for; example: 1.0."""
+    """Time between polls in seconds, at least the minimum of the map; example: 1.0."""
 
     stale_after_s: Annotated[float, Field(ge=0.1, le=604_800.0)] = 60.0
-    """A device in which nothing changes for longer than this counts as not connected: its
-    heartbeat, else its time, else everything that is read. At least two poll periods."""
+    """Time without a change of the heartbeat, else of the time stamp, else of any value, after
+    which the device counts as not connected, s; at least two poll periods."""
 
     connection: Literal["kept", "per_reply"] = "kept"
-    """"kept": one connection for as long as it works. "per_reply": a new one for each request, for
-    a device that closes it after each reply or when it is not asked for a while, or that has a
-    single one which others need, too. Not on a serial line."""
+    """"kept": one connection is reused. "per_reply": a new connection for each request, for a
+    device that closes idle connections or shares its only one with other clients. Not on a serial
+    line."""
 
     _map: RegisterMapSettings = PrivateAttr()
 
@@ -75,22 +74,22 @@ class MappedDeviceSettings(ModbusLinkSettings):
 
     @property
     def rate_hz(self) -> float:
-        """Polls per second: the unit's sampling rate."""
+        """Polls per second, which is the sampling rate of the unit."""
         return 1.0 / self.poll_period_s
 
     @property
     def registers(self) -> RegisterMap:
-        """The map as the adapters take it."""
+        """Register map as a value of the adapters."""
         return self._map.register_map()
 
     @property
     def mapped_channels(self) -> tuple[str, ...]:
-        """Ids of the channels and slow channels whose plain values are read."""
+        """Ids of the channels and slow channels with plain values."""
         return tuple(v.channel for v in self._map.value if not isinstance(v.quantity, VectorPart))
 
     @property
     def rows(self) -> tuple[VectorRow, ...]:
-        """What is read of vectors, in the order of the map."""
+        """Vector values in the order of the map."""
         return tuple(
             VectorRow(v.channel, v.quantity)
             for v in self._map.value
@@ -98,13 +97,7 @@ class MappedDeviceSettings(ModbusLinkSettings):
         )
 
     def require_known(self, known: Sequence[str], *at: int | str) -> None:
-        """Refuse a value of a channel that the unit has not.
-
-        Raises
-        ------
-        MisfitError
-            Naming the channels that there are.
-        """
+        """Refuse values of unknown channels. Raises `MisfitError` if the map has one."""
         for n, value in enumerate(self._map.value):
             if value.channel not in known:
                 place = (*at, "map", "value", n, "channel") if self.map else (*at, "map_file")
@@ -115,18 +108,15 @@ class MappedDeviceSettings(ModbusLinkSettings):
 
 
 class ModbusPolledSettings(MappedDeviceSettings):
-    """Registers read again and again, each poll a sample; for slow machines and slow values."""
+    """Registers that are polled, each poll a sample; for slow machines and slow values."""
 
     kind: Literal["modbus_polled"]
-    """This source's kind."""
+    """Kind of the source."""
 
     def require_fit(self, channels: Sequence[str], slow: Sequence[str]) -> None:
-        """Refuse a map that does not give every waveform channel, or gives vectors.
+        """Refuse a map that does not fit the channels of the unit.
 
-        Raises
-        ------
-        MisfitError
-            Saying which is missing.
+        Raises `MisfitError` if a waveform channel is missing, or the map has vectors.
         """
         self.require_known([*channels, *slow], "source")
         for row in self.rows:
@@ -138,20 +128,21 @@ class ModbusPolledSettings(MappedDeviceSettings):
 
 
 class ModbusVectorSettings(MappedDeviceSettings):
-    """A rack that gives 1× amplitudes, and perhaps phases, instead of waveforms."""
+    """A rack with 1× amplitudes, optionally phases, instead of waveforms."""
 
     kind: Literal["modbus_vector"]
-    """This source's kind."""
+    """Kind of the source."""
 
     n_polls: Annotated[int, Field(ge=2, le=100_000)] = 60
-    """Polls that are averaged; 60 of 5 s are five minutes."""
+    """Number of averaged polls; 60 of 5 s are five minutes."""
 
     hop_polls: Annotated[int, Field(ge=1, le=100_000)] = 4
-    """Polls from one result to the next, when limits of vibration are judged: four of 5 s are 20 s;
-    not above n_polls."""
+    """Number of polls between results and checks of limits; 4 of 5 s are 20 s; not above
+    n_polls."""
 
     min_polls: Annotated[int, Field(ge=2, le=100_000)] = 4
-    """Polls with a changed vector below which a result is uncertain; not above n_polls."""
+    """Number of polls with a changed vector below which a result is uncertain; not above
+    n_polls."""
 
     @model_validator(mode="after")
     def _check_polls(self) -> Self:
@@ -162,16 +153,13 @@ class ModbusVectorSettings(MappedDeviceSettings):
 
     @property
     def averaging(self) -> PollSettings:
-        """Which polls make a result."""
+        """Averaging of polls as a value of core."""
         return PollSettings(self.n_polls, self.hop_polls, self.min_polls)
 
     def require_fit(self, channels: Sequence[str], slow: Sequence[str]) -> None:
-        """Refuse a map without the 1× amplitude of every channel.
+        """Refuse a map that does not fit the channels of the unit.
 
-        Raises
-        ------
-        MisfitError
-            Saying which is missing.
+        Raises `MisfitError` if a 1× amplitude is missing, or the map has plain values.
         """
         self.require_known([*channels, *slow], "source")
         given = [r.channel for r in self.rows if r.part is VectorPart.ORDER1_AMPLITUDE]
@@ -185,28 +173,25 @@ class ModbusVectorSettings(MappedDeviceSettings):
 
 
 class SlowDeviceSettings(MappedDeviceSettings):
-    """A device of slow values beside the one that the waveforms come from."""
+    """A second device with slow values."""
 
     def require_fit(self, slow: Sequence[str]) -> None:
-        """Refuse a value that is of no slow channel.
+        """Refuse a map that does not fit the slow channels of the unit.
 
-        Raises
-        ------
-        MisfitError
-            Naming those that there are.
+        Raises `MisfitError` if a value belongs to no slow channel.
         """
         self.require_known(slow, "slow_source")
 
 
 class ModbusFifoSettings(ModbusLinkSettings):
-    """A device whose samples are read from queues, by function 0x18."""
+    """A device with sample queues that are read by function 0x18."""
 
     kind: Literal["modbus_fifo"]
-    """This source's kind."""
+    """Kind of the source."""
 
     layout: FifoKind = FifoKind.INTERLEAVED
-    """"interleaved": one queue with a record of all channels for each sample. "per_channel": a
-    queue for each channel."""
+    """"interleaved": one queue with a record of all channels per sample. "per_channel": one queue
+    per channel."""
 
     addresses: Annotated[
         tuple[Annotated[int, Field(ge=0, le=65_535)], ...], Field(min_length=1, max_length=32)
@@ -214,21 +199,21 @@ class ModbusFifoSettings(ModbusLinkSettings):
     """Address of the queue, or of the queue of each channel, counted from 0; example: [1000]."""
 
     has_counter: bool = True
-    """Whether a record, or a reading of a channel's queue, begins with an unsigned 16-bit counter
-    of samples. Without it only long losses are noticed, and how long is not known."""
+    """Whether a record, or a reading of the queue of a channel, begins with an unsigned 16-bit
+    counter of samples. Without it only long losses are detected, with unknown length."""
 
     reading: Literal["removes", "keeps"] = "removes"
-    """Whether reading takes samples out of the queue ("removes") or shows them again ("keeps")."""
+    """Whether reading removes samples from the queue ("removes") or not ("keeps")."""
 
     poll_period_s: Annotated[float, Field(ge=0.001, le=60.0)] = 0.005
-    """Wait after a reading that has emptied the queue, in seconds."""
+    """Pause after a reading that emptied the queue, in seconds."""
 
     stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 3.0
-    """A device without a new sample, or a queue that never runs empty, for longer than this counts
-    as not connected."""
+    """Time without a new sample, or with a queue that is never empty, after which the device counts
+    as not connected, s."""
 
     loss_tolerance_s: Annotated[float, Field(ge=0.01, le=10.0)] = 0.1
-    """Without a counter: a loss shorter than this cannot be told from jitter."""
+    """Shortest loss that is detected without a counter, s; shorter ones look like jitter."""
 
     @model_validator(mode="after")
     def _check_queues(self) -> Self:
@@ -249,12 +234,10 @@ class ModbusFifoSettings(ModbusLinkSettings):
         return self
 
     def fifo_layout(self, n_channels: int) -> FifoLayout:
-        """The queues as the adapter takes them.
+        """Return the queues as a value of the adapter.
 
-        Raises
-        ------
-        MisfitError
-            If the channels do not fit into a FIFO read of 31 registers, or cannot be told apart.
+        Raises `MisfitError` if the channels do not fit into a FIFO read of 31 registers, or cannot
+        be told apart.
         """
         n_queues = 1 if self.layout is FifoKind.INTERLEAVED else n_channels
         if len(self.addresses) != n_queues:
@@ -291,27 +274,27 @@ class ModbusRingSettings(ModbusLinkSettings):
     """A streaming DAQ with a block ring, over Modbus TCP or RTU."""
 
     kind: Literal["modbus_ring"]
-    """This source's kind."""
+    """Kind of the source."""
 
     base_address: Annotated[int, Field(ge=0, le=65520)] = 0
-    """Address of the profile's header, counted from 0."""
+    """Address of the header of the profile, counted from 0."""
 
     function: Literal[3, 4] = 3
     """Function code that reads the registers: 3 (holding) or 4 (input)."""
 
     poll_period_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.25
-    """Longest time between looks at the ring in seconds; the ring must hold several of them. It is
-    looked at a little sooner, out of step with its slots, which shows how fast the DAQ samples."""
+    """Longest time between polls of the ring in seconds; the ring must hold several of them. Polls
+    are slightly faster and asynchronous to the slots, in order to measure the sampling rate."""
 
     stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 3.0
-    """A DAQ whose newest slot stands still for this long counts as not connected."""
+    """Time without a new slot after which the DAQ counts as not connected, s."""
 
 
 class SimulatedSettings(Settings):
-    """The unit's simulation read in this process, without any wire."""
+    """Simulation of the unit in this process, without a device."""
 
     kind: Literal["simulated"]
-    """This source's kind."""
+    """Kind of the source."""
 
 
 SourceSettings = Annotated[

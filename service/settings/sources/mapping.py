@@ -1,4 +1,4 @@
-"""The mapping file: which column of a foreign file is which channel of a unit."""
+"""Mapping file of an import: the columns of a foreign file by channel of a unit."""
 
 from typing import Annotated, Literal, Self
 
@@ -7,6 +7,7 @@ from pydantic import AwareDatetime, Field, StringConstraints, model_validator
 from service.settings.base import Identifier, MisfitError, Settings, refuse_twice
 
 ColumnName = Annotated[str, StringConstraints(min_length=1, max_length=500)]
+GroupName = Annotated[str, StringConstraints(max_length=500)]
 UnitName = Annotated[str, StringConstraints(min_length=1, max_length=40)]
 Format = Literal["mdf4", "tdms", "hdf5", "csv", "candump", "blf"]
 Form = Literal[
@@ -30,24 +31,24 @@ IN_UTC = ("tdms", "candump")
 
 
 class TimeSettings(Settings):
-    """How the samples of the file lie in time."""
+    """Times of the samples in the file."""
 
     source: Literal["file", "column", "start"]
     """"file": the format's own time (MDF4 time channel, TDMS waveform properties, stamps of a CAN
     log). "column": a column of the file. "start": from `start` on at the unit's rate, no gaps."""
 
     zone: Annotated[str, StringConstraints(pattern=r"^(UTC|[+-](0\d|1[0-4]):[0-5]\d)$")] = ""
-    """Time zone of times that have none of their own: "UTC", or as an offset such as "-03:00". Not
-    needed with `start`, which has one."""
+    """Time zone of times without one: "UTC", or an offset such as "-03:00". Not needed with
+    `start`, which has one."""
 
     column: ColumnName | None = None
     """Column with the time of each sample; only for source "column"; example: "time"."""
 
-    group: Annotated[str, StringConstraints(max_length=500)] = ""
-    """Its TDMS or MDF4 group, where the name alone is not enough."""
+    group: GroupName = ""
+    """TDMS or MDF4 group of the column, if the name is ambiguous."""
 
     form: Form | None = None
-    """What the column has: "iso8601" (CSV only), "epoch_s", "epoch_ms", "epoch_us", "epoch_ns"
+    """Form of the column: "iso8601" (CSV only), "epoch_s", "epoch_ms", "epoch_us", "epoch_ns"
     (since 1970), "elapsed_s" … "elapsed_ns" (since `start`), "timestamp" (TDMS only)."""
 
     start: AwareDatetime | None = None
@@ -55,67 +56,59 @@ class TimeSettings(Settings):
     2026-03-01T10:00:00-03:00."""
 
     tolerance: Annotated[float, Field(ge=0.01, le=0.45)] = 0.4
-    """How far a time may be from its place at the unit's rate, in samples: 0.01 to 0.45."""
+    """Tolerance of a time against the unit's rate, in samples: 0.01 to 0.45."""
 
 
 class CsvSettings(Settings):
-    """How a CSV file is written."""
+    """Dialect of a CSV file."""
 
     delimiter: Annotated[str, StringConstraints(min_length=1, max_length=1)] = ","
-    """Between columns; example: ";"."""
+    """Separator of columns; example: ";"."""
 
     decimal: Literal[".", ","] = "."
     """Decimal point of numbers: "." or ","."""
 
     header_line: Annotated[int, Field(ge=1, le=1000)] = 1
-    """Number of the line with the column names, from 1; what is before it is skipped."""
+    """Number of the line with the column names, from 1; earlier lines are skipped."""
 
 
-class MappedChannel(Settings):
+class MappedColumn(Settings):
+    """Channel of a unit and its column in the file."""
+
+    id: Identifier
+    """Id of the channel in the plant file; example: "ujb_shaft_x"."""
+
+    column: ColumnName
+    """Name of the CSV column, the TDMS or MDF4 channel; path of the HDF5 dataset."""
+
+    group: GroupName = ""
+    """TDMS group, or name or number of the MDF4 channel group, if the name is ambiguous."""
+
+    unit: UnitName
+    """Unit of the values in the file; example: "um", "mm/s", "g", "mV", "degC", "kW". Refused if
+    the file states another unit, or if the channel is not measured in such a unit."""
+
+
+class MappedChannel(MappedColumn):
     """A waveform channel of the unit."""
 
-    id: Identifier
-    """As in the plant file; example: "ujb_shaft_x"."""
-
-    column: ColumnName
-    """Name of the CSV column, the TDMS or MDF4 channel; path of the HDF5 dataset."""
-
-    group: Annotated[str, StringConstraints(max_length=500)] = ""
-    """TDMS group, or name or number of the MDF4 channel group, where the name is not enough."""
-
-    unit: UnitName
-    """Unit of the values in the file; example: "um", "mm/s", "g", "mV". Refused if the file itself
-    says otherwise, or if the channel is not measured in such a unit."""
-
     unit_per_count: Annotated[float, Field(allow_inf_nan=False)] | None = None
-    """If the column has the converter's counts: the unit per count; example: 0.00036621."""
+    """Unit per count, if the column has the counts of the converter; example: 0.00036621."""
 
 
-class MappedSlowChannel(Settings):
+class MappedSlowChannel(MappedColumn):
     """A slow channel of the unit."""
-
-    id: Identifier
-    """As in the plant file; example: "ujb_oil_temperature"."""
-
-    column: ColumnName
-    """Name of the CSV column, the TDMS or MDF4 channel; path of the HDF5 dataset."""
-
-    group: Annotated[str, StringConstraints(max_length=500)] = ""
-    """TDMS group, or name or number of the MDF4 channel group, where the name is not enough."""
-
-    unit: UnitName
-    """Unit of the values in the file; example: "degC", "r/min", "kW"."""
 
     time_column: ColumnName | None = None
     """Its own time column, of the same form as that of the waveforms, if it has another rate;
     example: "slow/time"."""
 
-    time_group: Annotated[str, StringConstraints(max_length=500)] = ""
+    time_group: GroupName = ""
     """Group of that column."""
 
 
 class ImportMapping(Settings):
-    """A mapping file. Every waveform and slow channel of the unit that is to be there is named."""
+    """A mapping file, which names every waveform and slow channel to import."""
 
     format: Format
     """"mdf4", "tdms", "hdf5", "csv", "candump" or "blf"."""
@@ -127,14 +120,14 @@ class ImportMapping(Settings):
     """Only for CSV files."""
 
     bus: Annotated[str, StringConstraints(max_length=64)] = ""
-    """Only for CAN logs, and needed for those of several buses: which of them. A candump log has
-    its name, a BLF log its number from 1; examples: "can0", "2"."""
+    """Bus to import from a CAN log with several buses: its name in a candump log, its number from 1
+    in a BLF log; examples: "can0", "2"."""
 
     channel: Annotated[tuple[MappedChannel, ...], Field(max_length=32)] = ()
-    """Waveform channels; none for CAN logs, whose channels are those of the unit's DBC file."""
+    """Waveform channels; none for CAN logs, which use the DBC file of the unit."""
 
     slow_channel: Annotated[tuple[MappedSlowChannel, ...], Field(max_length=50)] = ()
-    """Slow channels; as above."""
+    """Slow channels; none for CAN logs."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -172,7 +165,7 @@ class ImportMapping(Settings):
         has_start = self.format == "mdf4"
         needs = self.time.source == "start" or (form.startswith("elapsed") and not has_start)
         if needs and start is None:
-            raise MisfitError("is needed: what time counts from", "time", "start")
+            raise MisfitError("is needed as the origin of the times", "time", "start")
         allowed = needs or form.startswith("elapsed")
         if start is not None and not allowed:
             raise MisfitError("has no effect here; leave it out", "time", "start")
@@ -187,11 +180,12 @@ class ImportMapping(Settings):
             self._refuse_groups()
 
     def _refuse_groups(self) -> None:
+        words = f"{self.format} has no groups"
         for n, channel in enumerate(self.channel):
             if channel.group:
-                raise MisfitError(f"{self.format} has no groups", "channel", n, "group")
+                raise MisfitError(words, "channel", n, "group")
         for n, slow in enumerate(self.slow_channel):
             if slow.group or slow.time_group:
-                raise MisfitError(f"{self.format} has no groups", "slow_channel", n)
+                raise MisfitError(words, "slow_channel", n)
         if self.time.group:
-            raise MisfitError(f"{self.format} has no groups", "time", "group")
+            raise MisfitError(words, "time", "group")

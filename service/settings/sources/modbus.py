@@ -11,16 +11,16 @@ IdentificationText = Annotated[str, StringConstraints(min_length=1, max_length=2
 
 
 class SignatureIdentity(Settings):
-    """Registers that never change in this device and differ in others: type, firmware, serial."""
+    """Constant registers that identify a device: type, firmware, serial number."""
 
     kind: Literal["signature"]
-    """This way of telling devices apart."""
+    """Always "signature"."""
 
     address: Annotated[int, Field(ge=0, le=0xFFFF)]
     """Address of the first register, counted from 0; example: 1000."""
 
     words: Annotated[tuple[Word, ...], Field(min_length=1, max_length=125)]
-    """What the registers contain, 0 to 65535 each; example: [0x0102, 0x0007]."""
+    """Contents of the registers, 0 to 65535 each; example: [0x0102, 0x0007]."""
 
     function: Literal[3, 4] = 3
     """Function code that reads them: 3 (holding) or 4 (input)."""
@@ -33,10 +33,10 @@ class SignatureIdentity(Settings):
 
 
 class IdentificationIdentity(Settings):
-    """The device's answer to function 43/14; what is not given may be anything."""
+    """Response of the device to function 43/14; objects that are not given are not checked."""
 
     kind: Literal["identification"]
-    """This way of telling devices apart."""
+    """Always "identification"."""
 
     vendor: IdentificationText | None = None
     """Vendor name (object 0); example: "Acme"."""
@@ -66,11 +66,11 @@ class ModbusLinkSettings(Settings):
     """Address or name of a Modbus TCP device; example: "192.0.2.17"."""
 
     port: Annotated[int, Field(ge=0, le=65535)] = 502
-    """TCP port; example: 502. 0 only for a simulated DAQ, which then takes a free one."""
+    """TCP port; example: 502. 0 takes a free port, for a simulated DAQ only."""
 
     device: Annotated[str, StringConstraints(min_length=1, max_length=255)] | None = None
-    """Serial port of a Modbus RTU line instead of a host; example: "/dev/ttyUSB0". "pty" only for a
-    simulated DAQ, which then makes one."""
+    """Serial port of a Modbus RTU line, instead of a host; example: "/dev/ttyUSB0". "pty" makes a
+    pseudo-terminal, for a simulated DAQ only."""
 
     baudrate: Annotated[int, Field(ge=1200, le=4_000_000)] = 115_200
     """Bits per second of the serial line; 12 channels at 600 Hz need 460800."""
@@ -85,17 +85,17 @@ class ModbusLinkSettings(Settings):
     """Modbus unit identifier, 1 to 255; on a serial line at most 247."""
 
     timeout_s: Annotated[float, Field(ge=0.05, le=60.0)] = 0.5
-    """Longest wait for one reply in seconds, 0.05 to 60; a link that is silent for longer is
-    lost. Two poll periods or less notice that within three."""
+    """Time-out of a reply in seconds, 0.05 to 60, after which the link counts as lost. Up to two
+    poll periods, a loss is detected within three."""
 
     identity: IdentitySettings | None = None
-    """What the device must answer to be the right one, asked on each connection: kind "signature"
-    (registers) or "identification" (function 43/14). Without it only the data's own form tells."""
+    """Expected identity, checked on each connection: kind "signature" (registers) or
+    "identification" (function 43/14). Without it only the form of the data is checked."""
 
     requests_in_flight: Annotated[int, Field(ge=1, le=16)] | None = None
-    """Most requests that are sent before the first is answered, over TCP: 1 to 16. Without it six
-    to a block ring, and one to any other device, as some lose all but one. A device that does not
-    answer them in order is asked one at a time from then on. `padwatch probe in-flight` tries."""
+    """Maximum number of pending requests over TCP, 1 to 16; six for a block ring and one for other
+    devices by default, as some support only one. If replies arrive out of order, one request at a
+    time is used from then on. `padwatch probe in-flight` measures it."""
 
     @model_validator(mode="after")
     def _check_link(self) -> Self:

@@ -23,13 +23,13 @@ from service.settings.toml_file import load_toml
 
 
 class TogetherSettings(Settings):
-    """Registers that must be read as one block."""
+    """Registers that must be read in one request."""
 
     address: Address
-    """The first one, as the manual writes it."""
+    """First register, as in the manual."""
 
     count: Annotated[int, Field(ge=1, le=125)]
-    """How many, 1 to 125."""
+    """Number of registers, 1 to 125."""
 
     function: Literal[3, 4] | None = None
     """Default: the map's."""
@@ -42,16 +42,16 @@ class EpochTimeSettings(Settings):
     """Always "epoch"."""
 
     seconds: CellSettings
-    """Where the seconds stand; example: { address = 4, type = "uint32", byte_order = "CDAB" }."""
+    """Register of the seconds; example: { address = 4, type = "uint32", byte_order = "CDAB" }."""
 
     parts: CellSettings | None = None
-    """Where parts of a second stand, if anywhere."""
+    """Register of fractions of a second, if any."""
 
     parts_per_s: Annotated[float, Field(ge=1.0, le=1e9)] = 1e6
-    """How many of them make a second; example: 1000.0."""
+    """Number of fractions per second; example: 1000.0."""
 
     def plain(self, default: MapDefaults) -> EpochTime:
-        """As the adapters take it."""
+        """Return the time as a value of the adapters."""
         return EpochTime(
             seconds=default.cell(self.seconds, "time", "seconds"),
             parts=_optional(default, self.parts, "time", "parts"),
@@ -60,19 +60,19 @@ class EpochTimeSettings(Settings):
 
 
 class CalendarTimeSettings(Settings):
-    """Six registers with the parts of date and time."""
+    """Six registers with date and time."""
 
     kind: Literal["calendar"]
     """Always "calendar"."""
 
     first: CellSettings
-    """The first of the six."""
+    """First of the six registers."""
 
     fields: Annotated[tuple[str, ...], Field(min_length=6, max_length=6)] = CALENDAR_FIELDS
-    """In which order they follow each other."""
+    """Order of the six registers."""
 
     utc_offset_s: Annotated[float, Field(ge=-86400.0, le=86400.0)] = 0.0
-    """What the device's clock is ahead of UTC; example: -10800."""
+    """Offset of the device's clock from UTC, s; example: -10800."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -81,61 +81,61 @@ class CalendarTimeSettings(Settings):
         return self
 
     def plain(self, default: MapDefaults) -> CalendarTime:
-        """As the adapters take it."""
+        """Return the time as a value of the adapters."""
         first = default.cell(self.first, "time", "first")
         default.require_in_space(first.address, len(self.fields), "time", "first")
         return CalendarTime(first=first, fields=self.fields, utc_offset_s=self.utc_offset_s)
 
 
 class SignatureSettings(CellSettings):
-    """A register that tells this device from others."""
+    """A register that identifies the device."""
 
     expected: float
-    """What must be found in it."""
+    """Expected value of the register."""
 
 
 class RegisterMapSettings(Settings):
-    """What stands where in a device, as its manual says."""
+    """Register map of a device, as in its manual."""
 
     base: Literal[0, 1, 10001, 30001, 40001, 100001, 300001, 400001] = 0
-    """Number that the manual gives to the first register: 0, 1, or 10001, 30001, 40001, 100001,
-    300001, 400001."""
+    """Number of the first register in the manual: 0, 1, or 10001, 30001, 40001, 100001, 300001,
+    400001."""
 
     function: Function = 3
-    """Function code of all that name none: 3 holding, 4 input registers, 1 coils, 2 inputs."""
+    """Default function code: 3 holding, 4 input registers, 1 coils, 2 inputs."""
 
     byte_order: ByteOrder = ByteOrder.ABCD
-    """Byte order of all that name none: "ABCD", "CDAB", "BADC" or "DCBA"."""
+    """Default byte order: "ABCD", "CDAB", "BADC" or "DCBA"."""
 
     max_registers: Annotated[int, Field(ge=1, le=125)] = 125
-    """Most registers in one read, 1 to 125."""
+    """Maximum number of registers in one read, 1 to 125."""
 
     max_gap: Annotated[int, Field(ge=0, le=124)] = 0
-    """Registers between two values that may be read along; all of them must exist in the device, or
-    the whole read fails."""
+    """Maximum number of unused registers between two values in one read; they must exist in the
+    device, or the read fails."""
 
     min_poll_period_s: Annotated[float, Field(ge=0.0, le=86400.0)] = 0.0
-    """Shortest poll period that the manual allows, in seconds."""
+    """Minimum poll period by the manual, in seconds."""
 
     min_timeout_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
-    """Shortest time-out that the manual allows, in seconds."""
+    """Minimum time-out by the manual, in seconds."""
 
     heartbeat: CellSettings | None = None
-    """A counter that changes with every measurement: one that stands still is a dead device."""
+    """Counter that changes with every measurement; if it stops, the device counts as stale."""
 
     time: (
         Annotated[EpochTimeSettings | CalendarTimeSettings, Field(discriminator="kind")] | None
     ) = None
-    """When the device measured, by its own clock."""
+    """Time of the measurement by the clock of the device."""
 
     signature: Annotated[tuple[SignatureSettings, ...], Field(max_length=16)] = ()
-    """What must be found before anything is believed."""
+    """Registers that are checked before values are used."""
 
     together: Annotated[tuple[TogetherSettings, ...], Field(max_length=200)] = ()
     """Blocks that must be read in one request."""
 
     value: Annotated[tuple[ValueSettings, ...], Field(min_length=1, max_length=500)]
-    """What is read."""
+    """Values to read."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -146,13 +146,7 @@ class RegisterMapSettings(Settings):
         return self
 
     def register_map(self) -> RegisterMap:
-        """The map as the adapters take it.
-
-        Raises
-        ------
-        MisfitError
-            If no device can have it; says where.
-        """
+        """Return the map as a value of the adapters. Raises `MisfitError` if no device can have it."""
         default = MapDefaults(self.base, self.function, self.byte_order)
         register = 4 if self.function == 4 else 3
         for n, block in enumerate(self.together):
@@ -184,15 +178,9 @@ def _optional(default: MapDefaults, cell: CellSettings | None, *at: int | str) -
     return None if cell is None else default.cell(cell, *at)
 
 
-_KINDS_OF_TIME = ("epoch", "calendar")
-
-
 def load_map_file(path: Path) -> RegisterMapSettings:
     """Read and check a register map.
 
-    Raises
-    ------
-    TomlFileError
-        If it cannot be read or anything in it is wrong.
+    Raises `TomlFileError` if it cannot be read or anything in it is wrong.
     """
-    return load_toml(path, RegisterMapSettings, _KINDS_OF_TIME)
+    return load_toml(path, RegisterMapSettings)

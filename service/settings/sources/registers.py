@@ -32,10 +32,10 @@ NotZero = Annotated[float, AfterValidator(_refuse_zero)]
 
 
 class CellSettings(Settings):
-    """A register, or several that make one number."""
+    """One register, or several that form one number."""
 
     address: Address
-    """As the manual writes it, counted from the map's ``base``; example: 609."""
+    """Address as in the manual, counted from the ``base`` of the map; example: 609."""
 
     function: Function | None = None
     """1 (coils), 2 (discrete inputs), 3 (holding) or 4 (input registers); default: the map's."""
@@ -47,30 +47,31 @@ class CellSettings(Settings):
     """"ABCD", "CDAB", "BADC" or "DCBA", A the most significant byte; default: the map's."""
 
     bit: Annotated[int, Field(ge=0, le=15)] | None = None
-    """Of a register, 0 the least significant; with type "bit" and function 3 or 4; example: 0."""
+    """Bit of a register, 0 the least significant; with type "bit" and function 3 or 4; example:
+    0."""
 
 
 class ScaleRegisterSettings(CellSettings):
     """value = raw / divisor * this register; both must be read in one request."""
 
     divisor: NotZero = 32767.0
-    """What the raw number is divided by; not 0."""
+    """Divisor of the raw number; not 0."""
 
 
 class FullScaleSettings(Settings):
-    """A range onto which the raw numbers are mapped; a raw number at its end is clipped."""
+    """Linear scale from raw numbers to values; raw numbers at its ends count as clipped."""
 
     minimum: float | None = None
-    """What ``raw_minimum`` stands for."""
+    """Value at ``raw_minimum``."""
 
     maximum: float | None = None
-    """What ``raw_maximum`` stands for."""
+    """Value at ``raw_maximum``."""
 
     minimum_register: CellSettings | None = None
-    """Where the device says so, instead of ``minimum``."""
+    """Register of that value, instead of ``minimum``."""
 
     maximum_register: CellSettings | None = None
-    """Where the device says so, instead of ``maximum``."""
+    """Register of that value, instead of ``maximum``."""
 
     raw_minimum: float = 0.0
     """Raw number at the lower end."""
@@ -89,19 +90,19 @@ class FullScaleSettings(Settings):
 
 
 class FlagSettings(CellSettings):
-    """What a status register says of the value."""
+    """Status of the value in a status register."""
 
     mask: Annotated[int, Field(ge=1, le=ALL_BITS)] = ALL_BITS
-    """Bits of the register that count; example: 0x0020."""
+    """Bits of the register that are evaluated; example: 0x0020."""
 
     set_means: Meaning | None = None
     """"bad": any of these bits makes the value bad. "ok": it is bad unless all are set."""
 
     ok_values: Annotated[tuple[int, ...], Field(max_length=64)] = ()
-    """Instead of ``set_means``: numbers of the masked part that mean a good value."""
+    """Masked numbers that mean a good value, instead of ``set_means``."""
 
     clipped_values: Annotated[tuple[int, ...], Field(max_length=64)] = ()
-    """With ``ok_values``: numbers that mean a clipped value."""
+    """Masked numbers that mean a clipped value, with ``ok_values``."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -131,56 +132,56 @@ class FlagSettings(CellSettings):
 
 
 class ValueSettings(CellSettings):
-    """A value and how it is made from registers: raw * scale + offset."""
+    """A value and its conversion from registers: raw * scale + offset."""
 
     channel: Identifier
-    """Channel or slow channel that it is of; example: "ujb_shaft_x"."""
+    """Channel or slow channel of the value; example: "ujb_shaft_x"."""
 
     quantity: VectorPart | Literal["value"] = "value"
-    """"value": a sample or slow value in the channel's unit. Of a vector rack: "order1_amplitude",
-    "order1_phase", "vortex_amplitude", "overall" or "gap"."""
+    """"value": a sample or slow value in the unit of the channel. Of a vector rack:
+    "order1_amplitude", "order1_phase", "vortex_amplitude", "overall" or "gap"."""
 
     detector: Literal["pk", "pp", "rms"] | None = None
-    """How the device states amplitudes: zero-to-peak, peak-to-peak or root mean square."""
+    """Detector of amplitudes: zero-to-peak, peak-to-peak or root mean square."""
 
     phase: Literal["lag", "lead"] | None = None
-    """Whether a growing phase in degrees means that the signal comes later or earlier."""
+    """Whether an increasing phase in degrees means a later ("lag") or earlier ("lead") signal."""
 
     scale: NotZero = 1.0
-    """Factor to the channel's unit; not 0; example: 25.4 from mil to µm."""
+    """Factor to the unit of the channel; not 0; example: 25.4 from mil to µm."""
 
     offset: float = 0.0
-    """Added after the factor."""
+    """Offset that is added after the factor."""
 
     scale_register: ScaleRegisterSettings | None = None
-    """A register that says what a full mantissa stands for."""
+    """Register with the full-scale value of a mantissa."""
 
     full_scale: FullScaleSettings | None = None
-    """A range that the raw numbers are mapped onto."""
+    """Range of the raw numbers and of the values."""
 
     flag: Annotated[tuple[FlagSettings, ...], Field(max_length=8)] = ()
-    """What status registers say of it."""
+    """Status registers of the value."""
 
     invalid_values: Annotated[tuple[float, ...], Field(max_length=16)] = ()
-    """Raw numbers that stand for no value; not-a-number always does; example: [0x8000]."""
+    """Raw numbers that mean an invalid value, as NaN always does; example: [0x8000]."""
 
     invalid_below: float | None = None
-    """Raw numbers below stand for an error; example: -32000."""
+    """Raw number below which values are invalid; example: -32000."""
 
     invalid_above: float | None = None
-    """Raw numbers above stand for an error; example: 32000.0."""
+    """Raw number above which values are invalid; example: 32000.0."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         has_detector = self.quantity in AMPLITUDE_PARTS
         if (self.detector is not None) != has_detector:
             raise MisfitError(
-                'must be "pk", "pp" or "rms" of amplitudes, and of nothing else', "detector"
+                'must be "pk", "pp" or "rms" for amplitudes, and only for amplitudes', "detector"
             )
         if (self.phase is not None) != (self.quantity == VectorPart.ORDER1_PHASE):
-            raise MisfitError('must be "lag" or "lead" of phases, and of nothing else', "phase")
+            raise MisfitError('must be "lag" or "lead" for phases, and only for phases', "phase")
         if self.scale_register is not None and self.full_scale is not None:
-            raise MisfitError("cannot be had together with full_scale", "scale_register")
+            raise MisfitError("cannot be combined with full_scale", "scale_register")
         low, high = self.invalid_below, self.invalid_above
         if low is not None and high is not None and not low < high:
             raise MisfitError(f"must be below invalid_above {high:g}", "invalid_below")
@@ -193,21 +194,21 @@ class ValueSettings(CellSettings):
 
     @property
     def id(self) -> str:
-        """Which row of a sample block, or which slow channel."""
+        """Id of the row of a sample block, or of the slow channel."""
         if isinstance(self.quantity, VectorPart):
             return VectorRow(self.channel, self.quantity).id
         return self.channel
 
     @property
     def rim_factor(self) -> float:
-        """From the device's convention to padwatch's: zero-to-peak, degrees of lead."""
+        """Factor to zero-to-peak amplitude and to degrees of lead."""
         factor = PK_PER[self.detector] if self.detector else 1.0
         return factor * (SIGN_OF[self.phase] if self.phase else 1.0)
 
 
 @dataclass(frozen=True)
 class MapDefaults:
-    """What a map says for all cells that do not say it themselves, and where it counts from.
+    """Defaults of a map: first address, function code and byte order of its cells.
 
     All methods raise `MisfitError` with the place in the map.
     """

@@ -1,4 +1,4 @@
-"""Simulated machines: their signals, their life and their damage."""
+"""Simulated machines: signals, machine lives and damage."""
 
 from typing import Annotated, Literal, Self
 
@@ -11,7 +11,7 @@ class SimulatedDamageSettings(Settings):
     """Damage to one bearing of a simulated life."""
 
     bearing: Literal["UJB", "LJB", "TJB"]
-    """Which bearing."""
+    """Damaged bearing."""
 
     kind: Literal[
         "stiffness_loss",
@@ -22,23 +22,23 @@ class SimulatedDamageSettings(Settings):
         "probe_gain",
         "accelerometer_gain",
     ]
-    """What goes wrong: with the film (the first four), the bracket or the transducers."""
+    """Kind of damage: of the film (the first four), the bracket or the transducers."""
 
     size: Annotated[float, Field(gt=-1.0, lt=1.0)]
-    """Share that is lost in the end: of the film's stiffness, the oil's viscosity, the bracket's
-    stiffness; of a gain its relative change, with its sign. Example: 0.2."""
+    """Final relative loss of film stiffness, oil viscosity or bracket stiffness, or final relative
+    change of a gain, with its sign. Example: 0.2."""
 
     after_s: Annotated[float, Field(ge=0.0, le=3.2e7)] | None = None
-    """Sets in so long after the simulator's start, s."""
+    """Onset after the start of the simulator, s."""
 
     at: AwareDatetime | None = None
-    """Or sets in at this time. Example: 2026-03-01T12:00:00Z."""
+    """Onset as a time, instead of after_s. Example: 2026-03-01T12:00:00Z."""
 
     ramp_s: Annotated[float, Field(ge=0.0, le=3.2e7)] = 0.0
-    """Time from onset to `size`, evenly, s; 0 is a step."""
+    """Duration of the linear increase to `size`, s; 0 is a step."""
 
     directions: Annotated[tuple[Literal["x", "y"], ...], Field(min_length=1)] = ("x", "y")
-    """Whose transducers change, for gains."""
+    """Directions of the changed transducers, for gains."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -50,26 +50,25 @@ class SimulatedDamageSettings(Settings):
 
 
 class SimulatedLifeSettings(Settings):
-    """A plant life: its readings of the past, and its samples from now on."""
+    """A machine life: past readings, and samples from now on."""
 
     life_seed: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = None
-    """Which life the machine lives, instead of fixed films. Even ones are of 92.3 r/min, odd ones
-    of 90.9 r/min. Starts and stops, load, oil and the shaft's place in its bearings follow from it.
-    """
+    """Seed of a machine life, instead of fixed films. Even seeds run at 92.3 r/min, odd ones at
+    90.9 r/min. The seed determines starts and stops, load, oil and the shaft position."""
 
     held_load: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
-    """Share of 700 MW at which the machine is kept running from the day before the simulator's
-    start; without it, it may stand still. Example: 0.95."""
+    """Share of 700 MW at which the machine runs from the day before the start of the simulator;
+    without it, the machine may be stopped. Example: 0.95."""
 
     damage: tuple[SimulatedDamageSettings, ...] = ()
-    """What goes wrong with it."""
+    """Damage of the machine."""
 
 
 class SimulatedBearingSettings(Settings):
     """Oil film and shaft position of one simulated bearing."""
 
     bearing: Literal["UJB", "LJB", "TJB"]
-    """Which of the rotor model's three bearings."""
+    """Bearing of the rotor model."""
 
     k_xx_n_per_m: Annotated[float, Field(ge=1e6, le=1e12)]
     """Direct film stiffness in x, N/m; damping follows as 0.0125 s times it. Example: 0.69e9."""
@@ -97,23 +96,23 @@ class SimulatedBearingSettings(Settings):
 
 
 OF_A_LIFE = ("held_load", "damage")
-"""Keys that mean nothing without `life_seed`."""
+"""Keys that require `life_seed`."""
 
 FIXED = (
     *("speed_rpm", "power_mw", "power_wander_mw_rms", "unbalance_grade_mm_s", "bearing"),
     *("hydraulic_force_n_rms", "hydraulic_cutoff_hz", "rope_force_n", "rope_order"),
 )
-"""Keys that a life decides on."""
+"""Keys that are not allowed with `life_seed`."""
 
 NEEDED = ("speed_rpm", "power_mw", "bearing")
-"""Keys that are needed without one."""
+"""Keys that are required without `life_seed`."""
 
 
 class SimulationSettings(SimulatedLifeSettings):
     """A unit on the paper's ten-degree-of-freedom model, with fixed films or with a life."""
 
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
-    """The same seed gives the same samples to the last bit."""
+    """Seed of the random signals; the same seed gives identical samples."""
 
     speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)] | None = None
     """Running speed, r/min."""
@@ -131,7 +130,7 @@ class SimulationSettings(SimulatedLifeSettings):
     """Broadband hydraulic force on the runner, N rms in each direction."""
 
     hydraulic_cutoff_hz: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
-    """The hydraulic force is flat below this frequency; without it, white."""
+    """Bandwidth of the hydraulic force, Hz; white without it."""
 
     rope_force_n: Annotated[float, Field(ge=0.0, le=1e7)] = 0.0
     """Rotating force of the part-load vortex rope on the runner, N."""

@@ -180,7 +180,7 @@ def test_what_is_exported_can_be_imported_again(
             1,
             "column 'nope' is not there; the file",
         ),
-        ('zone = "UTC"', "", 2, "time.zone: is needed"),
+        ('zone = "UTC"', "", 2, "time.zone (by default): is needed"),
         (
             'unit = "r/min"',
             'unit = "degF"',

@@ -5,7 +5,7 @@ import itertools
 import ssl
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -15,12 +15,11 @@ from rigs.standing_clock import T0, SetClock
 from core.alarms.alarm import Alarm, AlarmChange, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
-from service.notifications.channel import Timeouts, Trust
-from service.notifications.message import Composer, Plant, Surroundings
-from service.notifications.routing import Route, Router
+from service.notifications.message import AlarmContext, Composer
+from service.notifications.routing import Router
 from service.notifications.sender import Receiver, Sender
-from service.notifications.webhook import Webhook, WebhookTarget
-from service.settings.notifications import TOLD
+from service.notifications.webhook import Webhook
+from service.settings.notifications import DEFAULT_CHANGES, WebhookSettings
 from service.store.sqlite import SqliteStore
 
 PATIENCE_S = 30.0
@@ -55,15 +54,27 @@ def news(number: int, *conditions: Judgement, unit: str = "U1") -> AlarmNews:
     return AlarmNews(alarm, tuple(events))
 
 
-def route(receiver: str, changes: tuple[AlarmChange, ...] = TOLD, **wanted: object) -> Route:
-    return Route(receiver, frozenset(changes), **wanted)  # type: ignore[arg-type]
+def desk(url: str = "http://127.0.0.1/", **settings: object) -> WebhookSettings:
+    """Return the settings of a receiver."""
+    return WebhookSettings.model_validate({"kind": "webhook", "id": "desk", "url": url, **settings})
+
+
+def route(
+    receiver: str, changes: tuple[AlarmChange, ...] = DEFAULT_CHANGES, **wanted: object
+) -> WebhookSettings:
+    return desk(id=receiver, changes=changes, **wanted)
 
 
 def composer(prefix: str = "id") -> Composer:
     """Numbers its messages in order."""
     numbers = itertools.count()
-    plant = Plant("Itaipu", "https://padwatch.example/", {"U1": "Unit 1"})
-    return Composer(plant, lambda _: Surroundings(), lambda: f"{prefix}-{next(numbers)}")
+    return Composer(
+        "Itaipu",
+        "https://padwatch.example/",
+        {"U1": "Unit 1"},
+        lambda _: AlarmContext(),
+        lambda: f"{prefix}-{next(numbers)}",
+    )
 
 
 @dataclass
@@ -170,6 +181,7 @@ class Room:
     answers = staticmethod(answer)
     news = staticmethod(news)
     routed = staticmethod(route)
+    settings = staticmethod(desk)
     serving = staticmethod(serving)
 
     def __init__(self, path: Path, stack: AsyncExitStack) -> None:
@@ -187,7 +199,7 @@ class Room:
         server.port = await self._stack.enter_async_context(serving(server.serve, context))
         return server
 
-    def open_store(self, *routes: Route, prefix: str = "id") -> SqliteStore:
+    def open_store(self, *routes: WebhookSettings, prefix: str = "id") -> SqliteStore:
         """Open the database; the same one each time, with the receivers of the moment."""
         router = Router(routes or [route("desk")], composer(prefix), self.clock.now_ns)
         store = SqliteStore(self.path, address=router)
@@ -198,10 +210,10 @@ class Room:
         self, server: WebServer, store: SqliteStore, name: str = "desk", **changes: object
     ) -> Sender:
         """Make the sender of a receiver that is told by a webhook."""
-        times = Timeouts(connect_s=20.0, answer_s=20.0, total_s=20.0)
-        target = WebhookTarget(server.url, timeouts=times)
-        receiver = Receiver(name, "webhook", server.url, Webhook(target, Trust(), self.clock))
-        return Sender(replace(receiver, **changes), store.outbox, self.clock)  # type: ignore[arg-type]
+        keys = ("connect_timeout_s", "answer_timeout_s", "total_timeout_s")
+        settings = desk(server.url, **(dict.fromkeys(keys, 20.0) | changes))
+        receiver = Receiver(name, settings, Webhook(settings, self.clock))
+        return Sender(receiver, store.outbox, self.clock)
 
     async def settled(self, sender: Sender, store: SqliteStore) -> None:
         """Wait until nothing waits for a receiver any more."""

@@ -6,7 +6,7 @@ import json
 import ssl
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import AsyncExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from email.policy import default
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from service.notifications.channel import Delivered, Failed, Refused, Secret, Timeouts, Trust
-from service.notifications.mail import Mail, MailTarget, mail_of
+from service.notifications.channel import Delivered, Failed, Refused, TrustedAuthorities
+from service.notifications.mail import Mail, mail_of
 from service.notifications.message import Message
+from service.settings.notifications import SmtpSettings
 
 MESSAGE: Message = {
     "format": 1, "id": "5e4b", "type": "alarm", "plant": "Itaipu",
@@ -95,10 +96,14 @@ async def serve(room: Any) -> AsyncIterator[ServeMail]:
 
 
 def mail_to(server: MailServer, ca_file: Path | None = None, **changes: Any) -> Mail:
-    times = Timeouts(connect_s=20.0, answer_s=20.0, total_s=20.0)
-    target = MailTarget("127.0.0.1", server.port, "padwatch@x.example", "desk@x.example",
-                        "none", timeouts=times)  # fmt: skip
-    return Mail(replace(target, **changes), Trust(ca_file))
+    settings = {
+        "kind": "smtp", "id": "desk", "host": "127.0.0.1", "port": server.port, "tls": "none",
+        "sender": "padwatch@x.example", "recipients": ["desk@x.example"],
+        "connect_timeout_s": 20.0, "answer_timeout_s": 20.0, "total_timeout_s": 20.0,
+        "ca_file": None if ca_file is None else str(ca_file), **changes,
+    }  # fmt: skip
+    valid = SmtpSettings.model_validate(settings)
+    return Mail(valid, "desk@x.example", TrustedAuthorities(valid.ca_file))
 
 
 async def test_a_mail_says_what_where_since_when_by_how_much_and_under_which_condition(
@@ -106,7 +111,7 @@ async def test_a_mail_says_what_where_since_when_by_how_much_and_under_which_con
 ) -> None:
     server = await serve()
 
-    outcomes = [await mail_to(server).carry(MESSAGE, BODY) for _ in range(2)]
+    outcomes = [await mail_to(server).send(MESSAGE, BODY) for _ in range(2)]
 
     assert outcomes == [Delivered("taken as 4711")] * 2
     assert server.mails[0] == server.mails[1]
@@ -144,15 +149,14 @@ async def test_what_a_server_says_decides_between_later_and_never(
 ) -> None:
     server = await serve(**{word: says})
 
-    assert await mail_to(server).carry(MESSAGE, BODY) == outcome
+    assert await mail_to(server).send(MESSAGE, BODY) == outcome
 
 
 @pytest.mark.parametrize("word", ["GREETING", "EHLO", "MAIL", "TAKEN"])
 async def test_a_server_that_falls_silent_is_left(word: str, serve: ServeMail) -> None:
     server = await serve(**{word: "nothing"})
-    soon = Timeouts(connect_s=20.0, answer_s=20.0, total_s=0.3)
 
-    outcome = await mail_to(server, timeouts=soon).carry(MESSAGE, BODY)
+    outcome = await mail_to(server, total_timeout_s=0.3).send(MESSAGE, BODY)
 
     assert isinstance(outcome, Failed)
 
@@ -163,7 +167,7 @@ async def test_a_mail_that_was_taken_is_delivered_whatever_comes_after(
 ) -> None:
     server = await serve(QUIT=says)
 
-    assert await mail_to(server).carry(MESSAGE, BODY) == Delivered("taken as 4711")
+    assert await mail_to(server).send(MESSAGE, BODY) == Delivered("taken as 4711")
 
 
 async def test_login_and_mail_pass_only_under_tls_with_a_certificate_that_is_believed(
@@ -171,30 +175,40 @@ async def test_login_and_mail_pass_only_under_tls_with_a_certificate_that_is_bel
 ) -> None:
     server = await serve(tls=server_tls)
     (tmp_path / "password").write_text("geheim\n")
-    login = {"tls": "starttls", "username": "padwatch", "password": Secret(tmp_path / "password")}
+    login = {
+        "tls": "starttls",
+        "username": "padwatch",
+        "password": {"file": str(tmp_path / "password")},
+    }
 
-    refused = await mail_to(server, **login).carry(MESSAGE, BODY)
+    refused = await mail_to(server, **login).send(MESSAGE, BODY)
     assert isinstance(refused, Failed)
     assert "certificate verify failed" in refused.answer.lower()
     assert server.commands[-1] == "STARTTLS"
 
     without_tls = await serve()
-    in_the_clear = await mail_to(without_tls, certificate[0], **login).carry(MESSAGE, BODY)
+    in_the_clear = await mail_to(without_tls, certificate[0], **login).send(MESSAGE, BODY)
     assert isinstance(in_the_clear, Failed)
     assert [line.split()[0] for line in without_tls.commands if line[:4] in ("AUTH", "MAIL")] == []
 
-    taken = await mail_to(server, certificate[0], **login).carry(MESSAGE, BODY)
+    taken = await mail_to(server, certificate[0], **login).send(MESSAGE, BODY)
     assert taken == Delivered("taken as 4711")
     assert server.commands[-5] == "AUTH PLAIN AHBhZHdhdGNoAGdlaGVpbQ=="
 
 
 async def test_a_missing_password_is_said_without_troubling_the_server(serve: ServeMail) -> None:
     server = await serve()
-    missing = {"username": "padwatch", "password": Secret(env="PADWATCH_NO_SUCH_VARIABLE")}
+    missing = {
+        "tls": "starttls",
+        "username": "padwatch",
+        "password": {"env": "PADWATCH_NO_SUCH_VARIABLE"},
+    }
 
-    outcome = await mail_to(server, **missing).carry(MESSAGE, BODY)
+    outcome = await mail_to(server, **missing).send(MESSAGE, BODY)
 
-    words = "environment variable PADWATCH_NO_SUCH_VARIABLE holds no single line of printable text"
+    words = (
+        "environment variable PADWATCH_NO_SUCH_VARIABLE must hold a single line of printable text"
+    )
     assert outcome == Failed(words)
     assert server.commands == []
 

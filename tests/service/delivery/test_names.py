@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from service.notifications.channel import Failed, Trust
-from service.notifications.webhook import Webhook, WebhookTarget
+from service.notifications.channel import Failed
+from service.notifications.webhook import Webhook
 
 
 @pytest.fixture
@@ -23,11 +23,13 @@ def _name_server(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("_name_server")
 async def test_what_cannot_be_looked_up_or_trusted_is_said(room: Any, tmp_path: Any) -> None:
-    webhook = Webhook(WebhookTarget("https://no.example/"), Trust(), room.clock)
-    assert await webhook.carry({"id": "1"}, "{}") == Failed("Name or service not known")
+    webhook = Webhook(room.settings("https://no.example/"), room.clock)
+    assert await webhook.send({"id": "1"}, "{}") == Failed("Name or service not known")
 
-    webhook = Webhook(WebhookTarget("https://127.0.0.1:1/"), Trust(tmp_path / "ca.pem"), room.clock)
-    outcome = await webhook.carry({"id": "1"}, "{}")
+    webhook = Webhook(
+        room.settings("https://127.0.0.1:1/", ca_file=str(tmp_path / "ca.pem")), room.clock
+    )
+    outcome = await webhook.send({"id": "1"}, "{}")
     assert isinstance(outcome, Failed)
     assert f"ca_file {tmp_path / 'ca.pem'}" in outcome.answer
 
@@ -37,7 +39,7 @@ async def test_a_message_goes_to_the_name_it_is_meant_for(room: Any) -> None:
     server = await room.web(room.answers("200 OK"))
     url = f"http://desk.example:{server.port}/alarms?x=1"
 
-    await Webhook(WebhookTarget(url), Trust(), room.clock).carry({"id": "1"}, "{}")
+    await Webhook(room.settings(url), room.clock).send({"id": "1"}, "{}")
 
     (request,) = server.requests
     assert request.headers["host"] == f"desk.example:{server.port}"
@@ -48,12 +50,12 @@ async def test_nothing_is_told_to_a_server_whose_certificate_is_not_believed(
     room: Any, server_tls: Any, certificate: Any
 ) -> None:
     server = await room.web(room.answers("200 OK"), context=server_tls)
-    target = WebhookTarget(server.url)
+    trusting = room.settings(server.url, ca_file=str(certificate[0]))
 
-    refused = await Webhook(target, Trust(), room.clock).carry({"id": "1"}, "{}")
+    refused = await Webhook(room.settings(server.url), room.clock).send({"id": "1"}, "{}")
     assert isinstance(refused, Failed)
     assert "certificate verify failed" in refused.answer.lower()
     assert server.requests == []
 
-    await Webhook(target, Trust(certificate[0]), room.clock).carry({"id": "1"}, "{}")
+    await Webhook(trusting, room.clock).send({"id": "1"}, "{}")
     assert len(server.requests) == 1

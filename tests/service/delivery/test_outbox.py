@@ -71,9 +71,9 @@ DELIVER_AND_HANG = """
 import asyncio, sys, threading
 from pathlib import Path
 from acquisition.clock import SystemClock
-from service.notifications.channel import Trust
 from service.notifications.sender import Receiver, Sender
-from service.notifications.webhook import Webhook, WebhookTarget
+from service.notifications.webhook import Webhook
+from service.settings.notifications import WebhookSettings
 from service.store.sqlite import SqliteStore
 
 store = SqliteStore(Path(sys.argv[1]))
@@ -83,8 +83,8 @@ class Outbox(type(store.outbox)):
         print("answered", flush=True)
         threading.Event().wait()
 
-clock, target = SystemClock(), WebhookTarget(sys.argv[2])
-desk = Receiver("desk", "webhook", target.url, Webhook(target, Trust(), clock))
+clock, settings = SystemClock(), WebhookSettings(kind="webhook", id="desk", url=sys.argv[2])
+desk = Receiver("desk", settings, Webhook(settings, clock))
 asyncio.run(Sender(desk, Outbox(store._writing, store._reader), clock).run())
 """
 

@@ -76,7 +76,7 @@ def told(store: Any, receiver: str = "desk", unit: str = "%") -> list[tuple[str,
 def test_what_is_off_the_list_is_told_when_it_comes_back_active_and_ends_are_never_owed(
     lowest: AlarmLevel, steps: list[Any], expected: list[str], room: Any
 ) -> None:
-    store = room.open_store(room.routed("desk", lowest=lowest))
+    store = room.open_store(room.routed("desk", lowest_priority=lowest.name.lower()))
 
     Life(store).go(*steps)
 
@@ -85,8 +85,8 @@ def test_what_is_off_the_list_is_told_when_it_comes_back_active_and_ends_are_nev
 
 def test_each_is_told_of_the_units_and_kinds_that_it_has_asked_for(room: Any) -> None:
     store = room.open_store(
-        room.routed("unit", units=frozenset({"U2"})),
-        room.routed("kind", kinds=frozenset({"link_lost"})),
+        room.routed("unit", units=("U2",)),
+        room.routed("kind", kinds=("link_lost",)),
         room.routed("seen", changes=(AlarmChange.ACKNOWLEDGED,)),
     )
 

@@ -3,10 +3,8 @@
 import asyncio
 import json
 import random
-from datetime import time
 from pathlib import Path
 from typing import Any
-from zoneinfo import ZoneInfo
 
 import pytest
 from harness.waiting import until
@@ -15,9 +13,9 @@ from hypothesis import strategies as st
 from rigs.tiers import fast_and_long
 
 from core.limits import AlarmLevel, Judgement
-from service.notifications.channel import Failed, Secret, SecretError
-from service.notifications.routing import QuietHours
+from service.notifications.channel import Failed, SecretError, read_secret
 from service.notifications.sender import SenderState, wait_s
+from service.settings.notifications import SecretSettings
 from service.store.outbox import LetterState
 
 DANGER = Judgement(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
@@ -151,7 +149,7 @@ async def test_each_event_reaches_a_receiver_that_fails_at_random_once_and_in_or
     server, store = await room.web(fails_at_random), room.open_store()
     store.append([], [], [room.news(n) for n in range(n_events)])
 
-    await room.delivered(server, store, max_age_s=1e8)
+    await room.delivered(server, store, max_age_h=8760.0)
 
     assert accepted == [(f"id-{n}", f"B{n}") for n in range(n_events)]
     assert {state for _, state, *_ in room.letters(store)} == {"delivered"}
@@ -165,7 +163,7 @@ async def test_what_grew_too_old_is_given_up_at_once_when_an_attempt_fails(room:
     room.clock.step(3_610 * 10**9)
     store.append([], [], [room.news(5)])
 
-    await room.delivered(server, store, max_age_s=3600.0)
+    await room.delivered(server, store, max_age_h=1.0)
 
     assert [r.id for r in server.requests] == ["id-0", "id-5"]
     (backlog,) = store.outbox.backlogs()
@@ -193,7 +191,7 @@ async def test_a_clock_that_is_set_gives_nothing_up(
     room.clock.ns = right_ns + queued_wrong_ns
     store.append([], [], [room.news(n) for n in range(3)])
     room.clock.ns = right_ns
-    sender = room.sender(server, store, max_age_s=3600.0)
+    sender = room.sender(server, store, max_age_h=1.0)
     room.clock.ns = right_ns + sent_wrong_ns
 
     async with room.running(sender):
@@ -211,7 +209,7 @@ async def test_quiet_hours_hold_what_is_no_danger_and_a_danger_ends_them_in_orde
 ) -> None:
     server, store = await room.web(room.answers("200 OK")), room.open_store()
     store.append([], [], [room.news(0), room.news(1)])
-    always = QuietHours(time(0, 0), time(23, 59), ZoneInfo("UTC"))
+    always = {"start": "00:00", "end": "23:59", "time_zone": "UTC"}
     sender = room.sender(server, store, quiet=always)
 
     async with room.running(sender):
@@ -305,9 +303,9 @@ async def test_a_flood_is_left_after_some_bytes_and_not_after_some_time(
     server = await room.web(behave)
     sender = room.sender(server, room.open_store())
 
-    outcome = await sender.receiver.carrier.carry({"id": "1"}, "{}")
+    outcome = await sender.receiver.channel.send({"id": "1"}, "{}")
 
-    assert outcome == Failed("the answer is longer than 32768 bytes")
+    assert outcome == Failed("the response is longer than 32768 bytes")
 
 
 SHARES = st.floats(0.0, 1.0)
@@ -332,7 +330,7 @@ def test_no_wait_is_shorter_than_one_before_it_could_have_been(n: int, share: fl
 def test_a_secret_loses_the_end_of_its_line_and_nothing_else(tmp_path: Path) -> None:
     (tmp_path / "key").write_text("s3cret with spaces\r\n")
 
-    assert Secret(tmp_path / "key").read() == "s3cret with spaces"
+    assert read_secret(SecretSettings(file=str(tmp_path / "key"))) == "s3cret with spaces"
 
 
 @pytest.mark.parametrize("content", [None, b"", b"\n", b"a\nb", b"\xff\xfe", b"a\x00b"])
@@ -343,5 +341,5 @@ def test_what_is_no_line_of_text_is_refused_without_being_shown(
         (tmp_path / "key").write_bytes(content)
 
     with pytest.raises(SecretError, match="No such file" if content is None else None) as refusal:
-        Secret(tmp_path / "key").read()
+        read_secret(SecretSettings(file=str(tmp_path / "key")))
     assert str(tmp_path / "key") in str(refusal.value)

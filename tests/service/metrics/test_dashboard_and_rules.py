@@ -13,7 +13,7 @@ import yaml
 from prometheus_client.metrics_core import Metric
 
 from service.cluster.consumer import consumer_metrics
-from service.cluster.replica_state import unit_metrics as replica_unit_metrics
+from service.cluster.replica_metrics import unit_metrics as replica_unit_metrics
 from service.live.live_view import LinkState
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
@@ -91,7 +91,7 @@ def of_several_processes() -> Iterator[Metric]:
     """What `padwatch serve` and `padwatch analyse` tell besides, by their own functions."""
     status = SimpleNamespace(state=LinkState.CONNECTED)
     live = Mock(read_error=None, **{"status.return_value": status, "silence_s.return_value": 0.5})
-    yield from replica_unit_metrics(Mock(live=live, bearings={"U1": ["UJB"]}))
+    yield from replica_unit_metrics(live, ["U1"])
     unit = SimpleNamespace(behind_s=0.5, refused={}, n_repeated=0)
     yield from consumer_metrics(Mock(trouble=None, n_pending={"U1": 3}, units={"U1": unit}))
 

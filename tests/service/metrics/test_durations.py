@@ -12,7 +12,7 @@ from acquisition.clock import Clock
 from core.samples.blocks import SampleBlock
 from service.measuring.counters import MAX_REASONS, bounded
 from service.measuring.timings import Timings
-from service.runtime.heartbeats import Unheard
+from service.runtime.heartbeats import Pulse
 from service.runtime.metrics import Durations
 from service.runtime.polls import PollClock, TimedSource
 
@@ -22,7 +22,7 @@ def test_a_bound_belongs_to_its_bucket_and_nothing_is_left_out(stepped_clock: An
     for duration_s in (0.0, 0.1, 0.15, 0.2, 7.0):
         durations.observe(duration_s)
 
-    seen = durations.seen()
+    seen = durations.state()
 
     assert seen.n_up_to == (2, 4, 5)
     assert seen.sum_s == pytest.approx(7.45)
@@ -35,8 +35,8 @@ def test_what_fails_is_not_timed(stepped_clock: Any) -> None:
     with durations.timed():
         stepped_clock.step(3.0)
 
-    assert durations.seen().n_up_to == (0, 1)
-    assert durations.seen().sum_s == 3.0
+    assert durations.state().n_up_to == (0, 1)
+    assert durations.state().sum_s == 3.0
 
 
 @pytest.mark.parametrize("bounds", [(), (0.2, 0.1), (0.1, 0.1)])
@@ -53,7 +53,7 @@ def test_the_time_between_two_results_belongs_to_neither(stepped_clock: Any) -> 
         timings.assessed("U1", began_s)
         stepped_clock.step(5.0)
 
-    seen = timings.assessments["U1"].seen()
+    seen = timings.assessments["U1"].state()
     assert seen.n_up_to[-1] == 3
     assert seen.sum_s == pytest.approx(0.3)
 
@@ -70,7 +70,7 @@ async def test_a_poll_is_what_lies_between_two_waits_of_one_task(stepped_clock: 
     await asyncio.create_task(poll(4, 0.25))
     await asyncio.create_task(poll(2, 0.5))
 
-    seen = polls.polls.seen()
+    seen = polls.polls.state()
     assert seen.n_up_to[-1] == 6
     assert seen.sum_s == pytest.approx(4 * 0.25 + 2 * 0.5)
 
@@ -106,15 +106,15 @@ async def test_a_source_that_is_connected_again_begins_anew(stepped_clock: Any) 
             assert [block async for block in blocks] == []
         stepped_clock.step(3600.0)  # without a link, which is no poll
 
-    assert source.polls.seen().n_up_to[-1] == 4
-    assert source.polls.seen().sum_s == pytest.approx(4 * 0.25)
+    assert source.polls.state().n_up_to[-1] == 4
+    assert source.polls.state().sum_s == pytest.approx(4 * 0.25)
 
 
 async def test_a_driver_may_look_at_the_clock_in_a_thread_of_its_own(stepped_clock: Any) -> None:
     """As that of a CAN bus does; it says nothing of the task that reads the source."""
-    pulse = Mock(spec=Unheard)
+    pulse = Mock(spec=Pulse)
     polls = PollClock(stepped_clock)
-    polls.listen(pulse)
+    polls.set_pulse(pulse)
     assert await asyncio.to_thread(polls.monotonic_s) == stepped_clock.monotonic_s()
     pulse.beat.assert_not_called()
     polls.monotonic_s()

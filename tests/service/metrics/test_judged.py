@@ -86,13 +86,14 @@ def test_films_count_under_the_word_that_was_said_last() -> None:
 
 def test_recipients_of_one_mail_are_added_up_and_never_named() -> None:
     """Two recipients of one mail, and a webhook that is in the plant file no longer."""
-    carrier: Any = None
+    channel: Any = None
+    settings: Any = None
 
     def view(name: str, n_waiting: int, hours: int | None, n_dead: int) -> ReceiverView:
         oldest_ns = None if hours is None else NOW_NS - hours * HOUR_NS
         return ReceiverView(
             name,
-            Receiver(name, "smtp", "somebody@plant.example", carrier),
+            Receiver(name, settings, channel),
             SenderStatus(n_failures=n_waiting),
             Backlog(name, n_waiting, oldest_ns, n_dead, None, None),
         )

@@ -35,13 +35,13 @@ def test_what_has_waited_for_the_analysis_is_as_old_in_a_replica(
     replica = ReplicaLive([UNIT.id], stepped_clock, STALE_AFTER_S)
     found = replace(assessment(), unit=UNIT.id, bearing=BEARING)
     live.set_link(UNIT.id, LinkState.CONNECTED)
-    replica.hear(UNIT.id, "one", 1, unit_signs(UNIT, live))
+    replica.update(UNIT.id, "one", 1, unit_signs(UNIT, live))
 
     sampled_s = stepped_clock.monotonic_s() - behind_s
     live.set_received(BLOCK, SampleAccount(), sampled_s)
     live.set_assessment(found, sampled_s)
     replica.set_results(UNIT.id, {BEARING: bearing_state(found)})
-    replica.hear(UNIT.id, "one", 2, read_signs(written_signs(unit_signs(UNIT, live))))
+    replica.update(UNIT.id, "one", 2, read_signs(written_signs(unit_signs(UNIT, live))))
 
     shown = replica.current(UNIT.id, BEARING)
     assert shown.is_current is is_current
@@ -54,7 +54,7 @@ def test_what_has_waited_for_the_analysis_is_as_old_in_a_replica(
 def replica(stepped_clock: Any) -> ReplicaLive:
     """One that has been told once of a unit whose samples arrive."""
     made = ReplicaLive([UNIT.id], stepped_clock, STALE_AFTER_S)
-    made.hear(UNIT.id, "one", 1, signs(0.0, stepped_clock.monotonic_s()))
+    made.update(UNIT.id, "one", 1, signs(0.0, stepped_clock.monotonic_s()))
     return made
 
 
@@ -72,11 +72,11 @@ def test_a_report_that_the_database_has_kept_back_makes_nothing_younger(
     stepped_clock.step(1.0)
     said_s = stepped_clock.monotonic_s()
     stepped_clock.step(held_up_s)
-    replica.hear(UNIT.id, "one", 2, signs(0.2, said_s))
+    replica.update(UNIT.id, "one", 2, signs(0.2, said_s))
 
     assert replica.data_age_s(UNIT.id) == pytest.approx(0.2 + held_up_s, abs=0.1)
     assert replica.is_alive(UNIT.id) is (held_up_s < SILENT_AFTER_S)
-    replica.hear(UNIT.id, "one", 3, signs(0.2, None))  # believed to have said it now
+    replica.update(UNIT.id, "one", 3, signs(0.2, None))  # believed to have said it now
     assert replica.data_age_s(UNIT.id) == pytest.approx(0.2)
 
 
@@ -85,10 +85,10 @@ def test_another_process_is_believed_from_its_second_report_on(
 ) -> None:
     said_s = stepped_clock.monotonic_s()
     stepped_clock.step(3.0)  # kept back, of which nobody can know yet
-    replica.hear(UNIT.id, "two", 1, signs(0.2, said_s))
+    replica.update(UNIT.id, "two", 1, signs(0.2, said_s))
     assert replica.data_age_s(UNIT.id) is None
     assert replica.why_no_samples(UNIT.id) is Reason.NOT_CONNECTED
 
-    replica.hear(UNIT.id, "two", 2, signs(0.3, stepped_clock.monotonic_s()))
+    replica.update(UNIT.id, "two", 2, signs(0.3, stepped_clock.monotonic_s()))
     assert replica.data_age_s(UNIT.id) == pytest.approx(0.3)
     assert replica.why_no_samples(UNIT.id) is None

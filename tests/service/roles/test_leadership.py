@@ -15,19 +15,24 @@ from service.notifications.channel import Delivered
 from service.notifications.sender import Deliveries, Receiver
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
 from service.settings.loading import load_plant_file
+from service.settings.notifications import WebhookSettings
 from service.store.database import Hold
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
 
 
 class Postman:
-    """Carries everything at once."""
+    """Delivers everything at once."""
 
-    async def carry(self, *_: object) -> Delivered:
+    address = ""
+
+    async def send(self, *_: object) -> Delivered:
         return Delivered("")
 
 
-SHIFT = Receiver("shift", "webhook", "", Postman())
+SHIFT = Receiver(
+    "shift", WebhookSettings(kind="webhook", id="shift", url="http://x.example"), Postman()
+)
 
 
 class Name:
@@ -170,7 +175,7 @@ def begin(tmp_path: Path) -> Iterator[Begin]:
 async def waiting(holds: Holds) -> "asyncio.Task[None]":
     """Let a process wait for its units."""
     taking = asyncio.create_task(holds.take())
-    while holds.waits_for in (None, "not begun"):
+    while holds.waits_for in (None, "not started"):
         await asyncio.sleep(0.01)
     return taking
 
@@ -230,7 +235,7 @@ def test_what_is_no_share_is_refused_with_what_to_write(text: str) -> None:
 
 
 def test_a_share_without_units_is_refused() -> None:
-    with pytest.raises(ValueError, match="no more than 2 parts"):
+    with pytest.raises(ValueError, match="at most 2 parts"):
         Partition(3, 3).part_of(PLANT)
 
 

@@ -13,7 +13,7 @@ from service.api.auth.authenticator import Doors, LoggedIn, NotLoggedIn, Refusal
 from service.api.auth.backoff import OF_ACCOUNT, Backoff
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import People, create_key
-from service.settings.processes import Doorway, why_closed
+from service.settings.processes import why_closed
 from service.store.access.identities import Identity, Means, Permission, Role, SessionLimits, digest
 from service.store.access.port import AccessStore
 from service.store.access.tables import MAX_SESSIONS
@@ -269,9 +269,9 @@ def test_a_key_for_one_unit_opens_no_other_and_changes_nothing_of_the_plant() ->
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "127.1.2.3", "::1", "localhost"])
 def test_loopback_needs_no_login(host: str) -> None:
-    assert why_closed(Doorway(host)) is None
+    assert why_closed(host) is None
     # a Unix socket is left to the proxy that opens it
-    assert why_closed(Doorway("0.0.0.0", is_unix_socket=True)) is None  # noqa: S104
+    assert why_closed("0.0.0.0", is_unix_socket=True) is None  # noqa: S104
 
 
 @pytest.mark.parametrize(
@@ -279,9 +279,9 @@ def test_loopback_needs_no_login(host: str) -> None:
     ["0.0.0.0", "::", "10.0.0.5", "plant.example", "127.0.0.1.example", "", "::ffff:10.0.0.5"],  # noqa: S104
 )
 def test_other_addresses_need_tls_and_an_account(host: str) -> None:
-    assert why_closed(Doorway(host, has_tls=True, has_account=True)) is None
+    assert why_closed(host, has_tls=True, has_account=True) is None
     for has_tls, has_account in ((False, False), (False, True), (True, False)):
-        why = why_closed(Doorway(host, has_tls=has_tls, has_account=has_account))
+        why = why_closed(host, has_tls=has_tls, has_account=has_account)
         assert why is not None
         assert ("[service.tls]" in why, "users add" in why) == (not has_tls, not has_account)
         assert host in why

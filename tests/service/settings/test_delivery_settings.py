@@ -7,7 +7,7 @@ import pytest
 
 from acquisition.clock import SystemClock
 from service.app.notifications import receivers_of, router_of
-from service.notifications.message import Surroundings
+from service.notifications.message import AlarmContext
 from service.settings.loading import load_plant_file
 from service.settings.storage import Origin
 from service.store.outbox import no_recipients
@@ -45,37 +45,40 @@ def test_every_recipient_is_a_receiver_and_secrets_in_addresses_are_not_shown(
 
     found = receivers_of(plant, Origin.LIVE, clock)
 
-    assert [(one.name, one.address) for one in found] == [
+    assert [(one.name, one.channel.address) for one in found] == [
         ("desk", "https://alarms.example"),
         ("shift:a@plant.example", "a@plant.example"),
         ("shift:b@plant.example", "b@plant.example"),
     ]
-    assert found[0].quiet is not None
+    assert found[0].settings.quiet is not None
     midnight_utc_ns, hour_ns = 1_767_225_600_000_000_000, 3600 * 10**9  # 21:00 in Asunción
-    quiet = [found[0].quiet.hold_at(midnight_utc_ns + hours * hour_ns) for hours in range(0, 24, 3)]
+    quiet = [
+        found[0].settings.quiet.include(midnight_utc_ns + hours * hour_ns)
+        for hours in range(0, 24, 3)
+    ]
     assert quiet == [False, True, True, False, False, False, False, False]
     # A replay tells nobody.
     assert receivers_of(plant, Origin.REPLAY, clock) == []
-    assert router_of(plant, Origin.REPLAY, lambda _: Surroundings(), clock) is no_recipients
+    assert router_of(plant, Origin.REPLAY, lambda _: AlarmContext(), clock) is no_recipients
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
         ('"https://alarms', '"ftp://alarms', "must begin with https:// or http://"),
-        ('"https://alarms', '"https://me:you@alarms', "must not hold a name or password"),
-        ('"https://alarms.example/padwatch?key=1"', '"https://a.b/ü"', "is no URL of printable"),
+        ('"https://alarms', '"https://me:you@alarms', "must not contain a name or password"),
+        ('"https://alarms.example/padwatch?key=1"', '"https://a.b/ü"', "is not a URL of printable"),
         ('{ env = "PADWATCH_KEY" }', '"s3cret"', "secret"),
         ('{ env = "PADWATCH_KEY" }', "{}", "give either file or env"),
         ('"22:00"', '"24:00"', "delivery.receiver[1].quiet.start"),
         ('"06:00"', '"22:00"', "must differ from start"),
-        ("America/Asuncion", "Mars/Olympus", "is no known time zone"),
+        ("America/Asuncion", "Mars/Olympus", "is not a known time zone"),
         ('["U1"]', '["U9"]', "is no unit of this plant, it has U1, U2"),
         ('["link_lost", "stiffness_x"]', '["mood"]', "delivery.receiver[1].kinds[1]"),
         ('"danger"', '"panic"', "lowest_priority"),
         ('id = "shift"', 'id = "desk"', "is used twice"),
-        ('username = "padwatch"\n', "", "username and password go together"),
-        ('host = "mail.example"', 'host = "mail.example"\ntls = "none"', "in the clear"),
+        ('username = "padwatch"\n', "", "username and password must be given"),
+        ('host = "mail.example"', 'host = "mail.example"\ntls = "none"', "unencrypted"),
         ('"a@plant.example"', '"a@plant.example\\r\\nBcc: x@y.z"', "delivery.receiver[2]"),
         ('"b@plant.example"', '"a@plant.example"', "is used twice"),
     ],

@@ -15,8 +15,9 @@ from core.machine.channel import Measurand
 from core.monitor.monitor import UnitMonitor
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import analysis_of, calibration_of, machine_of
-from service.settings.loading import PlantFileError, load_plant_file
+from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
+from service.settings.toml_file import TomlFileError
 
 DEPLOY = Path(__file__).parents[3] / "deploy"
 
@@ -120,7 +121,7 @@ def test_no_plant_file_ever_yields_anything_but_a_plant_or_a_refusal(
 
     try:
         plant = load_plant_file(path)
-    except PlantFileError as refusal:
+    except TomlFileError as refusal:
         refused = str(refusal).split("\n")
         assert all(line.startswith(f"{path}:") for line in refused)
     else:

@@ -238,7 +238,7 @@ def test_a_can_source_is_read_by_its_dbc_or_by_a_profile(tmp_path):
         ({"microseconds": "T.us"}, "seconds", "must be given together"),
         ({"data_bitrate": 2_000_000}, "data_bitrate", "set fd = true"),
         ({"stamps": "interface"}, "stamps", 'must be "host": slcan has no time stamps'),
-        ({"interface": "socketcan"}, "bitrate", "is set by the system here: ip link set"),
+        ({"interface": "socketcan"}, "bitrate", "is set in the operating system: ip link set"),
         (
             {"counter_counts": "frames", "frame_samples": ["W.n"]},
             "counter_counts",
@@ -270,7 +270,7 @@ CAN_OWN = ({"signals": {"x": "A.b"}}, {"counters": ["A.b"]}, {"epoch": "A.b"})
         (CAN | {"when_full": "block"}, "drop"),
         (CAN | {"options": {"a b": 1}}, "pattern"),
         (CAN | {"stale_after": 3.0}, "Extra inputs"),
-        *((CAN_PROFILE | own, "the profile knows its own") for own in CAN_OWN),
+        *((CAN_PROFILE | own, "a profile has its own") for own in CAN_OWN),
     ],
 )
 def test_a_wrong_value_of_a_can_source_is_refused(source, words):

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from service.settings.loading import MAX_FILE_BYTES, PlantFileError, load_plant_file
+from service.settings.loading import load_plant_file
+from service.settings.toml_file import MAX_FILE_BYTES, TomlFileError
 
 Changed = Callable[[str, str], tuple[str, int]]
 Mistakes = Callable[[str | bytes], list[str]]
@@ -112,10 +113,15 @@ BOTH = f'postgresql = "{ADDRESS} passfile=x"\npassword_file = "y"'
         ("alarms", "max_samples_lost_share = 0.0", "max_samples_lost_share = 0.0", "than 0"),
         ("alarms", "store_failing_after_s = -1.0", "store_failing_after_s = -1.0", "equal to 0"),
         ("store", 'password_file = "x"', "password_file = 'x'", "postgresql, which is not given"),
-        ("store", f'postgresql = "{ADDRESS} password=x"', "postgresql", "must not hold a password"),
-        ("store", 'postgresql = "postgresql://a:x@b.c/d"', "postgresql", "not hold a password"),
-        ("store", 'postgresql = "no address"', "postgresql", "is no connection string of libpq"),
-        ("store", 'postgresql = "hostname=x"', "postgresql", "is no connection string of libpq"),
+        (
+            "store",
+            f'postgresql = "{ADDRESS} password=x"',
+            "postgresql",
+            "must not contain a password",
+        ),
+        ("store", 'postgresql = "postgresql://a:x@b.c/d"', "postgresql", "not contain a password"),
+        ("store", 'postgresql = "no address"', "postgresql", "is not a libpq connection string"),
+        ("store", 'postgresql = "hostname=x"', "postgresql", "is not a libpq connection string"),
         ("store", BOTH, "password_file = 'y'", "is given as well as passfile"),
     ],
 )
@@ -220,7 +226,7 @@ def test_a_path_that_is_no_plant_file_is_refused_in_one_line(tmp_path: Path) -> 
         (pipe, "not a regular file"),
         (huge, f"larger than {MAX_FILE_BYTES} bytes"),
     ):
-        with pytest.raises(PlantFileError, match=said) as refusal:
+        with pytest.raises(TomlFileError, match=said) as refusal:
             load_plant_file(path)
         assert str(refusal.value).startswith(f"{path}: ")
         assert "\n" not in str(refusal.value)
@@ -228,7 +234,7 @@ def test_a_path_that_is_no_plant_file_is_refused_in_one_line(tmp_path: Path) -> 
 
 def test_a_file_that_is_nested_too_deeply_is_refused(mistakes: Mistakes) -> None:
     for text in ("a." * 20_000 + "a = 1", "a = " + "[" * 20_000 + "]" * 20_000):
-        assert mistakes(text) == [" nested too deeply for a plant file"]
+        assert mistakes(text) == [" nested too deeply"]
 
 
 def test_an_empty_file_or_a_key_with_a_line_break_is_refused_in_its_lines(
@@ -263,7 +269,7 @@ def test_a_line_that_two_units_or_two_devices_of_a_unit_are_read_on_is_refused(
     [said] = mistakes(text)
 
     assert said.startswith(f"{line}: unit[2].source.device = '/dev/ttyUSB0'")
-    assert "is read by source of unit[1] already: a serial line has one source" in said
+    assert "is read by source of unit[1] already; a line has one source" in said
 
     text, _ = changed(HOST, 'device = "/dev/ttyUSB0"')
     first, unit_1, unit_2 = text.split("\n[[unit]]\n")

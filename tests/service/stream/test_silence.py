@@ -14,7 +14,7 @@ from harness.moving_unit import Life, Message, MovingUnit
 from harness.stream_rig import analysing, blocks
 
 from service.cluster.frames import encoded_block
-from service.cluster.silent_units import Silence, silences_s
+from service.cluster.silent_units import SilenceWatch, silences_s
 from service.live.live_view import LinkState
 from service.settings.loading import load_plant_file
 from service.store.port import AlarmQuery
@@ -43,7 +43,7 @@ class Process:
     """One that analyses the unit, and sees whether it is silent."""
 
     life: Life
-    silence: Silence
+    silence: SilenceWatch
     clock: Any
     is_reached: bool = True
     waiting: Collection[str] = ()
@@ -105,9 +105,9 @@ class Place:
             life = await self._unit.begun(len(self.messages), stack)
             analysis = life.analysis
             parts = (analysis.analyser, analysis.ground.live, self._clock)
-            process = Process(life, Silence({UNIT: AFTER_S}, *parts), self._clock)
+            process = Process(life, SilenceWatch({UNIT: AFTER_S}, *parts), self._clock)
             process.is_reached = back is not Back.NO_STREAM
-            stored = life.progress.is_reliving
+            stored = life.progress.is_replaying
             if back is Back.WINDOW:
                 life.progress.reaches_back(1)
                 for sequence, payload in self.first if stored else []:
@@ -253,4 +253,4 @@ async def test_a_process_that_never_reaches_the_stream_says_that_its_units_are_l
                 await asyncio.sleep(0.01)
         status = ground.live.status(UNIT)
     assert status.state is LinkState.NOT_CONNECTED
-    assert "127.0.0.1:9 is not reached" in str(status.reason)
+    assert "127.0.0.1:9 cannot be reached" in str(status.reason)

@@ -84,7 +84,7 @@ def test_a_message_that_was_cut_or_grew_is_refused(
 @pytest.mark.parametrize(
     ("other", "kind", "word"),
     [
-        ({"plant": fingerprint("Elsewhere")}, "other_plant", "own stream"),
+        ({"plant": fingerprint("Elsewhere")}, "other_plant", "one stream"),
         ({"make": fingerprint("sx", "sz")}, "other_configuration", "same plant file"),
         ({"unit": "U2"}, "other_unit", "'U1'"),
     ],

@@ -15,7 +15,7 @@ from service.runtime.service_manager import ServiceManager
 def test_a_manager_hears_what_it_is_told_without_line_breaks(manager_socket: Any) -> None:
     manager = ServiceManager(manager_socket.environment)
 
-    manager.tell(READY="1", STATUS="all well\nWATCHDOG=trigger")
+    manager.notify(READY="1", STATUS="all well\nWATCHDOG=trigger")
 
     assert manager.listens
     assert manager.watchdog_s == 10.0
@@ -28,7 +28,7 @@ def test_without_a_socket_nobody_is_told(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(socket, "socket", refuse)
     manager = ServiceManager({"WATCHDOG_USEC": "10000000"})
-    manager.tell(READY="1")
+    manager.notify(READY="1")
 
     assert not manager.listens
     assert manager.watchdog_s is None
@@ -51,7 +51,7 @@ def test_a_watchdog_that_is_not_for_this_process_is_not_fed(given: dict[str, str
 def test_an_address_of_another_kind_is_not_used(address: str) -> None:
     with structlog.testing.capture_logs() as said:
         manager = ServiceManager({"NOTIFY_SOCKET": address})
-        manager.tell(READY="1")
+        manager.notify(READY="1")
 
     assert not manager.listens
     assert [entry["value"] for entry in said] == [address]
@@ -61,8 +61,8 @@ def test_a_manager_that_is_gone_is_logged_once_and_stops_nothing(tmp_path: Path)
     manager = ServiceManager({"NOTIFY_SOCKET": str(tmp_path / "gone")})
 
     with structlog.testing.capture_logs() as said:
-        manager.tell(WATCHDOG="1")
-        manager.tell(WATCHDOG="1")
+        manager.notify(WATCHDOG="1")
+        manager.notify(WATCHDOG="1")
 
     assert [entry["event"] for entry in said] == ["the service manager is not reached"]
 
@@ -72,7 +72,7 @@ def test_a_manager_that_does_not_read_never_makes_the_service_wait(manager_socke
 
     with structlog.testing.capture_logs() as said:
         for _ in range(100_000):
-            manager.tell(WATCHDOG="1")
+            manager.notify(WATCHDOG="1")
             if said:
                 break
 

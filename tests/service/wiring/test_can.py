@@ -60,10 +60,10 @@ def test_the_example_dbc_can_be_named_as_any_other(unit, stepped_clock):
 @pytest.mark.parametrize(
     ("keys", "said"),
     [
-        ({"profile": "padwatch_int16", "channel": "can0"}, "is no place for a simulated DAQ"),
+        ({"profile": "padwatch_int16", "channel": "can0"}, "a simulated DAQ cannot use channel"),
         (
             {"profile": "padwatch_int16", "channel": "socket://127.0.0.1:x"},
-            "is no place for a simulated DAQ",
+            "a simulated DAQ cannot use channel",
         ),
         ({"dbc": "demo_classic.dbc", "signals": {"x": "A.b"}}, "reads CAN by its own DBC"),
     ],

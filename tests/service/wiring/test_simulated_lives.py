@@ -19,8 +19,9 @@ from core.monitor.monitor import UnitMonitor
 from core.units import NS_PER_S
 from service.measuring.simulated_sources import scenario_of, simulated_feed, simulated_history
 from service.settings.core_values import analysis_of, calibration_of, machine_of
-from service.settings.loading import PlantFileError, load_plant_file
+from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
+from service.settings.toml_file import TomlFileError
 
 DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
 CLEARANCE_UM = {"UJB": 500.0, "LJB": 615.0, "TJB": 425.0}
@@ -127,6 +128,6 @@ def test_a_wrong_life_is_refused_with_key_and_value(
     tmp_path: Path, old: str, new: str, said: str
 ) -> None:
     assert old in LIFE
-    with pytest.raises(PlantFileError) as refusal:
+    with pytest.raises(TomlFileError) as refusal:
         plant_with(LIFE.replace(old, new, 1), tmp_path)
     assert said in str(refusal.value)

@@ -15,7 +15,7 @@ from service.cluster.progress import UnitProgress, memories_of, usable
 from service.cluster.session import identity_of
 from service.measuring.acquirer import Bus
 from service.measuring.recorder import Findings
-from service.notifications.message import Around
+from service.notifications.message import LiveContext
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.sqlite import SqliteStore
@@ -46,7 +46,7 @@ class Life:
 
     async def store(self) -> None:
         """Store everything, with how far it is."""
-        if not self.progress.is_reliving:
+        if not self.progress.is_replaying:
             self.analysis.recorder.put(Findings(position=self.progress.position()))
         await self.analysis.recorder.flush()
 
@@ -114,7 +114,7 @@ class MovingUnit:
         found = store.position(unit.id)
         memories = memories_of([found] if found else [])
         analysis = await analysis_on(
-            ground, monitors, Bus(512, clock), Around(live), memories=memories
+            ground, monitors, Bus(512, clock), LiveContext(live), memories=memories
         )
         parts = (analysis.analyser, live, analysis.recorder, clock)
         stored, memory = usable(found, STREAM, newest), memories.get(unit.id)

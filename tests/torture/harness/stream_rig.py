@@ -31,7 +31,7 @@ from service.live.live_view import LinkState
 from service.measuring.acquirer import Bus, LinkNews
 from service.measuring.sources import monitor_of
 from service.measuring.timings import Timings
-from service.notifications.message import Around
+from service.notifications.message import LiveContext
 from service.runtime.heartbeats import Heartbeats
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
@@ -114,7 +114,9 @@ async def analysing(plant: PlantFile) -> AsyncIterator[tuple[Analysing, Ground]]
     store = open_store(plant)
     ground, monitors = ground_of(plant, SystemClock(), store)
     assert plant.stream is not None
-    process = Analysing(plant, Partition(), plant.stream, monitors, ground, Around(ground.live))
+    process = Analysing(
+        plant, Partition(), plant.stream, monitors, ground, LiveContext(ground.live)
+    )
     task = asyncio.create_task(process._analyse())
     try:
         yield process, ground
@@ -152,7 +154,7 @@ async def single_process(plant_file: Path, sent: Sequence[Sent]) -> Path:
     path = Path(plant.service.data_folder) / "padwatch.sqlite3"
     store = SqliteStore(path)
     ground, monitors = ground_of(plant, clock, store)
-    analysis = await analysis_on(ground, monitors, Bus(512, clock), Around(ground.live))
+    analysis = await analysis_on(ground, monitors, Bus(512, clock), LiveContext(ground.live))
     try:
         for unit, message in sent:
             if isinstance(message, LinkNews):

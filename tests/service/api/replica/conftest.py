@@ -10,7 +10,7 @@ from rigs.described import described_app
 
 from core.alarms.alarm import PLANT
 from service.app.serving_process import Replica, replica_context, replica_on
-from service.cluster.reported_commands import CarryingOut
+from service.cluster.reported_commands import CommandWorker
 from service.cluster.reported_state import Reporter
 from service.runtime.heartbeats import Heartbeats
 from service.settings.plant import PlantFile
@@ -24,7 +24,7 @@ class Pair:
     replica: Replica
     client: httpx2.AsyncClient
     reporter: Reporter
-    carrying_out: CarryingOut
+    carrying_out: CommandWorker
 
     async def told(self) -> None:
         """Let the service report, and the replica read it."""
@@ -41,14 +41,14 @@ class Pair:
         return answer.json()
 
 
-def process_of(service: Any, plant: PlantFile, name: str) -> tuple[Reporter, CarryingOut]:
+def process_of(service: Any, plant: PlantFile, name: str) -> tuple[Reporter, CommandWorker]:
     """What a process that analyses adds to the service."""
     held = [*(unit.id for unit in plant.unit), PLANT]
     parts = (service.alarms, service.films)
     store, clock = service.store, service.clock
     return (
         Reporter(name, plant.unit, lambda: held, service.live, *parts, store.unit_states, clock),
-        CarryingOut(name, lambda: held, *parts, service.recorder, store, clock),
+        CommandWorker(name, lambda: held, *parts, service.recorder, store, clock),
     )
 
 

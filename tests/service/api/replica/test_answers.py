@@ -7,7 +7,7 @@ import pytest
 from core.alarms.alarm import AlarmState
 from core.limits import AlarmLevel
 from service.app.serving_process import replica_on
-from service.cluster.replica_state import NOBODY, SILENT_AFTER_S
+from service.cluster.replica_state import NOT_ANALYSED, SILENT_AFTER_S
 from service.live.live_view import LinkState
 from service.store.port import StoreError
 
@@ -56,7 +56,7 @@ async def test_a_process_that_has_died_is_not_shown_as_healthy(pair: Any) -> Non
     alarms = await pair.json("/api/v1/alarms")
     assert latest["quality"] == {"level": "bad", "reason": "not_connected"}
     assert {reading["value"] for reading in latest["readings"].values()} == {None}
-    assert (unit["source"]["state"], unit["source"]["reason"]) == ("not_connected", NOBODY)
+    assert (unit["source"]["state"], unit["source"]["reason"]) == ("not_connected", NOT_ANALYSED)
     known = {a["id"] for a in alarms["alarms"] if a["condition"] != "unknown"}
     assert known == set()
     assert {a["id"] for a in alarms["unjudged"]} >= {"U1:link:link_lost"}

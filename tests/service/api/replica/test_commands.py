@@ -9,7 +9,7 @@ import pytest
 from harness.waiting import at_work
 
 from core.alarms.operation import Comment
-from service.cluster.reported_commands import WAIT_S, Asking
+from service.cluster.reported_commands import WAIT_S, CommandClient
 from service.live.commands import OnAlarm, read, written
 from service.store.port import AlarmQuery
 from service.store.sharing import Answer, Command, CommandState
@@ -44,7 +44,7 @@ async def post(pair: Any, action: str, **body: object) -> httpx2.Response:
 
 def ask_for_a_comment(pair: Any) -> Command:
     """Ask as a replica does, without waiting for an answer."""
-    asking = Asking(pair.service.store, pair.replica.alarms, pair.service.clock)
+    asking = CommandClient(pair.service.store, pair.replica.alarms, pair.service.clock)
     command = asking._command("U1", OnAlarm(LINK, Comment("anna", "seen")), "anna")
     pair.service.store.commands.ask(command)
     return command
@@ -102,7 +102,7 @@ async def test_a_command_whose_asker_was_killed_is_not_carried_out_late(
     pair: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     await raise_alarm(pair)
-    monkeypatch.setattr(Asking, "_answer", _killed_in)
+    monkeypatch.setattr(CommandClient, "_answer", _killed_in)
     with pytest.raises(KeyboardInterrupt):
         await post(pair, "acknowledge", occurrence=1)
     pair.pass_time(60.0)
@@ -163,7 +163,7 @@ async def test_a_store_that_comes_back_late_is_told_of(
     await raise_alarm(pair)
     monkeypatch.setattr(pair.service.alarms, "_put", lambda _: None)
     monkeypatch.setattr(pair.service.recorder, "stored", _never)
-    monkeypatch.setattr(Asking, "_give_up", _after(pair))
+    monkeypatch.setattr(CommandClient, "_give_up", _after(pair))
     monkeypatch.setattr("service.cluster.reported_commands.EXPIRES_S", 1e6)  # time only steps here
     async with at_work(pair.carrying_out.run()):
         answer = await post(pair, "acknowledge", occurrence=1)
@@ -174,9 +174,9 @@ async def test_a_store_that_comes_back_late_is_told_of(
 
 def _after(pair: Any) -> Any:
     """Give up, but not before the command was taken."""
-    give_up = Asking._give_up
+    give_up = CommandClient._give_up
 
-    def late(self: Asking, command: Command, found: Answer) -> Answer:
+    def late(self: CommandClient, command: Command, found: Answer) -> Answer:
         while not pair.service.store.commands.open(["U1"])[0].taken_by:
             pass
         return give_up(self, command, found)
