@@ -23,12 +23,12 @@ from service.api.auth.refusals import Refusals
 from service.api.downloads import Downloads
 from service.api.load import LoadWatch
 from service.api.problems import ProblemError
-from service.live.alarm_board import AlarmBoard, EvidenceStatus
+from service.live.alarm_board import AlarmList, EvidenceStatus
 from service.live.commands import BaselineAction, FilmPlace
 from service.live.live_view import CurrentBearing, UnitStatus
 from service.measuring.references_in_force import ReferencesInForce
 from service.notifications.sender import ReceiverView
-from service.recordings.continuous_recorder import Tape
+from service.recordings.continuous_recorder import ContinuousRecorder
 from service.runtime.disk import SpaceWatch
 from service.runtime.polls import TimedSource
 from service.settings.bearings import BearingSettings
@@ -239,7 +239,7 @@ class Context:
     clock: Clock
     refresh_s: float
     references: ReferencesInForce
-    alarms: AlarmBoard
+    alarms: AlarmList
     films: FilmBoard
     operators: Operators
     captures: CaptureLook
@@ -258,7 +258,7 @@ class Context:
     access: AccessDesk | None = None
     space: SpaceWatch | None = None
     load: LoadWatch | None = None
-    tape: Tape | None = None
+    tape: ContinuousRecorder | None = None
     recordings: Sequence[pathlib.Path] | None = None
     faults: Callable[[], Mapping[str, str]] = dict
 

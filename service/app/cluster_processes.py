@@ -29,7 +29,7 @@ from service.live.live_view import LiveView
 from service.measuring.acquirer import Acquirer, Bus
 from service.measuring.analyser import BUS_CAPACITY, UnitMemory
 from service.measuring.counters import store_info
-from service.measuring.service_alarms import SHARED, StreamLook
+from service.measuring.service_alarms import SHARED, StreamStatus
 from service.measuring.sources import WatchedUnit
 from service.measuring.timings import Timings, timed_monitors
 from service.notifications.message import Around
@@ -226,7 +226,7 @@ class Analysing:
             if (found := await asyncio.to_thread(ground.store.position, unit)) is not None
         }
         self._memories = memories_of(self._stored.values())
-        stream = StreamLook(self._trouble, self._behind_s)
+        stream = StreamStatus(self._trouble, self._behind_s)
         analysis = await analysis_on(
             ground, monitors, bus, self._around, self._share, self._memories, stream
         )

@@ -6,11 +6,11 @@ from service.api.load import LoadWatch
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Bus
 from service.measuring.recorder import Recorder
-from service.measuring.service_alarms import LookAtHealth, ServiceHealth, StreamLook, enough_room
-from service.measuring.soundness import Soundness
+from service.measuring.service_alarms import HealthProbe, ServiceHealth, StreamStatus, enough_room
+from service.measuring.soundness import IntegrityMonitor
 from service.recordings.around_alarms import Captures
-from service.recordings.continuous_recorder import Shed, Tape
-from service.recordings.keeper import WaveformKeeper
+from service.recordings.continuous_recorder import DropReason, ContinuousRecorder
+from service.recordings.keeper import RecordingIndexer
 from service.runtime.disk import SpaceWatch
 
 
@@ -22,11 +22,11 @@ def health_of(
     bus: Bus,
     space: SpaceWatch | None = None,
     load: LoadWatch | None = None,
-    tape: Tape | None = None,
-    recordings: WaveformKeeper | None = None,
-    soundness: Soundness | None = None,
-    stream: StreamLook | None = None,
-) -> LookAtHealth:
+    tape: ContinuousRecorder | None = None,
+    recordings: RecordingIndexer | None = None,
+    soundness: IntegrityMonitor | None = None,
+    stream: StreamStatus | None = None,
+) -> HealthProbe:
     """Return a function that reads the health of the running service."""
     names = list(units)
 
@@ -55,7 +55,9 @@ def health_of(
     return look
 
 
-def recording_error(tape: Tape | None, recordings: WaveformKeeper | None) -> str | None:
+def recording_error(
+    tape: ContinuousRecorder | None, recordings: RecordingIndexer | None
+) -> str | None:
     """Return why samples are not recorded or recordings not maintained; None if neither."""
     now = tape.trouble if tape else None
     return now or (recordings.lasting_trouble if recordings else None)
@@ -91,7 +93,7 @@ class Pressure:
         self._bus, self._is_full, self._has_shed = bus, is_full, has_shed
         self._is_behind = False
 
-    def look(self) -> Shed | None:
+    def look(self) -> DropReason | None:
         """Return why recording pauses now, or None."""
         share = CAUGHT_UP if self._is_behind else 1.0
         is_behind = (
@@ -100,5 +102,5 @@ class Pressure:
         )
         self._is_behind = is_behind and (self._is_behind or self._has_shed())
         if self._is_behind:
-            return Shed.ANALYSIS_BEHIND
-        return Shed.DISK_FULL if self._is_full() else None
+            return DropReason.ANALYSIS_BEHIND
+        return DropReason.DISK_FULL if self._is_full() else None

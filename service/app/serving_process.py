@@ -33,7 +33,7 @@ from service.cluster.replica_state import (
 from service.cluster.reported_commands import Asking
 from service.cluster.reported_state import Described, Feed
 from service.measuring.acquirer import Bus
-from service.measuring.commands import InProcess
+from service.measuring.commands import LocalCommands
 from service.measuring.references_in_force import ReferencesInForce
 from service.measuring.timings import Timings
 from service.reports.routes import EvidenceDesk
@@ -128,7 +128,7 @@ def context_of(
         references=analysis.references,
         alarms=analysis.alarms,
         films=analysis.films,
-        operators=InProcess(analysis.alarms, analysis.films, analysis.recorder),
+        operators=LocalCommands(analysis.alarms, analysis.films, analysis.recorder),
         captures=analysis.captures,
         deliveries=analysis.deliveries,
         evidence=lambda: analysis.evidence.status,

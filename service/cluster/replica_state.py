@@ -23,11 +23,11 @@ from core.quality import Level, Reason, bad, missing
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import NO_SPECTRUM
 from service.live.alarm_board import AlarmCount, count_of
-from service.live.commands import FilmPlace, NotHereError
+from service.live.commands import FilmPlace, NotAvailableError
 from service.live.live_view import CurrentBearing, LinkState, UnitStatus
 from service.live.unit_state import BearingState, UnitSigns, UnitState
 from service.measuring.counters import alarm_metrics, film_metrics, store_info
-from service.measuring.service_alarms import SHARED, is_shared, told_by
+from service.measuring.service_alarms import SHARED, is_shared, reporting_unit
 from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import Receiver, ReceiverView, SenderState, SenderStatus
 from service.runtime.metrics import gauge
@@ -156,8 +156,8 @@ class ReplicaLive:
         return known.shown if self.is_alive(unit) else known.silent
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Raise `NotHereError`: samples stay in the process that analyses them."""
-        raise NotHereError(f"live samples of unit {unit} are not available from this replica")
+        """Raise `NotAvailableError`: samples stay in the process that analyses them."""
+        raise NotAvailableError(f"live samples of unit {unit} are not available from this replica")
 
     def newest_block(self, unit: str) -> SampleBlock | None:  # noqa: ARG002  as the port has it
         """Return None: samples stay in the process that analyses them."""
@@ -172,10 +172,10 @@ class ReplicaLive:
         return self._age_s(unit, self._known[unit].signs.data_age_s)
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """Nothing if there is no result; else raise `NotHereError`: arrays stay where they are."""
+        """Nothing if there is no result; else raise `NotAvailableError`: arrays stay where they are."""
         if bearing not in self._known[unit].results:
             return None
-        raise NotHereError(
+        raise NotAvailableError(
             f"live spectra and orbits of unit {unit} are not available from this replica;"
             " spectra over time are"
         )
@@ -357,7 +357,7 @@ class ReplicaAlarms:
         """Its unit, or who else tells of it where it is of no unit that there is."""
         if is_shared(alarm):
             return SHARED
-        unit = told_by(alarm.identity)
+        unit = reporting_unit(alarm.identity)
         return unit if unit in self._units else PLANT
 
     def count(self) -> AlarmCount:

@@ -14,17 +14,17 @@ from service.live.commands import (
     BaselineAction,
     BaselineRefusedError,
     FilmPlace,
-    NewReference,
-    NotCarriedOutError,
-    OnAlarm,
-    OnBaselines,
-    Task,
+    ReferenceCommand,
+    CommandFailedError,
+    AlarmCommand,
+    BaselineCommand,
+    Command,
     UnreadableCommandError,
-    read,
-    written,
+    decoded,
+    encoded,
 )
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.measuring.recorder import NotStoredError, Recorder
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import TroubleLog
@@ -51,7 +51,7 @@ class Asking:
     async def operate(self, id_: str, action: Action) -> Alarm:
         """Do something to an alarm; returns it as it is then, on the disk."""
         unit = self._alarms.owner(id_)
-        answer = await self._ask(unit, OnAlarm(id_, action), action.actor)
+        answer = await self._ask(unit, AlarmCommand(id_, action), action.actor)
         if answer.state is CommandState.UNKNOWN:
             raise LookupError(answer.words)
         if answer.state is CommandState.REFUSED:
@@ -61,34 +61,34 @@ class Asking:
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
         """Do something to the baselines of a bearing."""
-        answer = await self._ask(place.unit, OnBaselines(place, action, actor, reason), actor)
+        answer = await self._ask(place.unit, BaselineCommand(place, action, actor, reason), actor)
         if answer.state is CommandState.REFUSED:
             raise BaselineRefusedError(answer.words)
 
     async def refer_to(self, reference: VectorReference) -> None:
         """Compare 1× vectors with a reference that has just been stored."""
-        await self._ask(reference.unit, NewReference(reference.unit), acting().actor)
+        await self._ask(reference.unit, ReferenceCommand(reference.unit), acting().actor)
 
-    async def _ask(self, unit: str, task: Task, actor: str) -> Answer:
+    async def _ask(self, unit: str, task: Command, actor: str) -> Answer:
         """Write it down and wait.
 
         Raises
         ------
-        NotCarriedOutError
+        CommandFailedError
             If nobody does it, or it is in doubt.
         """
         command = self._command(unit, task, actor)
         await asyncio.to_thread(self._store.commands.ask, command)
         answer = await self._answer(command)
         if answer.state in (CommandState.WITHDRAWN, CommandState.INTERRUPTED):
-            raise NotCarriedOutError("Not carried out", f"unit {unit}: {answer.words}")
+            raise CommandFailedError("Not carried out", f"unit {unit}: {answer.words}")
         if answer.state in OPEN:
             detail = f"unit {unit}: it is being carried out, but is not on the disk yet"
-            raise NotCarriedOutError("Not on the disk yet", detail)
+            raise CommandFailedError("Not on the disk yet", detail)
         return answer
 
-    def _command(self, unit: str, task: Task, actor: str) -> Command:
-        kind, document = written(task)
+    def _command(self, unit: str, task: Command, actor: str) -> Command:
+        kind, document = encoded(task)
         now_ns = self._clock.now_ns()
         expires_ns = now_ns + ns_from_s(EXPIRES_S)
         who = (actor, acting().peer)
@@ -143,7 +143,7 @@ class CarryingOut:
         process: str,
         held: Callable[[], Collection[str]],
         alarms: AlarmEngine,
-        films: FilmKeeper,
+        films: FilmMonitor,
         recorder: Recorder,
         store: Store,
         clock: Clock,
@@ -184,18 +184,18 @@ class CarryingOut:
         if self._clock.now_ns() > found.command.expires_ns:
             return TOO_LATE
         try:
-            task = read(found.command.kind, found.command.document)
+            task = decoded(found.command.kind, found.command.document)
         except UnreadableCommandError as error:
             return Answer(CommandState.REFUSED, str(error))
         # baselines are written in a transaction of their own: it may be done, or not
-        is_in_doubt = isinstance(task, OnBaselines) and found.taken_by is not None
+        is_in_doubt = isinstance(task, BaselineCommand) and found.taken_by is not None
         return INTERRUPTED if is_in_doubt else None
 
     async def _carry_out(self, command: Command) -> Answer:
         who = Acting(Source.API, command.peer, command.actor, command.id)
         try:
             with acting_as(who):
-                await self._do(read(command.kind, command.document))
+                await self._do(decoded(command.kind, command.document))
         except LookupError:
             return Answer(CommandState.UNKNOWN, "there is no such alarm")
         except (ActionRefusedError, BaselineRefusedError) as error:
@@ -207,13 +207,13 @@ class CarryingOut:
             )
         return DONE
 
-    async def _do(self, task: Task) -> None:
-        if isinstance(task, OnAlarm):
+    async def _do(self, task: Command) -> None:
+        if isinstance(task, AlarmCommand):
             self._alarms.operate(task.alarm, task.action)
             await self._recorder.stored()
-        elif isinstance(task, OnBaselines):
+        elif isinstance(task, BaselineCommand):
             await self._films.act(task.place, task.action, task.actor, task.reason)
-        elif isinstance(task, NewReference):
+        elif isinstance(task, ReferenceCommand):
             in_force = await asyncio.to_thread(self._store.order1_references.in_force)
             for found in in_force:
                 if found.reference.unit == task.unit:

@@ -25,8 +25,8 @@ from service.live.unit_state import (
 )
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.describing import alarm_state, plant_signs, unit_signs, unit_state
-from service.measuring.films import FilmKeeper
-from service.measuring.service_alarms import SHARED, is_shared, told_by
+from service.measuring.films import FilmMonitor
+from service.measuring.service_alarms import SHARED, is_shared, reporting_unit
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import TroubleLog
 from service.settings.units import UnitSettings
@@ -69,7 +69,7 @@ class Reporter:
         held: Callable[[], Iterable[str]],
         live: LiveView,
         alarms: AlarmEngine,
-        films: FilmKeeper,
+        films: FilmMonitor,
         store: UnitStates,
         clock: Clock,
     ) -> None:
@@ -127,7 +127,8 @@ class Reporter:
         others = [
             alarm
             for alarm in self._alarms.alarms
-            if told_by(alarm.identity) not in self._units and is_shared(alarm) == (unit == SHARED)
+            if reporting_unit(alarm.identity) not in self._units
+            and is_shared(alarm) == (unit == SHARED)
         ]
         return alarm_state(others, self._alarms), plant_signs(self._live)
 

@@ -12,7 +12,7 @@ from service.live.live_view import LinkState, LiveView
 from service.measuring.acquirer import LinkNews
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import Analyser
-from service.measuring.service_alarms import ToldAlarms, gone_alarms, is_shared, judge
+from service.measuring.service_alarms import ReportedAlarms, gone_alarms, is_shared, judge
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.units import UnitSettings
 from service.store.port import Store, StoreError
@@ -46,7 +46,7 @@ class SilentUnits:
         self._beats: dict[str, tuple[str, int]] = {}
         self._heard_s: dict[str, float] = {}
         self._since_s = 0.0
-        self._board: ToldAlarms | None = None
+        self._board: ReportedAlarms | None = None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Look for as long as this process leads."""
@@ -85,7 +85,7 @@ class SilentUnits:
         """Whether the alarms are this process's just now."""
         return self._board is not None
 
-    def _kept(self, stored: Iterable[Alarm]) -> ToldAlarms:
+    def _kept(self, stored: Iterable[Alarm]) -> ReportedAlarms:
         """Take the alarms over, and wait anew, whoever was heard before."""
         board = gone_alarms(self._units)
         self._alarms.keep(board, [alarm for alarm in stored if is_shared(alarm)])

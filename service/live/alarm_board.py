@@ -48,7 +48,7 @@ def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> Ala
     )
 
 
-class AlarmBoard(Protocol):
+class AlarmList(Protocol):
     """All alarms as they are; see :class:`service.measuring.alarms.engine.AlarmEngine`."""
 
     @property

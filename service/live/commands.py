@@ -59,7 +59,7 @@ class Renew:
 BaselineAction: TypeAlias = Accept | Reject | Freeze | Thaw | Renew
 
 
-def step_of(
+def baseline_step(
     action: BaselineAction,
     place: FilmPlace,
     versions: Versions,
@@ -137,7 +137,7 @@ class UnreadableCommandError(Exception):
 
 
 @dataclass(frozen=True)
-class OnAlarm:
+class AlarmCommand:
     """Something that is done to an alarm."""
 
     alarm: str
@@ -145,7 +145,7 @@ class OnAlarm:
 
 
 @dataclass(frozen=True)
-class OnBaselines:
+class BaselineCommand:
     """Something that is done to the baselines of a bearing."""
 
     place: FilmPlace
@@ -155,13 +155,13 @@ class OnBaselines:
 
 
 @dataclass(frozen=True)
-class NewReference:
+class ReferenceCommand:
     """A reference of 1× was stored for a bearing of a unit."""
 
     unit: str
 
 
-Task: TypeAlias = OnAlarm | OnBaselines | NewReference
+Command: TypeAlias = AlarmCommand | BaselineCommand | ReferenceCommand
 
 _ALARM_ACTIONS: dict[str, type[Any]] = {
     kind.__name__: kind
@@ -174,7 +174,7 @@ _ALARM_ACTIONS: dict[str, type[Any]] = {
 _BASELINE_ACTIONS: dict[str, type[Any]] = {
     kind.__name__: kind for kind in (Accept, Reject, Freeze, Thaw, Renew)
 }
-_REFERENCE = NewReference.__name__
+_REFERENCE = ReferenceCommand.__name__
 _ON_ALARM = {k: TypeAdapter(tuple[str, c]) for k, c in _ALARM_ACTIONS.items()}  # type: ignore[valid-type]
 _ON_BASELINES = {
     k: TypeAdapter(tuple[FilmPlace, c, str, str])  # type: ignore[valid-type]
@@ -182,19 +182,19 @@ _ON_BASELINES = {
 }
 
 
-def written(task: Task) -> tuple[str, str]:
+def encoded(task: Command) -> tuple[str, str]:
     """Kind and document of a task; `read` gives an equal one."""
-    if isinstance(task, OnAlarm):
+    if isinstance(task, AlarmCommand):
         kind = type(task.action).__name__
         return kind, _ON_ALARM[kind].dump_json((task.alarm, task.action)).decode()
-    if isinstance(task, OnBaselines):
+    if isinstance(task, BaselineCommand):
         kind = type(task.action).__name__
         whole = (task.place, task.action, task.actor, task.reason)
         return kind, _ON_BASELINES[kind].dump_json(whole).decode()
-    return _REFERENCE, TypeAdapter(NewReference).dump_json(task).decode()
+    return _REFERENCE, TypeAdapter(ReferenceCommand).dump_json(task).decode()
 
 
-def read(kind: str, document: str) -> Task:
+def decoded(kind: str, document: str) -> Command:
     """Read a task.
 
     Raises
@@ -204,21 +204,21 @@ def read(kind: str, document: str) -> Task:
     """
     try:
         if kind in _ON_ALARM:
-            return OnAlarm(*_ON_ALARM[kind].validate_json(document))
+            return AlarmCommand(*_ON_ALARM[kind].validate_json(document))
         if kind in _ON_BASELINES:
-            return OnBaselines(*_ON_BASELINES[kind].validate_json(document))
+            return BaselineCommand(*_ON_BASELINES[kind].validate_json(document))
         if kind == _REFERENCE:
-            return TypeAdapter(NewReference).validate_json(document)
+            return TypeAdapter(ReferenceCommand).validate_json(document)
     except ValidationError as error:
         raise UnreadableCommandError(f"command {kind} cannot be read: {error}") from error
     raise UnreadableCommandError(f"this padwatch knows no command {kind!r}")
 
 
-class NotHereError(Exception):
+class NotAvailableError(Exception):
     """It exists only in the process that analyses; the message says so."""
 
 
-class NotCarriedOutError(Exception):
+class CommandFailedError(Exception):
     """What somebody asked for is not done, or not on the disk; the message says which."""
 
     def __init__(self, title: str, detail: str) -> None:

@@ -24,14 +24,14 @@ from service.live.alarm_board import AlarmCount, count_of
 from service.measuring.recorder import Findings
 from service.measuring.service_alarms import (
     HostTime,
-    LookAtHealth,
+    HealthProbe,
     ServiceAlarms,
-    ToldAlarms,
+    ReportedAlarms,
     is_shared,
     refuse,
     service_rules_of,
     stream_alarms,
-    told_by,
+    reporting_unit,
 )
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.alarm_kinds import MESSAGES_REFUSED
@@ -59,7 +59,7 @@ NO_FILMS: Mapping[str, Judgement] = MappingProxyType({})
 WITHOUT_LINK = (LINK_LOST, MESSAGES_REFUSED)
 """Kinds that are judged also while no samples arrive."""
 
-Board = UnitAlarms | ServiceAlarms | ToldAlarms
+Board = UnitAlarms | ServiceAlarms | ReportedAlarms
 
 LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
 
@@ -91,12 +91,12 @@ class AlarmEngine:
         listener: Callable[[SampleBlock, Sequence[AlarmNews]], None] | None = None,
         service: ServiceAlarms | None = None,
         chatter: ChatterRule | None = None,
-        stream: ToldAlarms | None = None,
+        stream: ReportedAlarms | None = None,
     ) -> None:
         self._units, self._put, self._clock, self._listener = units, put, clock, listener
         self._service = service or ServiceAlarms()
         self._stream = stream
-        self._kept: list[ToldAlarms] = [] if stream is None else [stream]
+        self._kept: list[ReportedAlarms] = [] if stream is None else [stream]
         self.chatter_rule = chatter or ChatterRule()
         self._chatter = ChatterWatch(self.chatter_rule)
         self._time = HostTime(clock)
@@ -129,13 +129,13 @@ class AlarmEngine:
         others = [alarm for alarm in found if alarm.identity.unit not in self._units]
         self._publish(self._service.restore(others, now_ns))
 
-    def keep(self, board: ToldAlarms, stored: Iterable[Alarm]) -> None:
+    def keep(self, board: ReportedAlarms, stored: Iterable[Alarm]) -> None:
         """Take over alarms that were another process's until now, as they were stored."""
         self._kept.append(board)
         self._publish(board.restore(stored, self._clock.now_ns()))
         self.revision += 1
 
-    def drop(self, board: ToldAlarms) -> None:
+    def drop(self, board: ReportedAlarms) -> None:
         """Leave alarms to another process."""
         self._kept.remove(board)
         self.revision += 1
@@ -339,7 +339,7 @@ async def alarm_engine(
     clock: Clock,
     listener: Listener | None = None,
     rows: Mapping[str, Sequence[str]] = MappingProxyType({}),
-    look: LookAtHealth | None = None,
+    look: HealthProbe | None = None,
     part: PlantPart = WHOLE,
     memories: Mapping[str, AlarmMemory] = NO_MEMORIES,
 ) -> AlarmEngine:
@@ -383,7 +383,7 @@ async def alarm_engine(
     ours = [
         alarm
         for alarm in stored
-        if part.looks_after(told_by(alarm.identity)) and (is_alone or not is_shared(alarm))
+        if part.looks_after(reporting_unit(alarm.identity)) and (is_alone or not is_shared(alarm))
     ]
     engine.restore(ours, memories)
     for held in await asyncio.to_thread(store.order1_references.in_force):

@@ -14,7 +14,7 @@ from core.samples.gaps import Count, Counts, SampleAccount
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Acquirer, Bus, LinkNews
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.measuring.recorder import Findings, Recorder
 from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import Heartbeats, Pulse
@@ -65,7 +65,7 @@ class Analyser:
         live: LiveView,
         recorder: Recorder,
         alarms: AlarmEngine,
-        films: FilmKeeper,
+        films: FilmMonitor,
     ) -> None:
         self._monitors, self._live, self._recorder = monitors, live, recorder
         self._alarms, self._films = alarms, films
@@ -177,7 +177,7 @@ class Runner:
         recorder: Recorder,
         clock: Clock,
         alarms: AlarmEngine,
-        films: FilmKeeper,
+        films: FilmMonitor,
         bus: Bus | None = None,
         beats: Heartbeats | None = None,
     ) -> None:

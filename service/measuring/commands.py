@@ -5,9 +5,9 @@ import asyncio
 from core.alarms.alarm import Alarm
 from core.alarms.judgements import VectorReference
 from core.alarms.operation import Action
-from service.live.commands import BaselineAction, FilmPlace, NotCarriedOutError
+from service.live.commands import BaselineAction, FilmPlace, CommandFailedError
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.measuring.recorder import NotStoredError, Recorder
 from service.store.port import StoreError
 
@@ -18,10 +18,10 @@ ANSWERS_WITHIN_S = 10.0
 """And how long before that, to see whether it takes anything."""
 
 
-class InProcess:
+class LocalCommands:
     """Asks the engine and the keeper of this process."""
 
-    def __init__(self, alarms: AlarmEngine, films: FilmKeeper, recorder: Recorder) -> None:
+    def __init__(self, alarms: AlarmEngine, films: FilmMonitor, recorder: Recorder) -> None:
         self._alarms, self._films, self._recorder = alarms, films, recorder
 
     async def operate(self, id_: str, action: Action) -> Alarm:
@@ -35,13 +35,13 @@ class InProcess:
             async with asyncio.timeout(STORED_WITHIN_S):
                 await self._recorder.stored()
         except TimeoutError as error:
-            raise NotCarriedOutError(
+            raise CommandFailedError(
                 "Not on the disk yet",
                 f"alarm {id_} is {alarm.state.value}, but the store does not answer:"
                 " a restart now would undo it. It is tried again until it is stored",
             ) from error
         except NotStoredError as error:
-            raise NotCarriedOutError(
+            raise CommandFailedError(
                 "Not stored",
                 f"alarm {id_} is {alarm.state.value}, but this is not in its history, and a restart"
                 f" undoes it: {error}",
@@ -53,7 +53,7 @@ class InProcess:
             async with asyncio.timeout(ANSWERS_WITHIN_S):
                 await self._recorder.require_store()
         except (StoreError, TimeoutError) as error:
-            raise NotCarriedOutError(
+            raise CommandFailedError(
                 "Nothing was done",
                 f"alarm {alarm.identity.id} is {alarm.state.value}, as before: what people do is"
                 f" done only if it can be stored ({error or 'the store does not answer'})",

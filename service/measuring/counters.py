@@ -13,11 +13,11 @@ from core.limits import AlarmLevel
 from core.quality import Level
 from core.samples.gaps import SampleAccount
 from core.units import NS_PER_S
-from service.live.alarm_board import AlarmBoard
+from service.live.alarm_board import AlarmList
 from service.live.live_view import LinkState, LiveView
 from service.measuring.acquirer import Bus
 from service.measuring.recorder import Recorder
-from service.measuring.soundness import Soundness
+from service.measuring.soundness import IntegrityMonitor
 from service.measuring.timings import Timings
 from service.runtime.disk import S_PER_DAY, SpaceWatch
 from service.runtime.metrics import Rows, counter, gauge, histogram, plain_histogram
@@ -185,7 +185,7 @@ def result_metrics(
     )
 
 
-def alarm_metrics(alarms: AlarmBoard, units: Iterable[str]) -> Iterator[Metric]:
+def alarm_metrics(alarms: AlarmList, units: Iterable[str]) -> Iterator[Metric]:
     """Alarms on the list, as the dashboard counts them."""
     count = alarms.count()
     yield gauge(
@@ -285,7 +285,7 @@ def store_info(kind: str) -> Metric:
     return gauge("store_info", "1; the database that results are in.", ("kind",), [((kind,), 1)])
 
 
-def soundness_metrics(found: Soundness | None) -> Iterator[Metric]:
+def soundness_metrics(found: IntegrityMonitor | None) -> Iterator[Metric]:
     """Whether what is stored is what was stored; nothing where nobody looks."""
     if found is None:
         return

@@ -8,8 +8,8 @@ from core.monitor.assessment import Assessment
 from service.live.live_view import LiveView, UnitStatus
 from service.live.unit_state import BearingState, FilmState, UnitSigns, UnitState
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.films import FilmKeeper
-from service.measuring.service_alarms import told_by
+from service.measuring.films import FilmMonitor
+from service.measuring.service_alarms import reporting_unit
 from service.settings.units import UnitSettings
 
 
@@ -31,11 +31,13 @@ def bearing_state(assessment: Assessment) -> BearingState:
 
 
 def unit_state(
-    settings: UnitSettings, live: LiveView, alarms: AlarmEngine, films: FilmKeeper
+    settings: UnitSettings, live: LiveView, alarms: AlarmEngine, films: FilmMonitor
 ) -> UnitState:
     """What is known of a unit now."""
     unit, bearings = settings.id, [bearing.id for bearing in settings.bearing]
-    own = alarm_state([alarm for alarm in alarms.alarms if told_by(alarm.identity) == unit], alarms)
+    own = alarm_state(
+        [alarm for alarm in alarms.alarms if reporting_unit(alarm.identity) == unit], alarms
+    )
     found = {bearing: live.assessment(unit, bearing) for bearing in bearings}
     seen = {bearing: films.newest(unit, bearing) for bearing in bearings}
     in_force = {bearing: films.baseline(unit, bearing) for bearing in bearings}

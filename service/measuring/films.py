@@ -17,7 +17,7 @@ from core.change.settings import FilmRules
 from core.limits import Judgement
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
-from service.live.commands import BaselineAction, FilmPlace, step_of
+from service.live.commands import BaselineAction, FilmPlace, baseline_step
 from service.measuring.baseline_learning import Learner
 from service.measuring.baseline_versions import UnitStart, in_force, unit_start
 from service.runtime.heartbeats import UNHEARD, Pulse
@@ -45,7 +45,7 @@ class WatchedFilms:
     newest: dict[str, FilmNews]
 
 
-class FilmKeeper:
+class FilmMonitor:
     """Watches films on the event loop; reads and learns in threads.
 
     Parameters
@@ -207,7 +207,7 @@ class FilmKeeper:
     ) -> StoredStep:
         entries = list(self._store.baselines(place.unit, place.bearing))
         versions = self.learner.versions(place)
-        return step_of(action, place, versions, entries, actor, reason, self._clock.now_ns())
+        return baseline_step(action, place, versions, entries, actor, reason, self._clock.now_ns())
 
     async def put_in_force(self, place: FilmPlace) -> None:
         """Compare a bearing with what its stored steps say from now on."""
@@ -236,9 +236,9 @@ def _restore(watch: FilmWatch, found: UnitStart) -> None:
     watch.judge.set_response(found.response)
 
 
-async def film_keeper(
+async def film_monitor(
     plant: PlantFile, machines: Mapping[str, Unit], store: FilmStore, clock: Clock
-) -> FilmKeeper:
+) -> FilmMonitor:
     """Put the keeper of all films together and let it go on where the service stopped.
 
     Raises
@@ -247,6 +247,6 @@ async def film_keeper(
         If what is stored of films cannot be read.
     """
     rules = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
-    keeper = FilmKeeper(machines, rules, plant.films, store, clock)
+    keeper = FilmMonitor(machines, rules, plant.films, store, clock)
     await keeper.start()
     return keeper

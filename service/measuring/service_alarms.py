@@ -93,7 +93,7 @@ class ServiceHealth:
 
 
 @dataclass(frozen=True)
-class StreamLook:
+class StreamStatus:
     """How blocks come over the stream, where they come that way.
 
     Parameters
@@ -108,7 +108,7 @@ class StreamLook:
     behind_s: Callable[[], float]
 
 
-LookAtHealth = Callable[[], ServiceHealth]
+HealthProbe = Callable[[], ServiceHealth]
 
 
 log = structlog.get_logger()
@@ -212,7 +212,7 @@ def loss_key(unit: str) -> str:
     return f"{SAMPLES_LOST}:{unit}"
 
 
-def told_by(identity: AlarmIdentity) -> str:
+def reporting_unit(identity: AlarmIdentity) -> str:
     """Unit whose process tells of an alarm: of lost samples, the one that analyses their unit."""
     return identity.subject if identity.kind == SAMPLES_LOST else identity.unit
 
@@ -274,7 +274,7 @@ class ServiceAlarms:
         self,
         units: Iterable[str] = (),
         rules: ServiceRules | None = None,
-        look: LookAtHealth | None = None,
+        look: HealthProbe | None = None,
         *,
         leads: bool = True,
     ) -> None:
@@ -405,7 +405,7 @@ class ServiceAlarms:
         self._board.update(self._watches[key], condition, now_ns)
 
 
-class ToldAlarms:
+class ReportedAlarms:
     """Owns alarms of some watches; what was told of each counts from the next tick on."""
 
     def __init__(self, watches: Iterable[Watch]) -> None:
@@ -470,12 +470,14 @@ def is_shared(alarm: Alarm) -> bool:
     return alarm.identity.kind == ANALYSIS_GONE
 
 
-def gone_alarms(units: Iterable[str]) -> ToldAlarms:
+def gone_alarms(units: Iterable[str]) -> ReportedAlarms:
     """The alarms of some units; nothing is known yet of any."""
-    return ToldAlarms(Watch(identity_of(unit), rule_of(0.0, 0.0), unit) for unit in units)
+    return ReportedAlarms(Watch(identity_of(unit), rule_of(0.0, 0.0), unit) for unit in units)
 
 
-def judge(alarms: ToldAlarms, silent: Sequence[str], heard: Sequence[str], after_s: float) -> None:
+def judge(
+    alarms: ReportedAlarms, silent: Sequence[str], heard: Sequence[str], after_s: float
+) -> None:
     """Take in which units were heard of lately, and which were not."""
     reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
     gone = Judgement(AlarmLevel.DANGER, reason=reason)
@@ -496,9 +498,9 @@ MAX_REASON = 200
 """Longest reason, letters: a message that is refused may hold anything."""
 
 
-def stream_alarms(units: Iterable[str]) -> ToldAlarms:
+def stream_alarms(units: Iterable[str]) -> ReportedAlarms:
     """Alarms about messages of units that cannot be used."""
-    alarms = ToldAlarms(
+    alarms = ReportedAlarms(
         Watch(_refused(unit), rule_of(0.0, REFUSED_FOR_S), STREAM) for unit in units
     )
     for alarm in alarms.alarms:
@@ -506,7 +508,7 @@ def stream_alarms(units: Iterable[str]) -> ToldAlarms:
     return alarms
 
 
-def refuse(alarms: ToldAlarms, unit: str, reason: str) -> None:
+def refuse(alarms: ReportedAlarms, unit: str, reason: str) -> None:
     """Note that a message of a unit was refused."""
     words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
     alarms.tell_once(_refused(unit).id, Judgement(AlarmLevel.ALERT, reason=words))

@@ -1,4 +1,4 @@
-"""`Soundness`: tells, while the service runs, that stored data are not what was stored."""
+"""`IntegrityMonitor`: tells, while the service runs, that stored data are not what was stored."""
 
 import asyncio
 
@@ -20,7 +20,7 @@ MAX_TOLD = 100
 """Damaged rows that get an entry of the audit trail each, from one start to the next."""
 
 
-class Soundness:
+class IntegrityMonitor:
     """Looks at what the store knows of itself; goes on with it as it is, and tells.
 
     Parameters

@@ -18,11 +18,11 @@ from acquisition.recordings.manifest import RecordedUnit, read_manifest
 from acquisition.recordings.reader import open_recording
 from core.samples.blocks import Rejection, SampleBlock
 from service.recordings.folders import KIND, unit_of
-from service.recordings.segment import Stretch, TapeSettings, clear_unfinished, join, unjoined
+from service.recordings.segment import Segment, SegmentSettings, clear_unfinished, join, unjoined
 from service.runtime.heartbeats import UNHEARD, Pulse
 
 
-class Shed(StrEnum):
+class DropReason(StrEnum):
     """Why samples are not in a continuous recording; what the recording itself says."""
 
     ANALYSIS_BEHIND = "analysis_behind"
@@ -35,7 +35,7 @@ class Shed(StrEnum):
 
 
 @dataclass
-class Hole:
+class Omission:
     """Samples that were offered and are left out, all of one epoch.
 
     Parameters
@@ -72,11 +72,11 @@ class Hole:
         self.n_samples = Counter()
 
 
-class TapeError(Exception):
+class RecordingError(Exception):
     """Samples could not be kept; the message says of which unit and why."""
 
 
-class UnitTape:
+class UnitRecorder:
     """Puts blocks one after the other into stretches.
 
     Parameters
@@ -96,18 +96,18 @@ class UnitTape:
         self,
         root: Path,
         unit: RecordedUnit,
-        settings: TapeSettings,
+        settings: SegmentSettings,
         end: tuple[int, int] | None = None,
     ) -> None:
         self._root, self._unit, self._settings = root, unit, settings
         self._end = end
         self._has_begun = False
-        self._stretch: Stretch | None = None
-        self._hole = Hole()
+        self._stretch: Segment | None = None
+        self._hole = Omission()
         self.ended: list[Path] = []
         self.n_written = self.n_refused = 0
 
-    def skip(self, hole: Hole) -> None:
+    def skip(self, hole: Omission) -> None:
         """Note what was left out before the next block."""
         self._hole.add(hole.epoch, (Rejection(r, n) for r, n in hole.n_samples.items()))
 
@@ -116,7 +116,7 @@ class UnitTape:
 
         Raises
         ------
-        TapeError
+        RecordingError
             If it cannot be kept, or if what was to be kept before it cannot.
         """
         fresh = self._fresh(block)
@@ -128,7 +128,7 @@ class UnitTape:
         try:
             self._put(block, now_s)
         except (ConfigError, OSError):
-            with suppress(TapeError):  # counted; it may be of another type than the stretch
+            with suppress(RecordingError):  # counted; it may be of another type than the stretch
                 self.end()
             self._try_again(block, now_s)
         self._hole.clear()
@@ -140,7 +140,7 @@ class UnitTape:
 
         Raises
         ------
-        TapeError
+        RecordingError
             If it cannot be kept.
         """
         if self._stretch is not None and self._stretch.is_due(now_s):
@@ -151,7 +151,7 @@ class UnitTape:
 
         Raises
         ------
-        TapeError
+        RecordingError
             If its last part cannot be kept.
         """
         stretch, self._stretch = self._stretch, None
@@ -172,27 +172,27 @@ class UnitTape:
         if self._stretch is None:
             told = self._after_end(told)
             self._root.mkdir(parents=True, exist_ok=True)
-            self._stretch = Stretch(self._root, self._unit, told, self._settings)
+            self._stretch = Segment(self._root, self._unit, told, self._settings)
         self._stretch.write(told, now_s)
 
     def _try_again(self, block: SampleBlock, now_s: float) -> None:
         try:
             self._put(block, now_s)
         except (ConfigError, OSError) as error:
-            self._hole.skip(block, Shed.DISK_REFUSED)
+            self._hole.skip(block, DropReason.DISK_REFUSED)
             self.n_refused += block.n_samples
-            with suppress(TapeError):
+            with suppress(RecordingError):
                 self.end()
             raise self._told(error) from error
 
-    def _finish_part(self, stretch: Stretch) -> None:
+    def _finish_part(self, stretch: Segment) -> None:
         n_samples = stretch.n_unsynced
         try:
             self.n_written += stretch.finish_part()
         except (ConfigError, OSError) as error:
             self.n_refused += n_samples
             if self._end is not None:
-                self._hole.add(self._end[0], [Rejection(Shed.DISK_REFUSED, n_samples)])
+                self._hole.add(self._end[0], [Rejection(DropReason.DISK_REFUSED, n_samples)])
             raise self._told(error) from error
 
     def _after_end(self, block: SampleBlock) -> SampleBlock:
@@ -202,11 +202,11 @@ class UnitTape:
         n_missing = block.first_index - self._end[1] - sum(r.n_samples for r in block.rejected)
         if n_missing <= 0:
             return block
-        reason = Shed.GAP_BEFORE if self._has_begun else Shed.NOT_RUNNING
+        reason = DropReason.GAP_BEFORE if self._has_begun else DropReason.NOT_RUNNING
         return replace(block, rejected=(*block.rejected, Rejection(reason, n_missing)))
 
-    def _told(self, error: Exception) -> TapeError:
-        return TapeError(f"samples of unit {self._unit.unit} are not recorded: {error}")
+    def _told(self, error: Exception) -> RecordingError:
+        return RecordingError(f"samples of unit {self._unit.unit} are not recorded: {error}")
 
 
 MAX_TRIED = 3
@@ -253,12 +253,12 @@ TOLD_S = 60.0
 """For how long after the last sample that was let go of this counts as trouble."""
 
 
-def unpressed() -> Shed | None:
+def unpressed() -> DropReason | None:
     """Nothing is more urgent."""
     return None
 
 
-class Tape:
+class ContinuousRecorder:
     """The continuous recordings of all units; told of every block, writes in a thread of its own.
 
     Parameters
@@ -286,27 +286,27 @@ class Tape:
         self,
         root: Path,
         units: Mapping[str, RecordedUnit],
-        settings: TapeSettings,
+        settings: SegmentSettings,
         clock: Clock,
-        press: Callable[[], Shed | None] = unpressed,
+        press: Callable[[], DropReason | None] = unpressed,
         owned: Collection[str] = (),
     ) -> None:
         self._owned = {*units, *owned}
         self._root, self._units, self._settings = root, units, settings
         self._clock, self._press = clock, press
-        self._tapes: dict[str, UnitTape] = {}
+        self._tapes: dict[str, UnitRecorder] = {}
         self._seen: dict[str, tuple[int, int]] = {}
-        self._holes: dict[str, Hole] = {unit: Hole() for unit in units}
+        self._holes: dict[str, Omission] = {unit: Omission() for unit in units}
         self._waiting: deque[tuple[float, SampleBlock]] = deque()
         self._n_waiting = 0
         self._busy_since_s: float | None = None
         self._shed_s: float | None = None
-        self._shed_reason: Shed | None = None
+        self._shed_reason: DropReason | None = None
         self._unjoined: deque[Path] = deque()
         self._is_closed = False
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="tape")
         self.error: str | None = None
-        self.n_shed: Counter[Shed] = Counter()
+        self.n_shed: Counter[DropReason] = Counter()
         self.n_finished = 0
 
     @property
@@ -326,7 +326,7 @@ class Tape:
             return self.error
         if self._shed_s is None or self._clock.monotonic_s() - self._shed_s > TOLD_S:
             return None
-        return WORDS[self._shed_reason or Shed.DISK_SLOW]
+        return WORDS[self._shed_reason or DropReason.DISK_SLOW]
 
     def take(self, block: SampleBlock) -> None:
         """Take in a block, or let it go and remember how much that was; never waits."""
@@ -373,16 +373,16 @@ class Tape:
         self._seen[block.unit] = (block.epoch, block.stop_index)
         return block
 
-    def _slow(self) -> Shed | None:
+    def _slow(self) -> DropReason | None:
         """Whether the disk does not keep up."""
         now_s = self._clock.monotonic_s()
         since = [self._busy_since_s] if self._busy_since_s is not None else []
         since += [self._waiting[0][0]] if self._waiting else []
         is_late = bool(since) and now_s - min(since) > MAX_WAIT_S
         is_late = is_late or self._n_waiting > MAX_WAITING_SAMPLES
-        return Shed.DISK_SLOW if is_late else None
+        return DropReason.DISK_SLOW if is_late else None
 
-    def _shed(self, block: SampleBlock, reason: Shed) -> None:
+    def _shed(self, block: SampleBlock, reason: DropReason) -> None:
         if self.trouble is None:
             log.warning("samples are not recorded", reason=WORDS[reason])
         self._holes[block.unit].skip(block, reason)
@@ -405,23 +405,23 @@ class Tape:
             error = self._tried(unit, methodcaller("sync", now_s)) or error
         self._tell(self._join_one() or error)
 
-    def _tried(self, unit: str, do: Callable[[UnitTape], None]) -> str | None:
+    def _tried(self, unit: str, do: Callable[[UnitRecorder], None]) -> str | None:
         tape = self._tapes.get(unit) or self._begin(unit)
         before = tape.n_refused
         try:
             do(tape)
-        except TapeError as error:
-            self.n_shed[Shed.DISK_REFUSED] += tape.n_refused - before
+        except RecordingError as error:
+            self.n_shed[DropReason.DISK_REFUSED] += tape.n_refused - before
             return str(error)
         finally:
             self._unjoined.extend(tape.ended)
             tape.ended.clear()
-        self.n_shed[Shed.DISK_REFUSED] += tape.n_refused - before
+        self.n_shed[DropReason.DISK_REFUSED] += tape.n_refused - before
         return None
 
-    def _begin(self, unit: str) -> UnitTape:
+    def _begin(self, unit: str) -> UnitRecorder:
         end = last_end(self._root, unit)
-        tape = self._tapes[unit] = UnitTape(self._root, self._units[unit], self._settings, end)
+        tape = self._tapes[unit] = UnitRecorder(self._root, self._units[unit], self._settings, end)
         return tape
 
     def _join_one(self) -> str | None:
@@ -439,7 +439,7 @@ class Tape:
     def _end(self) -> None:
         """End all stretches, and join what there is time for; in the thread."""
         for unit in list(self._tapes):
-            self._tell(self._tried(unit, UnitTape.end))
+            self._tell(self._tried(unit, UnitRecorder.end))
         until_s = self._clock.monotonic_s() + MAX_END_S
         for _ in range(len(self._unjoined)):
             if self._clock.monotonic_s() < until_s:
@@ -473,8 +473,8 @@ class Tape:
 
 
 WORDS = {
-    Shed.ANALYSIS_BEHIND: "the analysis is behind, and comes first",
-    Shed.DISK_SLOW: "the disk is too slow for them",
-    Shed.DISK_FULL: "the disk is nearly full",
-    Shed.DISK_REFUSED: "the disk refuses them",
+    DropReason.ANALYSIS_BEHIND: "the analysis is behind, and comes first",
+    DropReason.DISK_SLOW: "the disk is too slow for them",
+    DropReason.DISK_FULL: "the disk is nearly full",
+    DropReason.DISK_REFUSED: "the disk refuses them",
 }

@@ -61,7 +61,7 @@ class Index:
             self._store.put(list(found.values()))
             self._files |= found
             for key in found:
-                self._owed.pop(key, None)  # there is one of that name again
+                self._owed.pop(key, None)  # there is one of that name reinspected
 
     def remove(self, file: WaveformFile, reason: str, now_ns: int) -> None:
         """Strike out what is gone; `settle` tells the store."""
@@ -156,7 +156,7 @@ def inspected(folder: Path, place: str, kind: WaveformKind, now_ns: int) -> Wave
         return replace(bare, state=WaveformState.DAMAGED, reason=told(error, folder))
 
 
-def again(known: WaveformFile, folder: Path, now_ns: int) -> WaveformFile:
+def reinspected(known: WaveformFile, folder: Path, now_ns: int) -> WaveformFile:
     """Read all of a recording that is known; what is otherwise than it was is damaged.
 
     Raises
@@ -210,7 +210,7 @@ def told(error: Exception, folder: Path) -> str:
     return str(error).replace(str(folder), folder.name)[:500]
 
 
-class Found(StrEnum):
+class RecordingState(StrEnum):
     """What a recording is found to be."""
 
     SOUND = "sound"
@@ -221,7 +221,7 @@ class Found(StrEnum):
 
 
 @dataclass(frozen=True)
-class Verdict:
+class CheckResult:
     """What was found of one recording.
 
     Parameters
@@ -232,7 +232,7 @@ class Verdict:
 
     kind: WaveformKind
     name: str
-    found: Found
+    found: RecordingState
     reason: str = ""
 
 
@@ -258,7 +258,7 @@ class RecordingCheck:
         ]
         self.n_to_read = len(self._there)
 
-    def verdicts(self) -> Iterator[Verdict]:
+    def verdicts(self) -> Iterator[CheckResult]:
         """Read one after the other.
 
         Raises
@@ -269,28 +269,32 @@ class RecordingCheck:
         for kind, name in self._there:
             yield self._read(kind, name)
         for kind, name in sorted(set(self._known) - set(self._there)):
-            yield Verdict(kind, name, Found.MISSING, "the index has it, its folder does not")
+            yield CheckResult(
+                kind, name, RecordingState.MISSING, "the index has it, its folder does not"
+            )
         for kind, root in self._roots.items():
             for path in sorted(root.iterdir()) if root.is_dir() else ():
                 if path.name.endswith(UNFINISHED):
                     words = "it is being written, or a start of the service finishes it"
-                    yield Verdict(kind, path.name, Found.UNFINISHED, words)
+                    yield CheckResult(kind, path.name, RecordingState.UNFINISHED, words)
 
-    def _read(self, kind: WaveformKind, name: str) -> Verdict:
+    def _read(self, kind: WaveformKind, name: str) -> CheckResult:
         folder, known = self._roots[kind] / name, self._known.get((kind, name))
         try:
             if known is None or not known.checksum or name.endswith(DAMAGED):
                 found = inspected(folder, "", kind, self._now_ns)
             else:
-                found = again(known, folder, self._now_ns)
+                found = reinspected(known, folder, self._now_ns)
         except OSError as error:  # nothing comes of it here but that somebody looks
-            return Verdict(kind, name, Found.DAMAGED, f"it cannot be read: {error.strerror}")
+            return CheckResult(
+                kind, name, RecordingState.DAMAGED, f"it cannot be read: {error.strerror}"
+            )
         if found.state is WaveformState.DAMAGED:
-            return Verdict(kind, name, Found.DAMAGED, found.reason)
+            return CheckResult(kind, name, RecordingState.DAMAGED, found.reason)
         if known is None:
             words = "the running service enters it into the index"
-            return Verdict(kind, name, Found.NOT_ENTERED, words)
-        return Verdict(kind, name, Found.SOUND)
+            return CheckResult(kind, name, RecordingState.NOT_ENTERED, words)
+        return CheckResult(kind, name, RecordingState.SOUND)
 
 
 AGAIN_S = 60.0
@@ -300,7 +304,7 @@ Words = tuple[int, str, str]
 """Number and text of an error, and of which recording."""
 
 
-class Unread:
+class RetryList:
     """Remembers what the disk or the system refused to read, and when that is tried again."""
 
     def __init__(self, clock: Clock) -> None:

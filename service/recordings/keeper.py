@@ -11,7 +11,7 @@ from types import MappingProxyType
 import structlog
 
 from acquisition.clock import Clock
-from service.recordings.retention import Caretaker, Findings, Gauge, Troubles
+from service.recordings.retention import RecordingRetention, Findings, SpaceGauge, FirstError
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.store.waveform_port import WaveformFile, WaveformKind
 
@@ -20,7 +20,7 @@ log = structlog.get_logger()
 LOCK = "recordings.lock"
 
 
-class WatchKeeping:
+class RecordingLock:
     """Held until the process ends, however that happens; the file means nothing by itself."""
 
     def __init__(self, data_folder: Path) -> None:
@@ -68,7 +68,7 @@ TOLD_AFTER_S = 60.0
 NONE_DAMAGED: Mapping[str, str] = MappingProxyType({})
 
 
-class WaveformKeeper:
+class RecordingIndexer:
     """Keeps index and folders of recordings together while the service runs.
 
     Parameters
@@ -91,11 +91,15 @@ class WaveformKeeper:
     """
 
     def __init__(
-        self, gauge: Gauge, hire: Callable[[], Caretaker], clock: Clock, watch: WatchKeeping
+        self,
+        gauge: SpaceGauge,
+        hire: Callable[[], RecordingRetention],
+        clock: Clock,
+        watch: RecordingLock,
     ) -> None:
         self._gauge = gauge
         self._hire, self._clock, self._watch = hire, clock, watch
-        self._caretaker: Caretaker | None = None
+        self._caretaker: RecordingRetention | None = None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="waveforms")
         self.faults = NONE_DAMAGED
         self.n_files: Mapping[WaveformKind, int] = {}
@@ -144,7 +148,7 @@ class WaveformKeeper:
 
     def look(self) -> None:
         """Look once; in the thread."""
-        troubles = Troubles()
+        troubles = FirstError()
         with troubles.borne():
             self._gauge.measure()  # first of all: what comes then may take long, or fail
         with troubles.borne():
@@ -155,7 +159,7 @@ class WaveformKeeper:
         if self._caretaker is not None:
             self._count(self._caretaker)
 
-    def _count(self, caretaker: Caretaker) -> None:
+    def _count(self, caretaker: RecordingRetention) -> None:
         files: Sequence[WaveformFile] = caretaker.on_disk
         self.faults = caretaker.faults
         self.n_files = {k: sum(file.kind is k for file in files) for k in WaveformKind}

@@ -29,7 +29,7 @@ MAX_ALARM_BYTES = 1_000_000
 
 
 @dataclass(frozen=True)
-class Kept:
+class RecordingEntry:
     """A recording on the shelf.
 
     Parameters
@@ -52,7 +52,7 @@ class Kept:
     n_bytes: int
 
 
-class Shelf:
+class RecordingLibrary:
     """Recordings below some folders; all methods read the disk, so call them in a thread.
 
     Parameters
@@ -68,7 +68,7 @@ class Shelf:
 
     def newest(
         self, most: int, unit: str | None = None, kind: WaveformKind | None = None
-    ) -> list[Kept]:
+    ) -> list[RecordingEntry]:
         """The newest recordings, newest first; of one unit, or of all."""
         folders = [
             folder
@@ -78,7 +78,7 @@ class Shelf:
         by_age = sorted(folders, key=_age, reverse=True)
         return [self._kept(folder) for folder in by_age[:most]]
 
-    def one(self, name: str) -> Kept | None:
+    def one(self, name: str) -> RecordingEntry | None:
         """A recording by its name; None if there is none."""
         folder = self._folder(name)
         return None if folder is None else self._kept(folder)
@@ -144,14 +144,14 @@ class Shelf:
         for root in self._roots:
             yield from (root / name for name in finished(root))
 
-    def _kept(self, folder: Path) -> Kept:
+    def _kept(self, folder: Path) -> RecordingEntry:
         try:
             manifest, fault = read_manifest(folder), self._faults.get(folder.name)
         except ConfigError as error:
             manifest, fault = None, str(error).replace(str(folder), folder.name)
         kind = kind_of(folder.name)
         alarms = _alarms(folder / ALARM)
-        return Kept(folder.name, kind, manifest, fault, alarms, n_bytes_of(folder))
+        return RecordingEntry(folder.name, kind, manifest, fault, alarms, n_bytes_of(folder))
 
 
 def kind_of(name: str) -> WaveformKind:

@@ -4,12 +4,14 @@ from collections.abc import Iterator
 
 from prometheus_client.metrics_core import Metric
 
-from service.recordings.continuous_recorder import Tape
-from service.recordings.keeper import WaveformKeeper
+from service.recordings.continuous_recorder import ContinuousRecorder
+from service.recordings.keeper import RecordingIndexer
 from service.runtime.metrics import counter, gauge
 
 
-def recording_metrics(tape: Tape | None, recordings: WaveformKeeper | None) -> Iterator[Metric]:
+def recording_metrics(
+    tape: ContinuousRecorder | None, recordings: RecordingIndexer | None
+) -> Iterator[Metric]:
     """What is recorded, what is not and why, and what is found of recordings."""
     if tape is not None:
         yield counter(

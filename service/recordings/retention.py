@@ -21,7 +21,7 @@ from service.recordings.folders import (
     put_out_of_sight,
     set_aside,
 )
-from service.recordings.index import Index, Unread, again, inspected
+from service.recordings.index import Index, RetryList, reinspected, inspected
 from service.runtime.disk import Measure, SpaceLimits
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
@@ -34,7 +34,7 @@ LONGEST_NS = 3600 * NS_PER_S
 set."""
 
 
-class NotOldFrom:
+class AgeLimit:
     """Knows for each unit which of its recordings are too old.
 
     Parameters
@@ -101,7 +101,7 @@ class RoomLimits:
 
 
 @dataclass(frozen=True)
-class Need:
+class SpaceNeed:
     """How much room has to be made on the disk.
 
     Parameters
@@ -128,7 +128,7 @@ def make_room(
     files: Iterable[WaveformFile],
     limits: RoomLimits,
     now_ns: int,
-    need: Need,
+    need: SpaceNeed,
     bound: Bound,
     remove: Remove,
 ) -> None:
@@ -154,7 +154,7 @@ def _continuous(
 ) -> int:
     """Remove continuous ones; how many bytes became free."""
     over = sum(file.n_bytes for file in by_age) - limits.continuous_bytes
-    not_old = NotOldFrom(by_age, now_ns, ns_from_s(limits.continuous_days * S_PER_DAY))
+    not_old = AgeLimit(by_age, now_ns, ns_from_s(limits.continuous_days * S_PER_DAY))
     n_freed = 0
     for file in by_age:
         if over > n_freed:
@@ -190,7 +190,7 @@ def _stop_ns(file: WaveformFile) -> int:
     return file.stop_ns or file.changed_ns
 
 
-class Troubles:
+class FirstError:
     """Remembers the first thing that went wrong while the rest was done all the same.
 
     Attributes
@@ -224,7 +224,7 @@ class Troubles:
             raise self.first
 
 
-class Gauge:
+class SpaceGauge:
     """Measures the disks that recordings are on.
 
     Parameters
@@ -245,7 +245,7 @@ class Gauge:
     ) -> None:
         self._roots, self._space, self._measure = roots, space, measure
         self.is_full = False
-        self.need = Need()
+        self.need = SpaceNeed()
 
     def measure(self) -> None:
         """Measure all of them; one that does not say is short of nothing.
@@ -256,11 +256,11 @@ class Gauge:
             If a disk does not say.
         """
         short = dict.fromkeys(WaveformKind, 0)
-        troubles = Troubles()
+        troubles = FirstError()
         for kind, root in self._roots.items():
             with troubles.borne():
                 short[kind] = self._short(kind, root)
-        self.need = Need(short[WaveformKind.CONTINUOUS], short[WaveformKind.CAPTURE])
+        self.need = SpaceNeed(short[WaveformKind.CONTINUOUS], short[WaveformKind.CAPTURE])
         troubles.tell()
 
     def _short(self, kind: WaveformKind, root: Path) -> int:
@@ -301,7 +301,7 @@ class Findings:
 
 
 @dataclass(frozen=True)
-class Custody:
+class RetentionRules:
     """What a caretaker looks after, and by which rules.
 
     Parameters
@@ -314,20 +314,20 @@ class Custody:
 
     roots: Mapping[WaveformKind, Path]
     room: RoomLimits
-    gauge: Gauge
+    gauge: SpaceGauge
     bound: Bound
 
 
-class Caretaker:
+class RecordingRetention:
     """Brings index and folders together; the folders are what counts.
 
     Whatever fails, the rest is done: above all room is made while nothing can be written any more.
     """
 
-    def __init__(self, custody: Custody, index: Index, clock: Clock) -> None:
+    def __init__(self, custody: RetentionRules, index: Index, clock: Clock) -> None:
         self._custody, self._index, self._clock = custody, index, clock
         self._check_from_s = self._forgot_s = -1.0
-        self._unread = Unread(clock)
+        self._unread = RetryList(clock)
         self.found = Findings()
 
     @property
@@ -351,7 +351,7 @@ class Caretaker:
             If the index cannot be written.
         """
         until_s = self._clock.monotonic_s() + MAX_LOOK_S
-        troubles = Troubles()
+        troubles = FirstError()
         for kind, root in self._custody.roots.items():
             with troubles.borne():
                 self._go_on_removing(kind, root, troubles)
@@ -369,7 +369,7 @@ class Caretaker:
             self._unread.tell()
         troubles.tell()
 
-    def _go_on_removing(self, kind: WaveformKind, root: Path, troubles: Troubles) -> None:
+    def _go_on_removing(self, kind: WaveformKind, root: Path, troubles: FirstError) -> None:
         for name in being_removed(root):
             known = self._index.get(kind, name)
             if known is not None and not (root / name).exists():
@@ -407,7 +407,7 @@ class Caretaker:
         else:
             self.found.n_adopted += 1
 
-    def _make_room(self, troubles: Troubles) -> None:
+    def _make_room(self, troubles: FirstError) -> None:
         rules = self._custody
         with troubles.borne():
             rules.gauge.measure()
@@ -429,7 +429,7 @@ class Caretaker:
         log.info("a recording is removed", name=file.name, reason=reason)
         self._index.remove(file, reason, self._clock.now_ns())
 
-    def _finish_removals(self, troubles: Troubles) -> None:
+    def _finish_removals(self, troubles: FirstError) -> None:
         """Remove the folders of what the index knows to be gone.
 
         As long as it cannot be told, an empty folder says so to the next start.
@@ -471,7 +471,7 @@ class Caretaker:
         folder = self._custody.roots[file.kind] / file.name
         if not folder.is_dir():
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(folder))
-        found = again(file, folder, self._clock.now_ns())
+        found = reinspected(file, folder, self._clock.now_ns())
         self.found.n_checked += 1
         self._index.put([found])
         if found.state is WaveformState.DAMAGED:

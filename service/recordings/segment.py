@@ -34,7 +34,7 @@ from service.runtime.times import rfc3339
 
 
 @dataclass(frozen=True)
-class TapeSettings:
+class SegmentSettings:
     """How a continuous recording is cut.
 
     Parameters
@@ -154,7 +154,7 @@ def _alarm(event: AlarmEvent) -> dict[str, Any]:
 MAX_PARTS = 10_000
 
 
-class Stretch:
+class Segment:
     """The stretch of a unit that is being written; lives in the thread that writes.
 
     Each part is a finished recording, synced and renamed into place; the last one is in memory or
@@ -172,7 +172,7 @@ class Stretch:
     """
 
     def __init__(
-        self, root: Path, unit: RecordedUnit, first: SampleBlock, settings: TapeSettings
+        self, root: Path, unit: RecordedUnit, first: SampleBlock, settings: SegmentSettings
     ) -> None:
         self._unit, self._settings = unit, settings
         self._is_decided = False

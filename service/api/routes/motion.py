@@ -27,7 +27,7 @@ from service.api.routes.recordings import (
 from service.api.values import ApiModel, Time, listed
 from service.live.live_view import HELD_S
 from service.live.samples import newest_of, stretch_of
-from service.recordings.library import Kept
+from service.recordings.library import RecordingEntry
 from service.recordings.motion import (
     NoMotionError,
     Order1,
@@ -389,7 +389,7 @@ def _recorded(
     return motion_model(unit, bearing, found.motion, origin)
 
 
-def _unit_of(context: Context, kept: Kept) -> str:
+def _unit_of(context: Context, kept: RecordingEntry) -> str:
     if kept.manifest is None:
         raise damaged_recording(kept.name, ConfigError(kept.fault or "no manifest"))
     if kept.manifest.unit not in context.units:

@@ -24,7 +24,7 @@ from service.live.commands import (
     Renew,
     Thaw,
 )
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.settings.films import FilmAlarmSettings
 from service.store.film_port import BaselineStep, FilmHistory, FilmQuery
 from service.store.sqlite import SqliteStore
@@ -41,17 +41,17 @@ class Plant:
     def __init__(self, store: SqliteStore, film_news: Tell, clock: Any) -> None:
         self.store, self.film_news, self.clock = store, film_news, clock
 
-    async def start(self, **settings: Any) -> FilmKeeper:
+    async def start(self, **settings: Any) -> FilmMonitor:
         """A keeper as after a start."""
         given = FilmAlarmSettings(**settings)
         rules = {"U1": rules_of(given)}
-        keeper = FilmKeeper({"U1": unit()}, rules, given, self.store.films, self.clock)
+        keeper = FilmMonitor({"U1": unit()}, rules, given, self.store.films, self.clock)
         await keeper.start()
         return keeper
 
     async def live(
         self,
-        keeper: FilmKeeper,
+        keeper: FilmMonitor,
         history: StiffnessHistory,
         days: tuple[int, int],
         every: int = 1,
@@ -94,7 +94,7 @@ def rules_of(settings: FilmAlarmSettings) -> FilmRules:
     return FilmRules({"UJB": Estimator.DYNAMIC}, CellGrid(), operating, limits, 600 * 10**9)
 
 
-def in_force(keeper: FilmKeeper) -> int | None:
+def in_force(keeper: FilmMonitor) -> int | None:
     baseline = keeper.baseline("U1", "UJB")
     return baseline.origin.version if baseline else None
 

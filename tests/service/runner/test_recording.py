@@ -26,7 +26,7 @@ from core.samples.gaps import Gap
 from service.api.context import Context
 from service.app.web import application
 from service.measuring import recorder as recording
-from service.measuring.commands import InProcess
+from service.measuring.commands import LocalCommands
 from service.measuring.recorder import FILE, Findings, NotStoredError, ParkedRows, Recorder
 from service.measuring.references_in_force import ReferencesInForce
 from service.notifications.sender import Deliveries
@@ -100,7 +100,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
             *("Plant", {}, plant.live, plant.store, plant.clock, 9.0, references),
             alarms=plant.alarms,
             films=plant.films,
-            operators=InProcess(plant.alarms, plant.films, plant.recorder),
+            operators=LocalCommands(plant.alarms, plant.films, plant.recorder),
             captures=plant.captures,
             deliveries=Deliveries([], plant.store.outbox, plant.clock),
         )

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from service.recordings.folders import place_of, put_out_of_sight
-from service.recordings.index import again
+from service.recordings.index import reinspected
 from service.store.waveform_port import WaveformKind, WaveformState
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
@@ -114,7 +114,7 @@ def test_what_is_read_once_more_takes_a_small_share_of_the_time(
 ) -> None:
     def slow(*how: Any) -> Any:
         rig.clock.s += 4.0
-        return again(*how)
+        return reinspected(*how)
 
     for hour in range(3):
         rig.make(hour)
