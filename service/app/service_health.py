@@ -9,7 +9,7 @@ from service.measuring.recorder import Recorder
 from service.measuring.service_alarms import HealthProbe, ServiceHealth, StreamStatus, enough_room
 from service.measuring.soundness import IntegrityMonitor
 from service.recordings.around_alarms import Captures
-from service.recordings.continuous_recorder import DropReason, ContinuousRecorder
+from service.recordings.continuous_recorder import ContinuousRecorder, DropReason
 from service.recordings.keeper import RecordingIndexer
 from service.runtime.disk import SpaceWatch
 

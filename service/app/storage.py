@@ -15,11 +15,11 @@ from service.live.live_view import LiveView
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmMonitor
 from service.recordings.around_alarms import Captures, CaptureSettings
-from service.recordings.continuous_recorder import DropReason, ContinuousRecorder
+from service.recordings.continuous_recorder import ContinuousRecorder, DropReason
 from service.recordings.folders import place_of
 from service.recordings.index import Index
-from service.recordings.keeper import RecordingLock, RecordingIndexer
-from service.recordings.retention import RecordingRetention, RetentionRules, SpaceGauge, RoomLimits
+from service.recordings.keeper import RecordingIndexer, RecordingLock
+from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
 from service.recordings.segment import MakeWriter, SegmentSettings
 from service.reports.archive import EvidenceArchive
 from service.reports.capture_link import captures_in_use

@@ -21,7 +21,7 @@ from service.app.storage import custody_of, has_store, open_store
 from service.cli.offline.importing import import_recording
 from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
 from service.recordings.folders import place_of
-from service.recordings.index import RecordingState, RecordingCheck, CheckResult
+from service.recordings.index import CheckResult, RecordingCheck, RecordingState
 from service.runtime.process import made_by
 from service.runtime.times import rfc3339
 from service.settings.plant import PlantFile

@@ -11,14 +11,14 @@ from core.alarms.operation import Action, ActionRefusedError
 from core.units import ns_from_s
 from service.cluster.replica_state import ReplicaAlarms
 from service.live.commands import (
+    AlarmCommand,
     BaselineAction,
+    BaselineCommand,
     BaselineRefusedError,
+    Command,
+    CommandFailedError,
     FilmPlace,
     ReferenceCommand,
-    CommandFailedError,
-    AlarmCommand,
-    BaselineCommand,
-    Command,
     UnreadableCommandError,
     decoded,
     encoded,

@@ -23,15 +23,15 @@ from core.samples.blocks import SampleBlock
 from service.live.alarm_board import AlarmCount, count_of
 from service.measuring.recorder import Findings
 from service.measuring.service_alarms import (
-    HostTime,
     HealthProbe,
-    ServiceAlarms,
+    HostTime,
     ReportedAlarms,
+    ServiceAlarms,
     is_shared,
     refuse,
+    reporting_unit,
     service_rules_of,
     stream_alarms,
-    reporting_unit,
 )
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.alarm_kinds import MESSAGES_REFUSED

@@ -5,7 +5,7 @@ import asyncio
 from core.alarms.alarm import Alarm
 from core.alarms.judgements import VectorReference
 from core.alarms.operation import Action
-from service.live.commands import BaselineAction, FilmPlace, CommandFailedError
+from service.live.commands import BaselineAction, CommandFailedError, FilmPlace
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.films import FilmMonitor
 from service.measuring.recorder import NotStoredError, Recorder

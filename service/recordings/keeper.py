@@ -11,7 +11,7 @@ from types import MappingProxyType
 import structlog
 
 from acquisition.clock import Clock
-from service.recordings.retention import RecordingRetention, Findings, SpaceGauge, FirstError
+from service.recordings.retention import Findings, FirstError, RecordingRetention, SpaceGauge
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.store.waveform_port import WaveformFile, WaveformKind
 

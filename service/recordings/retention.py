@@ -21,7 +21,7 @@ from service.recordings.folders import (
     put_out_of_sight,
     set_aside,
 )
-from service.recordings.index import Index, RetryList, reinspected, inspected
+from service.recordings.index import Index, RetryList, inspected, reinspected
 from service.runtime.disk import Measure, SpaceLimits
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState

@@ -11,7 +11,7 @@ from rigs.capturing import Rig, block
 from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.manifest import RecordedUnit
-from service.recordings.continuous_recorder import DropReason, ContinuousRecorder
+from service.recordings.continuous_recorder import ContinuousRecorder, DropReason
 from service.recordings.segment import SegmentSettings
 
 SETTINGS = SegmentSettings(stretch_s=10.0, part_s=2.0)

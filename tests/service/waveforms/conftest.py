@@ -14,8 +14,8 @@ from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand
 from service.recordings.index import Index
-from service.recordings.keeper import RecordingLock, RecordingIndexer
-from service.recordings.retention import RecordingRetention, RetentionRules, SpaceGauge, RoomLimits
+from service.recordings.keeper import RecordingIndexer, RecordingLock
+from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
 from service.runtime.disk import DiskSpace, SpaceLimits
 from service.store.sqlite import SqliteStore
 from service.store.waveform_port import WaveformFile, WaveformKind

@@ -11,7 +11,7 @@ from harness.corruption import CHANGES, corrupted
 from acquisition.errors import ConfigError
 from acquisition.recordings.reader import open_recording
 from service.recordings import index as inspection
-from service.recordings.index import AGAIN_S, RecordingState, RecordingCheck
+from service.recordings.index import AGAIN_S, RecordingCheck, RecordingState
 from service.recordings.library import RecordingLibrary
 from service.store.waveform_port import WaveformKind, WaveformState
 
