@@ -232,7 +232,7 @@ def watch(keeper: EvidenceKeeper, alarms: AlarmEngine, captures: Captures, origi
     """Connect the collector of evidence to the alarms; a replay collects no evidence."""
     if origin is Origin.LIVE:
         alarms.show(keeper.see)
-        captures.tell(keeper.captured)
+        captures.set_listener(keeper.captured)
 
 
 def built_configuration(plant: PlantFile) -> Configuration:

@@ -74,7 +74,7 @@ def _verdicts(plant: PlantFile, roots: Mapping[WaveformKind, Path]) -> list[Chec
     with typer.progressbar(
         length=checking.n_to_read, label="Checking", file=sys.stderr, hidden=hidden
     ) as bar:
-        for verdict in checking.verdicts():
+        for verdict in checking.results():
             found.append(verdict)
             bar.update(1)
     return found

@@ -172,7 +172,7 @@ class ReplicaLive:
         return self._age_s(unit, self._known[unit].signs.data_age_s)
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """Nothing if there is no result; else raise `NotAvailableError`: arrays stay where they are."""
+        """None if there is no result; else raise `NotAvailableError`: arrays are not published."""
         if bearing not in self._known[unit].results:
             return None
         raise NotAvailableError(

@@ -15,9 +15,9 @@ from service.live.commands import (
     BaselineAction,
     BaselineCommand,
     BaselineRefusedError,
-    Command,
     CommandFailedError,
     FilmPlace,
+    OperatorCommand,
     ReferenceCommand,
     UnreadableCommandError,
     decoded,
@@ -69,7 +69,7 @@ class Asking:
         """Compare 1× vectors with a reference that has just been stored."""
         await self._ask(reference.unit, ReferenceCommand(reference.unit), acting().actor)
 
-    async def _ask(self, unit: str, task: Command, actor: str) -> Answer:
+    async def _ask(self, unit: str, task: OperatorCommand, actor: str) -> Answer:
         """Write it down and wait.
 
         Raises
@@ -87,7 +87,7 @@ class Asking:
             raise CommandFailedError("Not on the disk yet", detail)
         return answer
 
-    def _command(self, unit: str, task: Command, actor: str) -> Command:
+    def _command(self, unit: str, task: OperatorCommand, actor: str) -> Command:
         kind, document = encoded(task)
         now_ns = self._clock.now_ns()
         expires_ns = now_ns + ns_from_s(EXPIRES_S)
@@ -207,7 +207,7 @@ class CarryingOut:
             )
         return DONE
 
-    async def _do(self, task: Command) -> None:
+    async def _do(self, task: OperatorCommand) -> None:
         if isinstance(task, AlarmCommand):
             self._alarms.operate(task.alarm, task.action)
             await self._recorder.stored()

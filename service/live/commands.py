@@ -161,7 +161,7 @@ class ReferenceCommand:
     unit: str
 
 
-Command: TypeAlias = AlarmCommand | BaselineCommand | ReferenceCommand
+OperatorCommand: TypeAlias = AlarmCommand | BaselineCommand | ReferenceCommand
 
 _ALARM_ACTIONS: dict[str, type[Any]] = {
     kind.__name__: kind
@@ -182,7 +182,7 @@ _ON_BASELINES = {
 }
 
 
-def encoded(task: Command) -> tuple[str, str]:
+def encoded(task: OperatorCommand) -> tuple[str, str]:
     """Kind and document of a task; `read` gives an equal one."""
     if isinstance(task, AlarmCommand):
         kind = type(task.action).__name__
@@ -194,7 +194,7 @@ def encoded(task: Command) -> tuple[str, str]:
     return _REFERENCE, TypeAdapter(ReferenceCommand).dump_json(task).decode()
 
 
-def decoded(kind: str, document: str) -> Command:
+def decoded(kind: str, document: str) -> OperatorCommand:
     """Read a task.
 
     Raises

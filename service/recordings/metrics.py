@@ -1,4 +1,4 @@
-"""Metrics of continuous recording, and of all recordings that are kept."""
+"""Metrics of continuous recording and of stored recordings."""
 
 from collections.abc import Iterator
 
@@ -10,21 +10,21 @@ from service.runtime.metrics import counter, gauge
 
 
 def recording_metrics(
-    tape: ContinuousRecorder | None, recordings: RecordingIndexer | None
+    recorder: ContinuousRecorder | None, recordings: RecordingIndexer | None
 ) -> Iterator[Metric]:
-    """What is recorded, what is not and why, and what is found of recordings."""
-    if tape is not None:
+    """Yield the families of recorded and dropped samples, and of stored recordings."""
+    if recorder is not None:
         yield counter(
             "recording_samples",
             "Samples of each channel that continuous recordings have brought to the disk.",
             (),
-            [((), tape.n_written)],
+            [((), recorder.n_written)],
         )
         yield counter(
             "recording_shed_samples",
             "Samples of each channel that are not in them, by reason.",
             ("reason",),
-            [((reason.value,), n) for reason, n in sorted(tape.n_shed.items())],
+            [((reason.value,), n) for reason, n in sorted(recorder.n_dropped.items())],
         )
     if recordings is None:
         return

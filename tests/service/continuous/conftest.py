@@ -14,7 +14,7 @@ from acquisition.recordings.manifest import RecordedUnit
 from service.recordings.continuous_recorder import ContinuousRecorder, DropReason
 from service.recordings.segment import SegmentSettings
 
-SETTINGS = SegmentSettings(stretch_s=10.0, part_s=2.0)
+SETTINGS = SegmentSettings(segment_s=10.0, part_s=2.0)
 
 
 def recorded_unit(unit: str) -> RecordedUnit:

@@ -13,9 +13,10 @@ from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.summary import summary_of
 from core.samples.blocks import SampleBlock
 from service.recordings.continuous_recorder import UnitRecorder, last_end
-from service.recordings.segment import SegmentSettings, clear_unfinished, join, unjoined
+from service.recordings.folders import remove_incomplete
+from service.recordings.segment import SegmentSettings, join, unjoined
 
-SETTINGS = SegmentSettings(stretch_s=4.0, part_s=2.0)
+SETTINGS = SegmentSettings(segment_s=4.0, part_s=2.0)
 N_BLOCKS = 30
 DEEDS = ("mkdir", "rename", "unlink", "rmdir")
 
@@ -48,7 +49,7 @@ def killed_at(deed: int, patch: pytest.MonkeyPatch) -> Iterator[list[str]]:
 
 def recover(root: Path) -> None:
     left = unjoined(root, ("U1",))
-    clear_unfinished(root, ("U1",))
+    remove_incomplete(root, ("U1",))
     for folder in left:
         join(folder)
 

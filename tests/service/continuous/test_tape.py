@@ -30,7 +30,7 @@ async def test_every_sample_is_in_recordings_that_end_at_full_multiples_of_their
     assert first.folder.name == "U1-20260101T000004.000Z-continuous"
     assert first.manifest.sample_type == "int16"
     assert rig.tape.n_written == 1000
-    assert not rig.tape.n_shed.total()
+    assert not rig.tape.n_dropped.total()
 
 
 async def test_what_a_part_holds_is_on_the_disk_before_the_recording_is_complete(
@@ -78,7 +78,7 @@ async def test_what_gives_way_to_the_analysis_is_a_hole_with_number_and_reason(
 
     assert samples(recording) == numbers(0, 10) + numbers(17, 30)
     assert summary_of(recording).rejected == {reason.value: 70}
-    assert rig.tape.n_shed == {reason: 70, DropReason.DISK_REFUSED: 0}
+    assert rig.tape.n_dropped == {reason: 70, DropReason.DISK_REFUSED: 0}
 
 
 async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(
@@ -99,13 +99,13 @@ async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(
 async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
     running: Any, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class RefusedStretch:
+    class RefusedSegment:
         def __init__(self, *_: object) -> None:
             raise OSError(28, "No space left on device")
 
     async with running(root) as rig:
         with monkeypatch.context() as patch:
-            patch.setattr(unit_tape, "Stretch", RefusedStretch)
+            patch.setattr(unit_tape, "Segment", RefusedSegment)
             rig.send(0, 10)
             await rig.until(lambda: rig.tape.error is not None)
         assert "No space left on device" in rig.tape.trouble
@@ -115,7 +115,7 @@ async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
 
     assert samples(recording) == numbers(10, 20)
     assert summary_of(recording).rejected == {"disk_refused": 100}
-    assert rig.tape.n_shed[DropReason.DISK_REFUSED] == 100
+    assert rig.tape.n_dropped[DropReason.DISK_REFUSED] == 100
 
 
 @pytest.mark.parametrize(

@@ -215,7 +215,7 @@ def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> 
     keeper.look()
     assert look().recording_error is None
     rig.clock.s += 5.0
-    assert look().recording_error == "recordings are not looked after: database or disk is full"
+    assert look().recording_error == "recordings are not maintained: database or disk is full"
     index.is_away = False
     keeper.look()
 

@@ -11,7 +11,7 @@ from harness.corruption import CHANGES, corrupted
 from acquisition.errors import ConfigError
 from acquisition.recordings.reader import open_recording
 from service.recordings import index as inspection
-from service.recordings.index import AGAIN_S, RecordingCheck, RecordingState
+from service.recordings.index import RETRY_S, RecordingCheck, RecordingState
 from service.recordings.library import RecordingLibrary
 from service.store.waveform_port import WaveformKind, WaveformState
 
@@ -49,7 +49,7 @@ def test_a_passing_error_makes_nothing_damaged(
     assert checked[other.name] > checked[folder.name]  # it holds up no other
     assert not rig.caretaker.faults
     del refusal[folder.name]
-    rig.clock.s += AGAIN_S
+    rig.clock.s += RETRY_S
     rig.caretaker.look()
 
     assert [file.state for file in rig.files()] == [WaveformState.PRESENT] * 2
@@ -64,7 +64,7 @@ def test_a_passing_error_renames_nothing_that_is_new(rig: Any, refusal: dict[str
     assert rig.names() == [folder.name, other.name]
     assert [file.name for file in rig.files()] == [other.name]
     refusal.clear()
-    rig.clock.s += AGAIN_S
+    rig.clock.s += RETRY_S
     rig.caretaker.look()
 
     assert [file.name for file in rig.files()] == [folder.name, other.name]
@@ -76,7 +76,7 @@ def test_the_check_of_all_names_what_cannot_be_read_and_goes_on(
     folder, other = rig.make(0), rig.make(1)
     rig.caretaker.look()
     refusal[folder.name] = OSError(errno.EIO, "Input/output error")
-    one, two = RecordingCheck(rig.roots, rig.files(), rig.clock.now_ns()).verdicts()
+    one, two = RecordingCheck(rig.roots, rig.files(), rig.clock.now_ns()).results()
 
     assert (one.name, one.found) == (folder.name, RecordingState.DAMAGED)
     assert one.reason == "it cannot be read: Input/output error"
