@@ -23,7 +23,7 @@ from service.api.auth.refusals import Refusals
 from service.api.downloads import Downloads
 from service.api.load import LoadWatch
 from service.api.problems import ProblemError
-from service.live.alarm_board import AlarmList, EvidenceStatus
+from service.live.alarm_list import AlarmList, EvidenceStatus
 from service.live.commands import BaselineAction, FilmPlace
 from service.live.live_view import CurrentBearing, UnitStatus
 from service.measuring.references_in_force import ReferencesInForce

@@ -297,7 +297,7 @@ def custody_of(plant: PlantFile) -> RetentionRules:
         roots=roots,
         room=room,
         gauge=SpaceGauge(roots, space_limits(plant.space), measure_disk),
-        bound=partial(captures_in_use, data / EVIDENCE),
+        in_use=partial(captures_in_use, data / EVIDENCE),
     )
 
 

@@ -22,7 +22,7 @@ from core.monitor.catalogue import CATALOGUE
 from core.quality import Level, Reason, bad, missing
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import NO_SPECTRUM
-from service.live.alarm_board import AlarmCount, count_of
+from service.live.alarm_list import AlarmCount, count_of
 from service.live.commands import FilmPlace, NotAvailableError
 from service.live.live_view import CurrentBearing, LinkState, UnitStatus
 from service.live.unit_state import BearingState, UnitSigns, UnitState

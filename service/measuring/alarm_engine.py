@@ -20,7 +20,7 @@ from core.change.settings import FilmRules
 from core.limits import Judgement
 from core.monitor.assessment import Assessment
 from core.samples.blocks import SampleBlock
-from service.live.alarm_board import AlarmCount, count_of
+from service.live.alarm_list import AlarmCount, count_of
 from service.measuring.recorder import Findings
 from service.measuring.service_alarms import (
     HealthProbe,

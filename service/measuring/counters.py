@@ -13,7 +13,7 @@ from core.limits import AlarmLevel
 from core.quality import Level
 from core.samples.gaps import SampleAccount
 from core.units import NS_PER_S
-from service.live.alarm_board import AlarmList
+from service.live.alarm_list import AlarmList
 from service.live.live_view import LinkState, LiveView
 from service.measuring.acquirer import Bus
 from service.measuring.recorder import Recorder

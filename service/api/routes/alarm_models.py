@@ -19,7 +19,7 @@ from service.api.values import (
     cell_of,
     condition_model,
 )
-from service.live.alarm_board import AlarmList
+from service.live.alarm_list import AlarmList
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import AlarmKindName, value_unit
 from service.settings.storage import Origin

@@ -23,7 +23,7 @@ from service.api.routes.alarm_models import (
     alarm_model,
 )
 from service.api.values import ApiModel, Time
-from service.live.alarm_board import AlarmList
+from service.live.alarm_list import AlarmList
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
 from service.store.port import AlarmQuery, Store

@@ -173,7 +173,7 @@ async def test_engineers_decide_where_it_is_left_to_them(plant: Plant, film_life
 
     await keeper.act(UJB, Accept(2), "Ada", "compared with last year")
     assert in_force(keeper) == 2
-    with pytest.raises(BaselineRefusedError, match="version 2 is in force already"):
+    with pytest.raises(BaselineRefusedError, match="version 2 is already in force"):
         await keeper.act(UJB, Accept(2), "Ada", "again")
     with pytest.raises(BaselineRefusedError, match="no version 7"):
         await keeper.act(UJB, Accept(7), "Ada", "a guess")
