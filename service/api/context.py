@@ -26,7 +26,7 @@ from service.api.problems import ProblemError
 from service.live.alarm_list import AlarmList, EvidenceStatus
 from service.live.commands import BaselineAction, FilmPlace
 from service.live.live_view import CurrentBearing, UnitStatus
-from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.references import ReferencesInForce
 from service.notifications.sender import ReceiverView
 from service.recordings.continuous_recorder import ContinuousRecorder
 from service.runtime.disk import SpaceWatch

@@ -28,10 +28,11 @@ from service.cluster.silent_units import Silence, SilentUnits, silences_s
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Acquirer, Bus
 from service.measuring.analyser import BUS_CAPACITY, UnitMemory
-from service.measuring.counters import store_info
-from service.measuring.service_alarms import SHARED, StreamStatus
+from service.measuring.metrics import store_info
+from service.measuring.reported_alarms import SHARED
+from service.measuring.service_alarms import StreamStatus
 from service.measuring.sources import WatchedUnit
-from service.measuring.timings import Timings, timed_monitors
+from service.measuring.timings import TimedMonitor, Timings
 from service.notifications.message import Around
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.process import stop_on_signals
@@ -219,7 +220,8 @@ class Analysing:
         ground = self._ground
         await self._holds.take()
         bus = Bus(BUS_CAPACITY, ground.clock)  # always empty: blocks wait in the stream
-        monitors = timed_monitors(self._monitors, ground.timings)
+        timings, untimed = ground.timings, self._monitors.items()
+        monitors = {unit: TimedMonitor(monitor, timings) for unit, monitor in untimed}
         self._stored = {
             unit: found
             for unit in monitors

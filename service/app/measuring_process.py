@@ -27,10 +27,10 @@ from service.measuring.acquirer import Bus
 from service.measuring.alarm_engine import WHOLE, AlarmEngine, Listener, PlantPart, alarm_engine
 from service.measuring.analyser import NO_MEMORIES, Analyser, UnitMemory
 from service.measuring.films import FilmMonitor, film_monitor
+from service.measuring.integrity import IntegrityMonitor
 from service.measuring.recorder import FILE, ParkedRows, Recorder
-from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.references import ReferencesInForce
 from service.measuring.service_alarms import StreamStatus
-from service.measuring.soundness import IntegrityMonitor
 from service.measuring.sources import vector_rows
 from service.notifications.message import Around
 from service.notifications.sender import Deliveries

@@ -13,7 +13,9 @@ from service.api.load import LoadWatch, load_metrics
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Bus
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.counters import (
+from service.measuring.films import FilmMonitor
+from service.measuring.integrity import IntegrityMonitor
+from service.measuring.metrics import (
     alarm_metrics,
     film_metrics,
     link_metrics,
@@ -25,9 +27,7 @@ from service.measuring.counters import (
     space_metrics,
     store_metrics,
 )
-from service.measuring.films import FilmMonitor
 from service.measuring.recorder import Recorder
-from service.measuring.soundness import IntegrityMonitor
 from service.measuring.timings import Timings
 from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import Deliveries, ReceiverView

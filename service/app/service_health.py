@@ -2,12 +2,13 @@
 
 from collections.abc import Callable, Iterable
 
+from core.limits import WITHIN
 from service.api.load import LoadWatch
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Bus
+from service.measuring.integrity import IntegrityMonitor
 from service.measuring.recorder import Recorder
-from service.measuring.service_alarms import HealthProbe, ServiceHealth, StreamStatus, enough_room
-from service.measuring.soundness import IntegrityMonitor
+from service.measuring.service_alarms import HealthProbe, ServiceHealth, StreamStatus
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import ContinuousRecorder, DropReason
 from service.recordings.keeper import RecordingIndexer
@@ -36,20 +37,22 @@ def health_of(
             store_behind_s=recorder.behind_s,
             n_unstored=live.n_unstored,
             unstored_reason=live.unstored_reason,
-            waiting_share=bus.depth / bus.capacity,
-            analysis_delay_s=max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
-            captures_error=captures.trouble,
-            recording_error=recording_error(tape, recordings),
             n_recordings_damaged=recordings.n_lost if recordings else 0,
-            refused=load.words if load else None,
-            stored_trouble=soundness.trouble if soundness else None,
-            stream_trouble=stream.trouble() if stream else None,
+            readings={
+                "waiting_share": bus.depth / bus.capacity,
+                "analysis_delay_s": max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
+                "captures_error": captures.trouble,
+                "recording_error": recording_error(tape, recordings),
+                "refused": load.words if load else None,
+                "stored_trouble": soundness.trouble if soundness else None,
+                "stream_trouble": stream.trouble() if stream else None,
+            },
             accounts={
                 unit: status.account
                 for unit in names
                 if (status := live.status(unit)).last_sample_ns is not None
             },
-            disk=enough_room if space is None else space.condition,
+            disk=space.condition if space else lambda _: WITHIN,
         )
 
     return look

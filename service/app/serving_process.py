@@ -34,7 +34,7 @@ from service.cluster.reported_commands import Asking
 from service.cluster.reported_state import Described, Feed
 from service.measuring.acquirer import Bus
 from service.measuring.commands import LocalCommands
-from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.references import ReferencesInForce
 from service.measuring.timings import Timings
 from service.reports.routes import EvidenceDesk
 from service.runtime.heartbeats import Heartbeats

@@ -231,7 +231,7 @@ def evidence_of(
 def watch(keeper: EvidenceKeeper, alarms: AlarmEngine, captures: Captures, origin: Origin) -> None:
     """Connect the collector of evidence to the alarms; a replay collects no evidence."""
     if origin is Origin.LIVE:
-        alarms.show(keeper.see)
+        alarms.set_observer(keeper.see)
         captures.set_listener(keeper.captured)
 
 

@@ -26,8 +26,9 @@ from service.live.alarm_list import AlarmCount, count_of
 from service.live.commands import FilmPlace, NotAvailableError
 from service.live.live_view import CurrentBearing, LinkState, UnitStatus
 from service.live.unit_state import BearingState, UnitSigns, UnitState
-from service.measuring.counters import alarm_metrics, film_metrics, store_info
-from service.measuring.service_alarms import SHARED, is_shared, reporting_unit
+from service.measuring.metrics import alarm_metrics, film_metrics, store_info
+from service.measuring.reported_alarms import SHARED, is_shared
+from service.measuring.service_alarms import reporting_unit
 from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import Receiver, ReceiverView, SenderState, SenderStatus
 from service.runtime.metrics import gauge

@@ -217,4 +217,4 @@ class CarryingOut:
             in_force = await asyncio.to_thread(self._store.order1_references.in_force)
             for found in in_force:
                 if found.reference.unit == task.unit:
-                    self._alarms.refer_to(found.reference)
+                    self._alarms.set_reference(found.reference)

@@ -24,9 +24,10 @@ from service.live.unit_state import (
     written_signs,
 )
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.describing import alarm_state, plant_signs, unit_signs, unit_state
 from service.measuring.films import FilmMonitor
-from service.measuring.service_alarms import SHARED, is_shared, reporting_unit
+from service.measuring.reported_alarms import SHARED, is_shared
+from service.measuring.service_alarms import reporting_unit
+from service.measuring.snapshots import alarm_state, plant_signs, unit_signs, unit_state
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import TroubleLog
 from service.settings.units import UnitSettings

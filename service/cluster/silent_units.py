@@ -12,7 +12,12 @@ from service.live.live_view import LinkState, LiveView
 from service.measuring.acquirer import LinkNews
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import Analyser
-from service.measuring.service_alarms import ReportedAlarms, gone_alarms, is_shared, judge
+from service.measuring.reported_alarms import (
+    ReportedAlarms,
+    gone_alarms,
+    is_shared,
+    report_silence,
+)
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.units import UnitSettings
 from service.store.port import Store, StoreError
@@ -72,12 +77,12 @@ class SilentUnits:
         waits_s = {u: now_s - max(self._heard_s.get(u, 0.0), self._since_s) for u in self._units}
         silent = [unit for unit, wait_s in waits_s.items() if wait_s > SILENT_AFTER_S]
         heard = [unit for unit in self._heard_s if unit not in silent]
-        judge(self._board, silent, heard, SILENT_AFTER_S)
+        report_silence(self._board, silent, heard, SILENT_AFTER_S)
 
     def leave(self) -> None:
         """Leave the alarms to whoever leads next."""
         if self._board is not None:
-            self._alarms.drop(self._board)
+            self._alarms.remove_alarms(self._board)
         self._board = None
 
     @property
@@ -88,7 +93,7 @@ class SilentUnits:
     def _kept(self, stored: Iterable[Alarm]) -> ReportedAlarms:
         """Take the alarms over, and wait anew, whoever was heard before."""
         board = gone_alarms(self._units)
-        self._alarms.keep(board, [alarm for alarm in stored if is_shared(alarm)])
+        self._alarms.add_alarms(board, [alarm for alarm in stored if is_shared(alarm)])
         self._beats.clear()
         self._heard_s.clear()
         self._since_s = self._clock.monotonic_s()

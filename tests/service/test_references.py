@@ -14,7 +14,7 @@ from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.quality import Reading, Reason, missing, uncertain
-from service.measuring.references_in_force import (
+from service.measuring.references import (
     LOOK_EVERY_S,
     ReferenceRefusedError,
     ReferencesInForce,

@@ -12,9 +12,9 @@ import pytest
 from core.limits import AlarmLevel
 from core.monitor.assessment import Assessment
 from service.live.live_view import LiveView
-from service.measuring.counters import soundness_metrics
+from service.measuring.integrity import LOOK_EVERY_S, IntegrityMonitor
+from service.measuring.metrics import soundness_metrics
 from service.measuring.service_alarms import ServiceAlarms, ServiceHealth
-from service.measuring.soundness import LOOK_EVERY_S, IntegrityMonitor
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError, TrendQuery
 from service.store.sqlite import SqliteStore
@@ -132,7 +132,7 @@ async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_
 
 def test_damage_is_an_alarm_of_danger_until_the_service_no_longer_knows_of_it() -> None:
     trouble: list[str | None] = ["3 stored rows are damaged, and left out"]
-    alarms = ServiceAlarms((), None, lambda: ServiceHealth(stored_trouble=trouble[0]))
+    alarms = ServiceAlarms((), None, lambda: ServiceHealth({"stored_trouble": trouble[0]}))
     (raised,) = (e for news in alarms.tick(T0) for e in news.events)
     trouble[0] = None
     (returned,) = (e for news in alarms.tick(T0 + 10**9) for e in news.events)

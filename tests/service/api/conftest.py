@@ -39,7 +39,7 @@ from service.measuring.alarm_engine import AlarmEngine, alarm_engine
 from service.measuring.commands import LocalCommands
 from service.measuring.films import FilmMonitor, film_monitor
 from service.measuring.recorder import FILE, ParkedRows, Recorder
-from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.references import ReferencesInForce
 from service.measuring.simulated_sources import simulated_feed
 from service.notifications.sender import Deliveries
 from service.recordings.segment import CaptureFile

@@ -28,7 +28,7 @@ from service.app.web import application
 from service.measuring import recorder as recording
 from service.measuring.commands import LocalCommands
 from service.measuring.recorder import FILE, Findings, NotStoredError, ParkedRows, Recorder
-from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.references import ReferencesInForce
 from service.notifications.sender import Deliveries
 from service.store.port import TrendQuery, UnitGap
 

@@ -11,7 +11,7 @@ from rigs.assessments import assessment
 from rigs.store_fixtures import Execute, at
 
 from service.live.live_view import LiveView
-from service.measuring.soundness import IntegrityMonitor
+from service.measuring.integrity import IntegrityMonitor
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats
 from service.runtime.periodic import LOOK_S
 from service.store.access.identities import Role, Session

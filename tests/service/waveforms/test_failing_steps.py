@@ -213,13 +213,16 @@ def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> 
     assert rig.names() == [folder.name]  # nothing is lost
     rig.clock.s += 55.0
     keeper.look()
-    assert look().recording_error is None
+    assert look().readings["recording_error"] is None
     rig.clock.s += 5.0
-    assert look().recording_error == "recordings are not maintained: database or disk is full"
+    assert (
+        look().readings["recording_error"]
+        == "recordings are not maintained: database or disk is full"
+    )
     index.is_away = False
     keeper.look()
 
-    assert look().recording_error is None
+    assert look().readings["recording_error"] is None
     keeper.close()
 
 
