@@ -171,4 +171,4 @@ class Silence:
             return  # it was said
         self._live.set_link(unit, LinkState.NOT_CONNECTED, reason)
         log.warning("not connected", unit=unit, reason=reason)
-        self._analyser.hear(LinkNews(unit, LinkState.NOT_CONNECTED, reason))
+        self._analyser.note_link(LinkNews(unit, LinkState.NOT_CONNECTED, reason))

@@ -123,7 +123,7 @@ async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_
             await soundness.look()
         told = store.audit.entries(AuditQuery(action="store.row_damaged"))
 
-        assert soundness.trouble == "3 stored rows are damaged, and left out"
+        assert soundness.trouble == "3 stored rows are damaged and left out"
         assert told_to_prometheus(soundness)["padwatch_store_damaged_rows"] == 3.0
         assert sorted(entry.object for entry in told) == [
             f"assessment: series 1, time_ns {T0 + n}" for n in range(3)
@@ -131,7 +131,7 @@ async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_
 
 
 def test_damage_is_an_alarm_of_danger_until_the_service_no_longer_knows_of_it() -> None:
-    trouble: list[str | None] = ["3 stored rows are damaged, and left out"]
+    trouble: list[str | None] = ["3 stored rows are damaged and left out"]
     alarms = ServiceAlarms((), None, lambda: ServiceHealth({"stored_trouble": trouble[0]}))
     (raised,) = (e for news in alarms.tick(T0) for e in news.events)
     trouble[0] = None
@@ -140,6 +140,6 @@ def test_damage_is_an_alarm_of_danger_until_the_service_no_longer_knows_of_it() 
     assert raised.identity.kind == "stored_data_damaged"
     assert (raised.level, str(raised.reason)) == (
         AlarmLevel.DANGER,
-        "3 stored rows are damaged, and left out",
+        "3 stored rows are damaged and left out",
     )
     assert returned.change.value == "returned"

@@ -131,7 +131,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
     ("finds_again", "said"),
     [
         (False, ("error", "results are lost")),
-        (True, ("warning", "results were not stored; they are found again at the next start")),
+        (True, ("warning", "results were not stored; the next start repeats them")),
     ],
 )
 async def test_only_results_that_nobody_finds_again_are_said_to_be_lost(

@@ -131,7 +131,7 @@ async def test_what_it_finds_is_told_in_the_audit_trail_and_makes_the_alarm(
         (told,) = store.audit.entries(AuditQuery(action="store.row_damaged"))
 
     assert soundness.trouble is not None
-    assert told.reason == "the row is gone"
+    assert told.reason == "the row is missing"
 
 
 async def test_a_disk_that_stands_still_makes_the_loop_rest_but_not_fall_silent(
