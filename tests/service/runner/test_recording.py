@@ -279,7 +279,7 @@ async def test_who_waits_for_the_disk_is_told_what_will_never_be_there(
     await asyncio.sleep(0)
     plant.recorder.put(Findings(alarms=[news_of("sy")]))
     written = asyncio.create_task(plant.recorder.stored())
-    with pytest.raises(NotStoredError, match="too much"):
+    with pytest.raises(NotStoredError, match="queue to the store is full"):
         await given_up
     await plant.recorder.flush()
     await written

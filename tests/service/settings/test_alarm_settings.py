@@ -288,13 +288,6 @@ def test_every_kind_names_a_rule_and_a_reading_that_exist() -> None:
     assert len(ALARM_KINDS) == len(units.ALARM_KINDS) + len(SERVICE_KINDS)
 
 
-def test_the_page_about_alarms_lists_every_kind() -> None:
-    page = (ROOT / "docs" / "how-to" / "alarms.md").read_text()
-    table = page.partition("| Alarm | Subject |")[2].partition("\n\n")[0]
-    cells = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
-    assert set(re.findall(r"`(\w+)`", " ".join(cells))) == set(ALARM_KINDS)
-
-
 @pytest.mark.parametrize("pattern", ["*.py", "*.js"])
 def test_no_other_module_of_the_service_lists_kinds_of_alarms(pattern: str) -> None:
     other = {quantity.name for quantity in CATALOGUE} | names_of(Bearing, ServiceRules)
