@@ -154,7 +154,7 @@ async def analysis_on(
         live,
         clock,
         ParkedRows(Path(plant.service.data_folder) / FILE),
-        told=deliveries.wake,
+        on_stored=deliveries.wake,
         timed=commits.timed,
         finds_again=stream is not None,
     )

@@ -128,7 +128,7 @@ class Acquirer:
     ----------
     publish
         Receives blocks.
-    tell
+    report
         Receives link news.
     beats
         Heartbeats of the task of each unit: they continue while a device is away, and stop if its
@@ -141,11 +141,11 @@ class Acquirer:
         live: LiveView,
         clock: Clock,
         publish: Publish,
-        tell: Callable[[LinkNews], None],
+        report: Callable[[LinkNews], None],
         beats: Heartbeats | None = None,
     ) -> None:
         self._units, self._live, self._clock = units, live, clock
-        self._publish, self._tell = publish, tell
+        self._publish, self._report = publish, report
         self._gate = ConnectGate(CONNECTS_PER_S, clock)
         self._beats = beats or Heartbeats(clock)
 
@@ -171,7 +171,7 @@ class Acquirer:
                 await self._clock.sleep(wait_s)
             else:
                 self._live.set_link(unit, LinkState.ENDED, ENDED)
-                self._tell(LinkNews(unit, LinkState.ENDED, ENDED))
+                self._report(LinkNews(unit, LinkState.ENDED, ENDED))
                 self._beats.release(f"acquire {unit}")
                 return
 
@@ -185,7 +185,7 @@ class Acquirer:
             async for block in blocks:
                 if self._live.set_link(unit, LinkState.CONNECTED):
                     log.info("connected", unit=unit)
-                    self._tell(LinkNews(unit, LinkState.CONNECTED))
+                    self._report(LinkNews(unit, LinkState.CONNECTED))
                 pulse.rest()  # a full queue is a fault of the analysis
                 await self._publish(block)
                 resume()
@@ -193,7 +193,7 @@ class Acquirer:
     def _note_failure(self, unit: str, error: AcquisitionError) -> None:
         if self._live.set_link(unit, LinkState.NOT_CONNECTED, str(error)):
             log.warning("not connected", unit=unit, reason=str(error))
-        self._tell(LinkNews(unit, LinkState.NOT_CONNECTED, str(error)))
+        self._report(LinkNews(unit, LinkState.NOT_CONNECTED, str(error)))
 
 
 def _retry_s(error: AcquisitionError, retry_s: float) -> float:

@@ -126,7 +126,7 @@ class Recorder:
     capacity
         Maximum number of queued findings; above it the oldest are dropped and counted in
         :attr:`LiveView.n_unstored`. Alarm news has a queue of its own, up to `MAX_NEWS`.
-    told
+    on_stored
         Called after alarm news was written.
     timed
         Context manager around each write, in the thread.
@@ -141,13 +141,13 @@ class Recorder:
         clock: Clock,
         parked: ParkedRows,
         capacity: int = 5000,
-        told: Callable[[], None] = lambda: None,
+        on_stored: Callable[[], None] = lambda: None,
         timed: Callable[[], AbstractContextManager[None]] = nullcontext,
         *,
         finds_again: bool = False,
     ) -> None:
         self._store, self._live, self._clock, self._parked = store, live, clock, parked
-        self._capacity, self._told, self._timed = capacity, told, timed
+        self._capacity, self._on_stored, self._timed = capacity, on_stored, timed
         self._finds_again = finds_again
         self._waiting: deque[Findings] = deque()
         self._alarms: deque[AlarmNews] = deque()
@@ -277,7 +277,7 @@ class Recorder:
         for news in alarms:
             self._resolve(news, reasons.get(id(news)))
         if alarms:
-            self._told()
+            self._on_stored()
         await self._notify()
         return True
 

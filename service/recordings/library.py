@@ -76,12 +76,12 @@ class RecordingLibrary:
             if unit in (None, unit_of(folder.name)) and kind in (None, kind_of(folder.name))
         ]
         by_age = sorted(folders, key=_age, reverse=True)
-        return [self._kept(folder) for folder in by_age[:limit]]
+        return [self._entry(folder) for folder in by_age[:limit]]
 
     def one(self, name: str) -> RecordingEntry | None:
         """Return the recording of a name; None if it does not exist."""
         folder = self._folder(name)
-        return None if folder is None else self._kept(folder)
+        return None if folder is None else self._entry(folder)
 
     def opened(self, name: str) -> Recording:
         """Open a recording after a check of all its files.
@@ -130,7 +130,7 @@ class RecordingLibrary:
         for root in self._roots:
             yield from (root / name for name in finished(root))
 
-    def _kept(self, folder: Path) -> RecordingEntry:
+    def _entry(self, folder: Path) -> RecordingEntry:
         try:
             manifest, fault = read_manifest(folder), self._faults.get(folder.name)
         except ConfigError as error:
