@@ -62,7 +62,7 @@ class LiveLook(Protocol):
         ...
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Return the newest blocks of a unit; raise `NotHereError` if this process has none."""
+        """Return the newest blocks of a unit; raise `NotAvailableError` if this process has none."""
         ...
 
     def newest_block(self, unit: str) -> SampleBlock | None:
@@ -87,7 +87,7 @@ class LiveLook(Protocol):
 
 
 class FilmBoard(Protocol):
-    """The films of all bearings; see :class:`service.measuring.films.keeper.FilmKeeper`."""
+    """The films of all bearings; see :class:`service.measuring.films.FilmMonitor`."""
 
     @property
     def unwatched(self) -> Mapping[str, str]:
@@ -117,7 +117,7 @@ class FilmBoard(Protocol):
 
 
 class CaptureLook(Protocol):
-    """Samples around alarms; see :class:`service.recordings.capture.captures.Captures`."""
+    """Samples around alarms; see :class:`service.recordings.around_alarms.Captures`."""
 
     @property
     def error(self) -> str | None:
@@ -157,7 +157,7 @@ class Operators(Protocol):
             If there is no such alarm.
         ActionRefusedError
             If the operation does not fit the state of the alarm.
-        NotCarriedOutError
+        CommandFailedError
             If no process carries it out, or the disk does not answer.
         """
         ...
@@ -169,7 +169,7 @@ class Operators(Protocol):
         ------
         BaselineRefusedError
             If the action does not fit the baselines.
-        NotCarriedOutError
+        CommandFailedError
             If no process carries it out.
         """
         ...

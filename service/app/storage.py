@@ -273,15 +273,15 @@ def space_limits(settings: SpaceSettings) -> SpaceLimits:
 
 def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> RecordingIndexer:
     """Build the keeper of the recordings of a live plant."""
-    data, custody = Path(plant.service.data_folder), custody_of(plant)
+    data, rules = Path(plant.service.data_folder), retention_rules(plant)
 
-    def hire() -> RecordingRetention:
-        return RecordingRetention(custody, Index(store.waveforms, place_of(data)), clock)
+    def open_retention() -> RecordingRetention:
+        return RecordingRetention(rules, Index(store.waveforms, place_of(data)), clock)
 
-    return RecordingIndexer(custody.gauge, hire, clock, RecordingLock(data))
+    return RecordingIndexer(rules.gauge, open_retention, clock, RecordingLock(data))
 
 
-def custody_of(plant: PlantFile) -> RetentionRules:
+def retention_rules(plant: PlantFile) -> RetentionRules:
     """Return the folders of recordings and the rules of their retention."""
     data = Path(plant.service.data_folder)
     room = RoomLimits(

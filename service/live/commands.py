@@ -80,34 +80,34 @@ def baseline_step(
     BaselineRefusedError
         If the action does not fit the state of the baselines.
     """
-    from_ns = None
+    version: int | None = versions.in_force
+    from_ns: int | None = None
     match action:
-        case Accept(version):
-            step = BaselineStep.ACCEPTED
-            _require_acceptable(version, place, versions, entries)
-        case Reject(version):
-            step = BaselineStep.REJECTED
-            _entry(version, entries)
+        case Accept():
+            step, version = BaselineStep.ACCEPTED, action.version
+            _require_acceptable(action.version, place, versions, entries)
+        case Reject():
+            is_in_force, version = action.version == version, action.version
+            step = BaselineStep.WITHDRAWN if is_in_force else BaselineStep.REJECTED
+            _entry(action.version, entries)
             if version in versions.rejected:
                 raise BaselineRefusedError(f"version {version} is already rejected")
-            if version == versions.in_force:
-                step = BaselineStep.WITHDRAWN
         case Freeze():
-            step, version = BaselineStep.FROZEN, versions.in_force
+            step = BaselineStep.FROZEN
             if versions.is_frozen:
                 raise BaselineRefusedError(f"{place.bearing} is already frozen")
             if version is None:
                 raise BaselineRefusedError(f"{place.bearing} has no baseline in force")
         case Thaw():
-            step, version = BaselineStep.THAWED, versions.in_force
+            step = BaselineStep.THAWED
             if not versions.is_frozen:
                 raise BaselineRefusedError(f"{place.bearing} is not frozen")
-        case Renew(from_ns):
-            step, version = BaselineStep.RENEWED, None
+        case Renew():
+            step, version, from_ns = BaselineStep.RENEWED, None, action.from_ns
             if from_ns > now_ns:
                 raise BaselineRefusedError("a machine event cannot lie in the future")
             if versions.renewed_ns is not None and from_ns < versions.renewed_ns:
-                raise BaselineRefusedError("there has been a later machine event already")
+                raise BaselineRefusedError("there is already a later machine event")
     return StoredStep(place.unit, place.bearing, version, step, now_ns, actor, reason, from_ns)
 
 

@@ -282,13 +282,13 @@ class ServiceAlarms(OwnedAlarms):
                 return self._increase(name, n_damaged, AlarmLevel.ALERT, "damaged_or_missing")
             case "disk_nearly_full":
                 return health.disk(self._held(name))
-        found = health.readings.get(SERVICE_KINDS[name].reading or "")
-        if found is None:
+        reading = health.readings.get(SERVICE_KINDS[name].reading or "")
+        if reading is None:
             return WITHIN
-        if isinstance(found, str):
+        if isinstance(reading, str):
             level = AlarmLevel.DANGER if name in DANGER_KINDS else AlarmLevel.ALERT
-            return Judgement(level, reason=found)
-        return self._compared(name, found)
+            return Judgement(level, reason=reading)
+        return self._compared(name, reading)
 
     def _increase(self, name: str, n_found: int, level: AlarmLevel, reason: str) -> Judgement:
         """Judge a count that should not increase."""
