@@ -62,7 +62,7 @@ class LiveLook(Protocol):
         ...
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Return the newest blocks of a unit; raise `NotAvailableError` if this process has none."""
+        """Return the newest blocks of a unit; raise `NotAvailableError` if there are none."""
         ...
 
     def newest_block(self, unit: str) -> SampleBlock | None:

@@ -17,7 +17,7 @@ from acquisition.recordings.export import ExportFormat, export_recording
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.summary import RecordingSummary, summary_of
 from service.app.recordings import recording_of
-from service.app.storage import custody_of, has_store, open_store
+from service.app.storage import has_store, open_store, retention_rules
 from service.cli.offline.importing import import_recording
 from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
 from service.recordings.folders import place_of
@@ -43,7 +43,7 @@ def check(
     missing. `padwatch recording verify` checks one that was made with `--out` elsewhere.
     """
     plant = read_plant_file(plant_file)
-    roots = custody_of(plant).roots
+    roots = retention_rules(plant).roots
     try:
         verdicts = _verdicts(plant, roots)
     except (OSError, StoreError) as error:
