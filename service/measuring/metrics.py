@@ -37,7 +37,7 @@ def sample_metrics(live: LiveView, units: Iterable[str]) -> Iterator[Metric]:
     accounts = [((unit,), live.status(unit).account) for unit in units]
     yield counter(
         "samples_offered",
-        "Samples per channel that the device has counted since the first one that arrived.",
+        "Samples per channel counted by the device since the first that arrived.",
         UNIT,
         ((unit, account.n_offered) for unit, account in accounts),
     )
@@ -65,13 +65,13 @@ def sample_metrics(live: LiveView, units: Iterable[str]) -> Iterator[Metric]:
     )
     yield counter(
         "samples_repeated",
-        "Samples per channel that were offered a second time and dropped.",
+        "Repeated samples per channel, which were dropped.",
         UNIT,
         ((unit, account.n_repeated) for unit, account in accounts),
     )
     yield counter(
         "device_restarts",
-        "How often the device began to count its samples anew.",
+        "Restarts of the sample count of the device.",
         UNIT,
         ((unit, account.n_restarts) for unit, account in accounts),
     )
@@ -90,7 +90,7 @@ def link_metrics(
     )
     yield gauge(
         "ingest_lag_seconds",
-        "How far the newest sample's time is behind the host's clock.",
+        "Delay of the newest sample, by the clock of the host.",
         UNIT,
         (
             (unit, (now_ns - its.last_sample_ns) / NS_PER_S)
@@ -100,13 +100,13 @@ def link_metrics(
     )
     yield gauge(
         "data_age_seconds",
-        "Since samples arrived last.",
+        "Time since the newest samples arrived.",
         UNIT,
         (((unit,), age) for unit in units if (age := live.data_age_s(unit)) is not None),
     )
     yield gauge(
         "device_clock_offset_seconds",
-        "How far the device's time stamps are ahead of the host's clock.",
+        "Offset of the time stamps of the device from the clock of the host.",
         UNIT,
         (
             (unit, its.clock.offset_s)
@@ -159,7 +159,7 @@ def result_metrics(
     }
     yield gauge(
         "result_age_seconds",
-        "Since the newest result of a bearing.",
+        "Age of the newest result of a bearing.",
         ("unit", "bearing"),
         ((place, its.age_s) for place, its in current.items() if its.age_s is not None),
     )
@@ -233,10 +233,8 @@ def film_metrics(
 def queue_metrics(bus: Bus) -> Iterator[Metric]:
     """Yield the state of the queue from acquisition to analysis."""
     yield one("queue_blocks", "Blocks that wait for analysis.", bus.depth)
-    yield one("queue_capacity_blocks", "Most blocks that can wait for it.", bus.capacity)
-    yield one(
-        "queue_wait_seconds", "For how long the oldest of them has waited.", bus.oldest_wait_s
-    )
+    yield one("queue_capacity_blocks", "Maximum number of waiting blocks.", bus.capacity)
+    yield one("queue_wait_seconds", "Waiting time of the oldest block.", bus.oldest_wait_s)
 
 
 def store_metrics(
@@ -255,12 +253,12 @@ def store_metrics(
     yield one("store_waiting_findings", "Findings that wait for the store.", recorder.n_waiting)
     yield one(
         "store_behind_seconds",
-        "For how long findings have waited without any being written.",
+        "Time for which findings have waited without any being written.",
         recorder.behind_s,
     )
     yield counter(
         "store_lost_findings",
-        "Findings that the store did not take: given up, or refused and parked.",
+        "Findings that were not stored: dropped, or refused and parked.",
         (),
         [((), live.n_unstored)],
     )
@@ -268,7 +266,7 @@ def store_metrics(
 
 def store_info(kind: str) -> Metric:
     """Return the family that names the kind of the database."""
-    return gauge("store_info", "1; the database that results are in.", ("kind",), [((kind,), 1)])
+    return gauge("store_info", "1; kind of the database.", ("kind",), [((kind,), 1)])
 
 
 def soundness_metrics(found: IntegrityMonitor | None) -> Iterator[Metric]:
