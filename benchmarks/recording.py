@@ -14,8 +14,8 @@ from acquisition.clock import SystemClock
 from acquisition.delivery.blocks import BlockAssembler
 from core.samples.blocks import SampleBlock
 from service.measuring.simulated_sources import simulated_feed
-from service.recordings.continuous_recorder import UnitTape
-from service.recordings.segment import TapeSettings, join
+from service.recordings.continuous_recorder import UnitRecorder
+from service.recordings.segment import SegmentSettings, join
 from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
@@ -49,7 +49,7 @@ def main() -> None:
     blocks = blocks_of(unit)
     with tempfile.TemporaryDirectory() as folder:
         root = Path(folder)
-        tape = UnitTape(root, recorded_unit(unit), TapeSettings())
+        tape = UnitRecorder(root, recorded_unit(unit), SegmentSettings())
         start_s, join_s, write_bytes = time.process_time(), 0.0, _written()
         for block in blocks:
             tape.write(block, 0.0)
@@ -66,7 +66,7 @@ def main() -> None:
     print(f"  written in all  {per_day * write_bytes:.0f} MB a day")
 
 
-def _join(tape: UnitTape) -> float:
+def _join(tape: UnitRecorder) -> float:
     start_s = time.process_time()
     for folder in tape.ended:
         join(folder)

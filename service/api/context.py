@@ -23,12 +23,12 @@ from service.api.auth.refusals import Refusals
 from service.api.downloads import Downloads
 from service.api.load import LoadWatch
 from service.api.problems import ProblemError
-from service.live.alarm_board import AlarmBoard, EvidenceStatus
+from service.live.alarm_list import AlarmList, EvidenceStatus
 from service.live.commands import BaselineAction, FilmPlace
 from service.live.live_view import CurrentBearing, UnitStatus
-from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.references import ReferencesInForce
 from service.notifications.sender import ReceiverView
-from service.recordings.continuous_recorder import Tape
+from service.recordings.continuous_recorder import ContinuousRecorder
 from service.runtime.disk import SpaceWatch
 from service.runtime.polls import TimedSource
 from service.settings.bearings import BearingSettings
@@ -62,7 +62,7 @@ class LiveLook(Protocol):
         ...
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Return the newest blocks of a unit; raise `NotHereError` if this process has none."""
+        """Return the newest blocks of a unit; raise `NotAvailableError` if there are none."""
         ...
 
     def newest_block(self, unit: str) -> SampleBlock | None:
@@ -87,7 +87,7 @@ class LiveLook(Protocol):
 
 
 class FilmBoard(Protocol):
-    """The films of all bearings; see :class:`service.measuring.films.keeper.FilmKeeper`."""
+    """The films of all bearings; see :class:`service.measuring.films.FilmMonitor`."""
 
     @property
     def unwatched(self) -> Mapping[str, str]:
@@ -117,7 +117,7 @@ class FilmBoard(Protocol):
 
 
 class CaptureLook(Protocol):
-    """Samples around alarms; see :class:`service.recordings.capture.captures.Captures`."""
+    """Samples around alarms; see :class:`service.recordings.around_alarms.Captures`."""
 
     @property
     def error(self) -> str | None:
@@ -157,7 +157,7 @@ class Operators(Protocol):
             If there is no such alarm.
         ActionRefusedError
             If the operation does not fit the state of the alarm.
-        NotCarriedOutError
+        CommandFailedError
             If no process carries it out, or the disk does not answer.
         """
         ...
@@ -169,7 +169,7 @@ class Operators(Protocol):
         ------
         BaselineRefusedError
             If the action does not fit the baselines.
-        NotCarriedOutError
+        CommandFailedError
             If no process carries it out.
         """
         ...
@@ -239,7 +239,7 @@ class Context:
     clock: Clock
     refresh_s: float
     references: ReferencesInForce
-    alarms: AlarmBoard
+    alarms: AlarmList
     films: FilmBoard
     operators: Operators
     captures: CaptureLook
@@ -258,7 +258,7 @@ class Context:
     access: AccessDesk | None = None
     space: SpaceWatch | None = None
     load: LoadWatch | None = None
-    tape: Tape | None = None
+    tape: ContinuousRecorder | None = None
     recordings: Sequence[pathlib.Path] | None = None
     faults: Callable[[], Mapping[str, str]] = dict
 

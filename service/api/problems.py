@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 
 from service.api.auth.declared import allowed_methods
-from service.live.commands import NotCarriedOutError, NotHereError
+from service.live.commands import CommandFailedError, NotAvailableError
 from service.store.port import QueryTooLargeError, StoreError
 
 MEDIA_TYPE = "application/problem+json"
@@ -157,12 +157,12 @@ def install_problem_handlers(app: FastAPI) -> None:
         log.error("a query failed in the store", path=request.url.path, reason=str(error))
         return _render(request, 503, "Store not available", "the store cannot be read just now")
 
-    @app.exception_handler(NotHereError)
-    async def _not_here(request: Request, error: NotHereError) -> Response:
+    @app.exception_handler(NotAvailableError)
+    async def _not_here(request: Request, error: NotAvailableError) -> Response:
         return _render(request, 409, "Not available here", str(error))
 
-    @app.exception_handler(NotCarriedOutError)
-    async def _not_carried_out(request: Request, error: NotCarriedOutError) -> Response:
+    @app.exception_handler(CommandFailedError)
+    async def _not_carried_out(request: Request, error: CommandFailedError) -> Response:
         return _render(request, 503, error.title, str(error))
 
     @app.exception_handler(Exception)

@@ -28,10 +28,11 @@ from service.cluster.silent_units import SilenceWatch, SilentUnits, silences_s
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Acquirer, Bus
 from service.measuring.analyser import BUS_CAPACITY, UnitMemory
-from service.measuring.counters import store_info
-from service.measuring.service_alarms import SHARED, StreamLook
+from service.measuring.metrics import store_info
+from service.measuring.reported_alarms import SHARED
+from service.measuring.service_alarms import StreamStatus
 from service.measuring.sources import WatchedUnit
-from service.measuring.timings import Timings, timed_monitors
+from service.measuring.timings import Timings
 from service.notifications.message import LiveContext
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.process import stop_on_signals
@@ -219,14 +220,15 @@ class Analysing:
         ground = self._ground
         await self._holds.take()
         bus = Bus(BUS_CAPACITY, ground.clock)  # always empty: blocks wait in the stream
-        monitors = timed_monitors(self._monitors, ground.timings)
+        timings, untimed = ground.timings, self._monitors.items()
+        monitors = {unit: TimedMonitor(monitor, timings) for unit, monitor in untimed}
         self._stored = {
             unit: found
             for unit in monitors
             if (found := await asyncio.to_thread(ground.store.position, unit)) is not None
         }
         self._memories = memories_of(self._stored.values())
-        stream = StreamLook(self._trouble, self._behind_s)
+        stream = StreamStatus(self._trouble, self._behind_s)
         analysis = await analysis_on(
             ground, monitors, bus, self._alarm_context, self._share, self._memories, stream
         )

@@ -26,17 +26,17 @@ from service.cluster.reported_state import Reporter, process_name
 from service.measuring.acquirer import Bus
 from service.measuring.alarm_engine import WHOLE, AlarmEngine, Listener, PlantPart, alarm_engine
 from service.measuring.analyser import NO_MEMORIES, Analyser, UnitMemory
-from service.measuring.films import FilmKeeper, film_keeper
+from service.measuring.films import FilmMonitor, film_monitor
+from service.measuring.integrity import IntegrityMonitor
 from service.measuring.recorder import FILE, ParkedRows, Recorder
-from service.measuring.references_in_force import ReferencesInForce
-from service.measuring.service_alarms import StreamLook
-from service.measuring.soundness import Soundness
+from service.measuring.references import ReferencesInForce
+from service.measuring.service_alarms import StreamStatus
 from service.measuring.sources import vector_rows
 from service.notifications.message import LiveContext
 from service.notifications.sender import Deliveries
 from service.recordings.around_alarms import Captures
-from service.recordings.continuous_recorder import Tape
-from service.recordings.keeper import WaveformKeeper
+from service.recordings.continuous_recorder import ContinuousRecorder
+from service.recordings.keeper import RecordingIndexer
 from service.reports.keeper import EvidenceKeeper
 from service.runtime.disk import SpaceWatch
 from service.runtime.heartbeats import Loop
@@ -54,17 +54,17 @@ class Analysis:
     recorder: Recorder
     deliveries: Deliveries
     captures: Captures
-    tape: Tape
-    recordings: WaveformKeeper
+    tape: ContinuousRecorder
+    recordings: RecordingIndexer
     alarms: AlarmEngine
-    films: FilmKeeper
+    films: FilmMonitor
     evidence: EvidenceKeeper
     references: ReferencesInForce
     rolling: Rolling
     retaining: Retaining
     space: SpaceWatch
     load: LoadWatch
-    soundness: Soundness
+    soundness: IntegrityMonitor
 
     def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
         """Start the background loops; they run until they are cancelled."""
@@ -118,7 +118,7 @@ async def analysis_on(
     alarm_context: LiveContext,
     part: PlantPart = WHOLE,
     memories: Mapping[str, UnitMemory] = NO_MEMORIES,
-    stream: StreamLook | None = None,
+    stream: StreamStatus | None = None,
 ) -> Analysis:
     """Build the parts of the analysis and resume where the service stopped.
 
@@ -142,7 +142,7 @@ async def analysis_on(
     """
     plant, origin, store, clock = ground.plant, ground.origin, ground.store, ground.clock
     live = ground.live
-    soundness = Soundness(store, clock, live)
+    soundness = IntegrityMonitor(store, clock, live)
     await soundness.look()  # before anything is written
     if origin is Origin.LIVE:  # a replay starts anew and has no gap
         for unit, monitor in monitors.items():
@@ -154,7 +154,7 @@ async def analysis_on(
         live,
         clock,
         ParkedRows(Path(plant.service.data_folder) / FILE),
-        told=deliveries.wake,
+        on_stored=deliveries.wake,
         timed=commits.timed,
         finds_again=stream is not None,
     )
@@ -180,7 +180,7 @@ async def analysis_on(
         {unit: memory.alarms for unit, memory in memories.items()},
     )
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
-    films = await film_keeper(plant, machines, store.films, clock)
+    films = await film_monitor(plant, machines, store.films, clock)
     for unit, memory in memories.items():
         films.resume(unit, memory.films)
     alarm_context.watch_films(films.newest)
@@ -209,7 +209,7 @@ async def analysis_on(
     )
 
 
-def _listener(captures: Captures, tape: Tape) -> Listener:
+def _listener(captures: Captures, tape: ContinuousRecorder) -> Listener:
     """Return a listener that passes every judged block to both recorders of samples."""
 
     def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:

@@ -13,7 +13,9 @@ from service.api.load import LoadWatch, load_metrics
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Bus
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.counters import (
+from service.measuring.films import FilmMonitor
+from service.measuring.integrity import IntegrityMonitor
+from service.measuring.metrics import (
     alarm_metrics,
     film_metrics,
     link_metrics,
@@ -25,15 +27,13 @@ from service.measuring.counters import (
     space_metrics,
     store_metrics,
 )
-from service.measuring.films import FilmKeeper
 from service.measuring.recorder import Recorder
-from service.measuring.soundness import Soundness
 from service.measuring.timings import Timings
 from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import Deliveries, ReceiverView
 from service.recordings.around_alarms import Captures
-from service.recordings.continuous_recorder import Tape
-from service.recordings.keeper import WaveformKeeper
+from service.recordings.continuous_recorder import ContinuousRecorder
+from service.recordings.keeper import RecordingIndexer
 from service.recordings.metrics import recording_metrics
 from service.reports.keeper import EvidenceKeeper
 from service.runtime.disk import SpaceWatch
@@ -69,7 +69,7 @@ class Watched:
     bus: Bus
     recorder: Recorder
     alarms: AlarmEngine
-    films: FilmKeeper
+    films: FilmMonitor
     captures: Captures
     evidence: EvidenceKeeper
     deliveries: Deliveries
@@ -78,9 +78,9 @@ class Watched:
     sources: Mapping[str, TimedSource] = field(default_factory=dict)
     space: SpaceWatch | None = None
     load: LoadWatch | None = None
-    tape: Tape | None = None
-    recordings: WaveformKeeper | None = None
-    soundness: Soundness | None = None
+    tape: ContinuousRecorder | None = None
+    recordings: RecordingIndexer | None = None
+    soundness: IntegrityMonitor | None = None
     store_kind: str | None = None
 
 

@@ -2,15 +2,16 @@
 
 from collections.abc import Callable, Iterable
 
+from core.limits import WITHIN
 from service.api.load import LoadWatch
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Bus
+from service.measuring.integrity import IntegrityMonitor
 from service.measuring.recorder import Recorder
-from service.measuring.service_alarms import LookAtHealth, ServiceHealth, StreamLook, enough_room
-from service.measuring.soundness import Soundness
+from service.measuring.service_alarms import HealthProbe, ServiceHealth, StreamStatus
 from service.recordings.around_alarms import Captures
-from service.recordings.continuous_recorder import Shed, Tape
-from service.recordings.keeper import WaveformKeeper
+from service.recordings.continuous_recorder import ContinuousRecorder, DropReason
+from service.recordings.keeper import RecordingIndexer
 from service.runtime.disk import SpaceWatch
 
 
@@ -22,11 +23,11 @@ def health_of(
     bus: Bus,
     space: SpaceWatch | None = None,
     load: LoadWatch | None = None,
-    tape: Tape | None = None,
-    recordings: WaveformKeeper | None = None,
-    soundness: Soundness | None = None,
-    stream: StreamLook | None = None,
-) -> LookAtHealth:
+    tape: ContinuousRecorder | None = None,
+    recordings: RecordingIndexer | None = None,
+    soundness: IntegrityMonitor | None = None,
+    stream: StreamStatus | None = None,
+) -> HealthProbe:
     """Return a function that reads the health of the running service."""
     names = list(units)
 
@@ -36,26 +37,30 @@ def health_of(
             store_behind_s=recorder.behind_s,
             n_unstored=live.n_unstored,
             unstored_reason=live.unstored_reason,
-            waiting_share=bus.depth / bus.capacity,
-            analysis_delay_s=max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
-            captures_error=captures.trouble,
-            recording_error=recording_error(tape, recordings),
             n_recordings_damaged=recordings.n_lost if recordings else 0,
-            refused=load.words if load else None,
-            stored_trouble=soundness.trouble if soundness else None,
-            stream_trouble=stream.trouble() if stream else None,
+            readings={
+                "waiting_share": bus.depth / bus.capacity,
+                "analysis_delay_s": max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
+                "captures_error": captures.trouble,
+                "recording_error": recording_error(tape, recordings),
+                "refused": load.words if load else None,
+                "stored_trouble": soundness.trouble if soundness else None,
+                "stream_trouble": stream.trouble() if stream else None,
+            },
             accounts={
                 unit: status.account
                 for unit in names
                 if (status := live.status(unit)).last_sample_ns is not None
             },
-            disk=enough_room if space is None else space.condition,
+            disk=space.condition if space else lambda _: WITHIN,
         )
 
     return look
 
 
-def recording_error(tape: Tape | None, recordings: WaveformKeeper | None) -> str | None:
+def recording_error(
+    tape: ContinuousRecorder | None, recordings: RecordingIndexer | None
+) -> str | None:
     """Return why samples are not recorded or recordings not maintained; None if neither."""
     now = tape.trouble if tape else None
     return now or (recordings.lasting_trouble if recordings else None)
@@ -91,7 +96,7 @@ class Pressure:
         self._bus, self._is_full, self._has_shed = bus, is_full, has_shed
         self._is_behind = False
 
-    def look(self) -> Shed | None:
+    def look(self) -> DropReason | None:
         """Return why recording pauses now, or None."""
         share = CAUGHT_UP if self._is_behind else 1.0
         is_behind = (
@@ -100,5 +105,5 @@ class Pressure:
         )
         self._is_behind = is_behind and (self._is_behind or self._has_shed())
         if self._is_behind:
-            return Shed.ANALYSIS_BEHIND
-        return Shed.DISK_FULL if self._is_full() else None
+            return DropReason.ANALYSIS_BEHIND
+        return DropReason.DISK_FULL if self._is_full() else None

@@ -27,8 +27,8 @@ from service.cluster.replica_state import ReplicaAlarms, ReplicaFilms, ReplicaLi
 from service.cluster.reported_commands import CommandClient
 from service.cluster.reported_state import Feed, UnitDescription
 from service.measuring.acquirer import Bus
-from service.measuring.commands import InProcess
-from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.commands import LocalCommands
+from service.measuring.references import ReferencesInForce
 from service.measuring.timings import Timings
 from service.reports.routes import EvidenceDesk
 from service.runtime.heartbeats import Heartbeats
@@ -122,7 +122,7 @@ def context_of(
         references=analysis.references,
         alarms=analysis.alarms,
         films=analysis.films,
-        operators=InProcess(analysis.alarms, analysis.films, analysis.recorder),
+        operators=LocalCommands(analysis.alarms, analysis.films, analysis.recorder),
         captures=analysis.captures,
         deliveries=analysis.deliveries,
         evidence=lambda: analysis.evidence.status,

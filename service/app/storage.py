@@ -13,14 +13,14 @@ from service.api.downloads import Downloads
 from service.app.recordings import recording_writer
 from service.live.live_view import LiveView
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.recordings.around_alarms import Captures, CaptureSettings
-from service.recordings.continuous_recorder import Shed, Tape
+from service.recordings.continuous_recorder import ContinuousRecorder, DropReason
 from service.recordings.folders import place_of
 from service.recordings.index import Index
-from service.recordings.keeper import WatchKeeping, WaveformKeeper
-from service.recordings.retention import Caretaker, Custody, Gauge, RoomLimits
-from service.recordings.segment import MakeWriter, TapeSettings
+from service.recordings.keeper import RecordingIndexer, RecordingLock
+from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
+from service.recordings.segment import MakeWriter, SegmentSettings
 from service.reports.archive import EvidenceArchive
 from service.reports.capture_link import captures_in_use
 from service.reports.keeper import EvidenceFolders, EvidenceKeeper
@@ -175,8 +175,8 @@ def recordings_folder(plant: PlantFile) -> Path:
 
 
 def tape_of(
-    plant: PlantFile, origin: Origin, clock: Clock, press: Callable[[], Shed | None]
-) -> Tape:
+    plant: PlantFile, origin: Origin, clock: Clock, press: Callable[[], DropReason | None]
+) -> ContinuousRecorder:
     """Build the continuous recorder of the units of a live plant that are to be recorded."""
     found = plant.recording
     units = {
@@ -187,9 +187,9 @@ def tape_of(
         and origin is Origin.LIVE
         and not isinstance(unit.source, ModbusVectorSettings)
     }
-    settings = TapeSettings(60.0 * found.length_min, found.sync_s)
+    settings = SegmentSettings(60.0 * found.length_min, found.sync_s)
     owned = [unit.id for unit in plant.unit] if origin is Origin.LIVE else []
-    return Tape(recordings_folder(plant), units, settings, clock, press, owned)
+    return ContinuousRecorder(recordings_folder(plant), units, settings, clock, press, owned)
 
 
 EVIDENCE, CONFIGURATIONS = "evidence", "configurations"
@@ -213,7 +213,7 @@ def evidence_of(
     plant: PlantFile,
     origin: Origin,
     live: LiveView,
-    films: FilmKeeper,
+    films: FilmMonitor,
     store: Store,
     captures: Captures,
     clock: Clock,
@@ -231,8 +231,8 @@ def evidence_of(
 def watch(keeper: EvidenceKeeper, alarms: AlarmEngine, captures: Captures, origin: Origin) -> None:
     """Connect the collector of evidence to the alarms; a replay collects no evidence."""
     if origin is Origin.LIVE:
-        alarms.show(keeper.see)
-        captures.tell(keeper.captured)
+        alarms.set_observer(keeper.see)
+        captures.set_listener(keeper.captured)
 
 
 def built_configuration(plant: PlantFile) -> Configuration:
@@ -271,17 +271,17 @@ def space_limits(settings: SpaceSettings) -> SpaceLimits:
     )
 
 
-def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> WaveformKeeper:
+def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> RecordingIndexer:
     """Build the keeper of the recordings of a live plant."""
-    data, custody = Path(plant.service.data_folder), custody_of(plant)
+    data, rules = Path(plant.service.data_folder), retention_rules(plant)
 
-    def hire() -> Caretaker:
-        return Caretaker(custody, Index(store.waveforms, place_of(data)), clock)
+    def open_retention() -> RecordingRetention:
+        return RecordingRetention(rules, Index(store.waveforms, place_of(data)), clock)
 
-    return WaveformKeeper(custody.gauge, hire, clock, WatchKeeping(data))
+    return RecordingIndexer(rules.gauge, open_retention, clock, RecordingLock(data))
 
 
-def custody_of(plant: PlantFile) -> Custody:
+def retention_rules(plant: PlantFile) -> RetentionRules:
     """Return the folders of recordings and the rules of their retention."""
     data = Path(plant.service.data_folder)
     room = RoomLimits(
@@ -293,11 +293,11 @@ def custody_of(plant: PlantFile) -> Custody:
         WaveformKind.CAPTURE: data / CAPTURES,
         WaveformKind.CONTINUOUS: recordings_folder(plant),
     }
-    return Custody(
+    return RetentionRules(
         roots=roots,
         room=room,
-        gauge=Gauge(roots, space_limits(plant.space), measure_disk),
-        bound=partial(captures_in_use, data / EVIDENCE),
+        gauge=SpaceGauge(roots, space_limits(plant.space), measure_disk),
+        in_use=partial(captures_in_use, data / EVIDENCE),
     )
 
 

@@ -17,11 +17,11 @@ from acquisition.recordings.export import ExportFormat, export_recording
 from acquisition.recordings.reader import Recording
 from acquisition.recordings.summary import RecordingSummary, summary_of
 from service.app.recordings import recording_of
-from service.app.storage import custody_of, has_store, open_store
+from service.app.storage import has_store, open_store, retention_rules
 from service.cli.offline.importing import import_recording
 from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
 from service.recordings.folders import place_of
-from service.recordings.index import Found, RecordingCheck, Verdict
+from service.recordings.index import CheckResult, RecordingCheck, RecordingState
 from service.runtime.process import made_by
 from service.runtime.times import rfc3339
 from service.settings.plant import PlantFile
@@ -30,7 +30,7 @@ from service.settings.toml_file import TomlFileError, load_toml
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind
 
-WRONG = (Found.DAMAGED, Found.MISSING)
+WRONG = (RecordingState.DAMAGED, RecordingState.MISSING)
 
 
 def check(
@@ -43,13 +43,13 @@ def check(
     missing. `padwatch recording verify` checks one that was made with `--out` elsewhere.
     """
     plant = read_plant_file(plant_file)
-    roots = custody_of(plant).roots
+    roots = retention_rules(plant).roots
     try:
         verdicts = _verdicts(plant, roots)
     except (OSError, StoreError) as error:
         fail(f"padwatch recording check: {error}")
     counts = Counter(verdict.found for verdict in verdicts)
-    others = [verdict for verdict in verdicts if verdict.found is not Found.SOUND]
+    others = [verdict for verdict in verdicts if verdict.found is not RecordingState.SOUND]
     if json_output:
         folders = [str(root) for root in roots.values()]
         typer.echo(json.dumps(_document(counts, others) | {"folders": folders}, indent=1))
@@ -57,7 +57,7 @@ def check(
         for verdict in others:
             words = verdict.found.value.replace("_", " ")
             typer.echo(f"{verdict.kind.value} {verdict.name}: {words}: {verdict.reason}")
-        typer.echo(", ".join(f"{counts[f]} {f.value.replace('_', ' ')}" for f in Found))
+        typer.echo(", ".join(f"{counts[f]} {f.value.replace('_', ' ')}" for f in RecordingState))
         if not verdicts:
             typer.echo(
                 f"no recordings in {' or '.join(map(str, roots.values()))};"
@@ -67,14 +67,14 @@ def check(
         raise typer.Exit(1)
 
 
-def _verdicts(plant: PlantFile, roots: Mapping[WaveformKind, Path]) -> list[Verdict]:
+def _verdicts(plant: PlantFile, roots: Mapping[WaveformKind, Path]) -> list[CheckResult]:
     checking = RecordingCheck(roots, _index(plant), SystemClock().now_ns())
     found = []
     hidden = not sys.stderr.isatty()
     with typer.progressbar(
         length=checking.n_to_read, label="Checking", file=sys.stderr, hidden=hidden
     ) as bar:
-        for verdict in checking.verdicts():
+        for verdict in checking.results():
             found.append(verdict)
             bar.update(1)
     return found
@@ -87,12 +87,12 @@ def _index(plant: PlantFile) -> Sequence[WaveformFile]:
         return store.waveforms.files(place_of(Path(plant.service.data_folder)))
 
 
-def _document(counts: Counter[Found], others: Sequence[Verdict]) -> dict[str, object]:
+def _document(counts: Counter[RecordingState], others: Sequence[CheckResult]) -> dict[str, object]:
     listed = [
         {"kind": v.kind.value, "name": v.name, "found": v.found.value, "reason": v.reason}
         for v in others
     ]
-    return {found.value: counts[found] for found in Found} | {"recordings": listed}
+    return {found.value: counts[found] for found in RecordingState} | {"recordings": listed}
 
 
 GAPS_PRINTED = 20

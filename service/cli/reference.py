@@ -14,7 +14,7 @@ from service.api.routes.references import SetReferenceModel, set_reference_model
 from service.api.values import ApiModel
 from service.app.storage import has_store, open_store, store_name
 from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
-from service.measuring.references_in_force import (
+from service.measuring.references import (
     Gaps,
     ReferenceRefusedError,
     doubts,

@@ -28,7 +28,7 @@ from service.cluster.session import (
     stream_name,
     subject,
 )
-from service.measuring.counters import one
+from service.measuring.metrics import one
 from service.measuring.recorder import Findings, Recorder
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.metrics import counter, gauge

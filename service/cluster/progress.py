@@ -221,7 +221,7 @@ class UnitProgress:
         self._live.set_link(self.unit, LinkState.CONNECTED)
         self._rewind(message.block)
         account = self._memory.monitor.account if self._memory else None
-        await self._analyser.relive(message.block, self._sampled_s(message), account)
+        await self._analyser.replay(message.block, self._sampled_s(message), account)
         self._window.note(sequence, message.block, self._analyser.state(self.unit))
 
     def _is_done(self, message: Taken | LinkNews) -> bool:
@@ -268,7 +268,7 @@ class UnitProgress:
         is_known = self._analyser.is_connected(self.unit)
         if not is_known or self._live.status(self.unit).state is not LinkState.CONNECTED:
             self._take_news(LinkNews(self.unit, LinkState.CONNECTED))
-        findings = await self._analyser.learn(message.block, self._sampled_s(message))
+        findings = await self._analyser.analyse(message.block, self._sampled_s(message))
         self.sequence = sequence
         self._window.note(sequence, message.block, self._analyser.state(self.unit))
         if findings != Findings():
@@ -283,7 +283,7 @@ class UnitProgress:
         if self._live.set_link(news.unit, news.state, news.reason):
             write = log.info if news.is_connected else log.warning
             write(news.state.value.replace("_", " "), unit=news.unit, reason=news.reason)
-        self._analyser.hear(news)
+        self._analyser.note_link(news)
 
     def _refuse(self, sequence: int, error: WireError) -> None:
         self._why_refused = str(error)

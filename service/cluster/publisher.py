@@ -30,7 +30,7 @@ from service.cluster.session import (
     subject,
 )
 from service.measuring.acquirer import LinkNews
-from service.measuring.counters import one
+from service.measuring.metrics import one
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.metrics import counter
 from service.runtime.periodic import TroubleLog

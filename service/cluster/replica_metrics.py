@@ -14,7 +14,7 @@ from acquisition.clock import Clock
 from core.quality import Level
 from service.cluster.replica_state import ReplicaAlarms, ReplicaFilms, ReplicaLive
 from service.live.live_view import LinkState
-from service.measuring.counters import alarm_metrics, film_metrics, one, store_info
+from service.measuring.metrics import alarm_metrics, film_metrics, one, store_info
 from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import (
     Receiver,

@@ -15,11 +15,12 @@ from core.monitor.catalogue import CATALOGUE
 from core.quality import Reason, bad, missing
 from core.samples.blocks import SampleBlock
 from core.spectra.cross_spectrum import NO_SPECTRUM
-from service.live.alarm_board import AlarmCount, count_of
-from service.live.commands import FilmPlace, NotHereError
+from service.live.alarm_list import AlarmCount, count_of
+from service.live.commands import FilmPlace, NotAvailableError
 from service.live.live_view import CurrentBearing, LinkState, UnitStatus
 from service.live.unit_state import BearingState, UnitSigns, UnitState
-from service.measuring.service_alarms import SHARED, is_shared, told_by
+from service.measuring.reported_alarms import SHARED, is_shared
+from service.measuring.service_alarms import reporting_unit
 from service.settings.core_values import film_rules_of
 from service.settings.plant import PlantFile
 from service.store.film_port import FilmStore
@@ -140,8 +141,8 @@ class ReplicaLive:
         )
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Raise `NotHereError`: samples stay in the process that analyses them."""
-        raise NotHereError(f"live samples of unit {unit} are not available from this replica")
+        """Raise `NotAvailableError`: samples stay in the process that analyses them."""
+        raise NotAvailableError(f"live samples of unit {unit} are not available from this replica")
 
     def newest_block(self, unit: str) -> SampleBlock | None:  # noqa: ARG002  interface of LiveView
         """Return None: samples stay in the process that analyses them."""
@@ -156,10 +157,10 @@ class ReplicaLive:
         return self._age_s(unit, self._latest[unit].signs.data_age_s)
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """Return None without a result, otherwise raise `NotHereError`: arrays are not reported."""
+        """Return None without a result; else raise `NotAvailableError`: arrays are not reported."""
         if bearing not in self._latest[unit].results:
             return None
-        raise NotHereError(
+        raise NotAvailableError(
             f"live spectra and orbits of unit {unit} are not available from this replica;"
             " spectra over time are"
         )
@@ -344,7 +345,7 @@ class ReplicaAlarms:
     def _owner(self, alarm: Alarm) -> str:
         if is_shared(alarm):
             return SHARED
-        unit = told_by(alarm.identity)
+        unit = reporting_unit(alarm.identity)
         return unit if unit in self._units else PLANT
 
     def count(self) -> AlarmCount:

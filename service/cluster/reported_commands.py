@@ -11,20 +11,20 @@ from core.alarms.operation import Action, ActionRefusedError
 from core.units import ns_from_s
 from service.cluster.replica_state import ReplicaAlarms
 from service.live.commands import (
+    AlarmCommand,
     BaselineAction,
+    BaselineCommand,
     BaselineRefusedError,
+    CommandFailedError,
     FilmPlace,
-    NewReference,
-    NotCarriedOutError,
-    OnAlarm,
-    OnBaselines,
-    Task,
+    OperatorCommand,
+    ReferenceCommand,
     UnreadableCommandError,
-    read,
-    written,
+    decoded,
+    encoded,
 )
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.measuring.recorder import NotStoredError, Recorder
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import TroubleLog, periodic
@@ -51,7 +51,7 @@ class CommandClient:
     async def operate(self, id_: str, action: Action) -> Alarm:
         """Operate an alarm; returns its stored state afterwards."""
         unit = self._alarms.owner(id_)
-        answer = await self._send(unit, OnAlarm(id_, action), action.actor)
+        answer = await self._send(unit, AlarmCommand(id_, action), action.actor)
         if answer.state is CommandState.UNKNOWN:
             raise LookupError(answer.words)
         if answer.state is CommandState.REFUSED:
@@ -61,31 +61,31 @@ class CommandClient:
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
         """Change the baselines of a bearing."""
-        answer = await self._send(place.unit, OnBaselines(place, action, actor, reason), actor)
+        answer = await self._send(place.unit, BaselineCommand(place, action, actor, reason), actor)
         if answer.state is CommandState.REFUSED:
             raise BaselineRefusedError(answer.words)
 
     async def refer_to(self, reference: VectorReference) -> None:
         """Put a stored reference of 1× vectors in force."""
-        await self._send(reference.unit, NewReference(reference.unit), acting().actor)
+        await self._send(reference.unit, ReferenceCommand(reference.unit), acting().actor)
 
-    async def _send(self, unit: str, task: Task, actor: str) -> Answer:
+    async def _send(self, unit: str, task: OperatorCommand, actor: str) -> Answer:
         """Store a command and wait for its answer.
 
-        Raises `NotCarriedOutError` if the command is not carried out, or its outcome is unknown.
+        Raises `CommandFailedError` if the command is not carried out, or its outcome is unknown.
         """
         command = self._command(unit, task, actor)
         await asyncio.to_thread(self._store.commands.ask, command)
         answer = await self._answer(command)
         if answer.state in (CommandState.WITHDRAWN, CommandState.INTERRUPTED):
-            raise NotCarriedOutError("Not carried out", f"unit {unit}: {answer.words}")
+            raise CommandFailedError("Not carried out", f"unit {unit}: {answer.words}")
         if answer.state in OPEN:
             detail = f"unit {unit}: the command is being carried out but is not on the disk yet"
-            raise NotCarriedOutError("Not on the disk yet", detail)
+            raise CommandFailedError("Not on the disk yet", detail)
         return answer
 
-    def _command(self, unit: str, task: Task, actor: str) -> Command:
-        kind, document = written(task)
+    def _command(self, unit: str, task: OperatorCommand, actor: str) -> Command:
+        kind, document = encoded(task)
         now_ns = self._clock.now_ns()
         expires_ns = now_ns + ns_from_s(EXPIRES_S)
         who = (actor, acting().peer)
@@ -137,7 +137,7 @@ class CommandWorker:
         process: str,
         held: Callable[[], Collection[str]],
         alarms: AlarmEngine,
-        films: FilmKeeper,
+        films: FilmMonitor,
         recorder: Recorder,
         store: Store,
         clock: Clock,
@@ -179,18 +179,18 @@ class CommandWorker:
         if self._clock.now_ns() > found.command.expires_ns:
             return TOO_LATE
         try:
-            task = read(found.command.kind, found.command.document)
+            task = decoded(found.command.kind, found.command.document)
         except UnreadableCommandError as error:
             return Answer(CommandState.REFUSED, str(error))
         # baselines are stored in a separate transaction: the outcome is unknown
-        is_in_doubt = isinstance(task, OnBaselines) and found.taken_by is not None
+        is_in_doubt = isinstance(task, BaselineCommand) and found.taken_by is not None
         return INTERRUPTED if is_in_doubt else None
 
     async def _carry_out(self, command: Command) -> Answer:
         who = Acting(Source.API, command.peer, command.actor, command.id)
         try:
             with acting_as(who):
-                await self._do(read(command.kind, command.document))
+                await self._do(decoded(command.kind, command.document))
         except LookupError:
             return Answer(CommandState.UNKNOWN, "there is no such alarm")
         except (ActionRefusedError, BaselineRefusedError) as error:
@@ -202,14 +202,14 @@ class CommandWorker:
             )
         return DONE
 
-    async def _do(self, task: Task) -> None:
-        if isinstance(task, OnAlarm):
+    async def _do(self, task: OperatorCommand) -> None:
+        if isinstance(task, AlarmCommand):
             self._alarms.operate(task.alarm, task.action)
             await self._recorder.stored()
-        elif isinstance(task, OnBaselines):
+        elif isinstance(task, BaselineCommand):
             await self._films.act(task.place, task.action, task.actor, task.reason)
-        elif isinstance(task, NewReference):
+        elif isinstance(task, ReferenceCommand):
             in_force = await asyncio.to_thread(self._store.order1_references.in_force)
             for found in in_force:
                 if found.reference.unit == task.unit:
-                    self._alarms.refer_to(found.reference)
+                    self._alarms.set_reference(found.reference)

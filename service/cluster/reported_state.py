@@ -24,9 +24,10 @@ from service.live.unit_state import (
     written_signs,
 )
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.describing import alarm_state, plant_signs, unit_signs, unit_state
-from service.measuring.films import FilmKeeper
-from service.measuring.service_alarms import SHARED, is_shared, told_by
+from service.measuring.films import FilmMonitor
+from service.measuring.reported_alarms import SHARED, is_shared
+from service.measuring.service_alarms import reporting_unit
+from service.measuring.snapshots import alarm_state, plant_signs, unit_signs, unit_state
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import TroubleLog, periodic
 from service.settings.units import UnitSettings
@@ -69,7 +70,7 @@ class Reporter:
         held: Callable[[], Iterable[str]],
         live: LiveView,
         alarms: AlarmEngine,
-        films: FilmKeeper,
+        films: FilmMonitor,
         store: UnitStates,
         clock: Clock,
     ) -> None:
@@ -122,7 +123,8 @@ class Reporter:
         others = [
             alarm
             for alarm in self._alarms.alarms
-            if told_by(alarm.identity) not in self._units and is_shared(alarm) == (unit == SHARED)
+            if reporting_unit(alarm.identity) not in self._units
+            and is_shared(alarm) == (unit == SHARED)
         ]
         return alarm_state(others, self._alarms), plant_signs(self._live)
 

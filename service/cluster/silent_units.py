@@ -12,7 +12,12 @@ from service.live.live_view import LinkState, LiveView
 from service.measuring.acquirer import LinkNews
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import Analyser
-from service.measuring.service_alarms import ToldAlarms, gone_alarms, is_shared, judge
+from service.measuring.reported_alarms import (
+    ReportedAlarms,
+    gone_alarms,
+    is_shared,
+    report_silence,
+)
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import periodic
 from service.settings.units import UnitSettings
@@ -41,7 +46,7 @@ class SilentUnits:
         self._beats: dict[str, tuple[str, int]] = {}
         self._seen_s: dict[str, float] = {}
         self._since_s = 0.0
-        self._board: ToldAlarms | None = None
+        self._board: ReportedAlarms | None = None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Check while this process leads, until cancelled."""
@@ -64,12 +69,12 @@ class SilentUnits:
         waits_s = {u: now_s - max(self._seen_s.get(u, 0.0), self._since_s) for u in self._units}
         silent = [unit for unit, wait_s in waits_s.items() if wait_s > SILENT_AFTER_S]
         alive = [unit for unit in self._seen_s if unit not in silent]
-        judge(self._board, silent, alive, SILENT_AFTER_S)
+        report_silence(self._board, silent, alive, SILENT_AFTER_S)
 
     def leave(self) -> None:
         """Leave the alarms to the next leading process."""
         if self._board is not None:
-            self._alarms.drop(self._board)
+            self._alarms.remove_alarms(self._board)
         self._board = None
 
     @property
@@ -77,10 +82,10 @@ class SilentUnits:
         """Whether this process is responsible for the alarms."""
         return self._board is not None
 
-    def _kept(self, stored: Iterable[Alarm]) -> ToldAlarms:
+    def _kept(self, stored: Iterable[Alarm]) -> ReportedAlarms:
         """Take over the alarms and measure all ages anew."""
         board = gone_alarms(self._units)
-        self._alarms.keep(board, [alarm for alarm in stored if is_shared(alarm)])
+        self._alarms.add_alarms(board, [alarm for alarm in stored if is_shared(alarm)])
         self._beats.clear()
         self._seen_s.clear()
         self._since_s = self._clock.monotonic_s()
@@ -152,4 +157,4 @@ class SilenceWatch:
             return
         self._live.set_link(unit, LinkState.NOT_CONNECTED, reason)
         log.warning("not connected", unit=unit, reason=reason)
-        self._analyser.hear(LinkNews(unit, LinkState.NOT_CONNECTED, reason))
+        self._analyser.note_link(LinkNews(unit, LinkState.NOT_CONNECTED, reason))

@@ -1,1 +1,1 @@
-"""What crosses between measuring and serving: newest results, newest samples, commands."""
+"""Data between measuring and serving: newest results and samples, alarm list, commands."""

@@ -1,4 +1,4 @@
-"""What operators and engineers may ask of the measuring side, and the answers."""
+"""Commands of operators and engineers to the measuring process, and their errors."""
 
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -14,7 +14,7 @@ from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
 
 @dataclass(frozen=True)
 class FilmPlace:
-    """One bearing of one unit, by one estimator."""
+    """Film of a bearing, with the estimator of its stiffness."""
 
     unit: str
     bearing: str
@@ -22,36 +22,36 @@ class FilmPlace:
 
 
 class BaselineRefusedError(ValueError):
-    """An action does not fit the baselines as they are now; the message says why."""
+    """An action does not fit the state of the baselines; the message states why."""
 
 
 @dataclass(frozen=True)
 class Accept:
-    """Compare the bearing with a version from now on."""
+    """Put a version in force."""
 
     version: int
 
 
 @dataclass(frozen=True)
 class Reject:
-    """Compare it with that version no longer, and never by itself again."""
+    """Withdraw a version; it is never put in force automatically again."""
 
     version: int
 
 
 @dataclass(frozen=True)
 class Freeze:
-    """Learn no further."""
+    """Stop learning."""
 
 
 @dataclass(frozen=True)
 class Thaw:
-    """Learn again."""
+    """Resume learning."""
 
 
 @dataclass(frozen=True)
 class Renew:
-    """Begin again after a machine event, as an overhaul: older readings count no longer."""
+    """Learn anew after a machine event such as an overhaul, without older readings."""
 
     from_ns: int
 
@@ -59,7 +59,7 @@ class Renew:
 BaselineAction: TypeAlias = Accept | Reject | Freeze | Thaw | Renew
 
 
-def step_of(
+def baseline_step(
     action: BaselineAction,
     place: FilmPlace,
     versions: Versions,
@@ -68,50 +68,50 @@ def step_of(
     reason: str,
     now_ns: int,
 ) -> StoredStep:
-    """What is to be written if somebody does this now.
+    """Return the step to store for an action.
 
     Parameters
     ----------
     entries
-        Every baseline of the bearing.
+        All baselines of the bearing.
 
     Raises
     ------
     BaselineRefusedError
-        If it does not fit the baselines as they are.
+        If the action does not fit the state of the baselines.
     """
-
-    def done(step: BaselineStep, version: int | None, from_ns: int | None = None) -> StoredStep:
-        return StoredStep(place.unit, place.bearing, version, step, now_ns, actor, reason, from_ns)
-
+    version: int | None = versions.in_force
+    from_ns: int | None = None
     match action:
-        case Accept(version):
-            _require_acceptable(version, place, versions, entries)
-            return done(BaselineStep.ACCEPTED, version)
-        case Reject(version):
-            _require_version(version, entries)
+        case Accept():
+            step, version = BaselineStep.ACCEPTED, action.version
+            _require_acceptable(action.version, place, versions, entries)
+        case Reject():
+            is_in_force, version = action.version == version, action.version
+            step = BaselineStep.WITHDRAWN if is_in_force else BaselineStep.REJECTED
+            _entry(action.version, entries)
             if version in versions.rejected:
-                raise BaselineRefusedError(f"version {version} is rejected already")
-            is_used = version == versions.in_force
-            return done(BaselineStep.WITHDRAWN if is_used else BaselineStep.REJECTED, version)
+                raise BaselineRefusedError(f"version {version} is already rejected")
         case Freeze():
-            if versions.in_force is None or versions.is_frozen:
-                why = "is frozen already" if versions.is_frozen else "has no baseline in force"
-                raise BaselineRefusedError(f"{place.bearing} {why}")
-            return done(BaselineStep.FROZEN, versions.in_force)
+            step = BaselineStep.FROZEN
+            if versions.is_frozen:
+                raise BaselineRefusedError(f"{place.bearing} is already frozen")
+            if version is None:
+                raise BaselineRefusedError(f"{place.bearing} has no baseline in force")
         case Thaw():
+            step = BaselineStep.THAWED
             if not versions.is_frozen:
                 raise BaselineRefusedError(f"{place.bearing} is not frozen")
-            return done(BaselineStep.THAWED, versions.in_force)
-        case Renew(from_ns):
+        case Renew():
+            step, version, from_ns = BaselineStep.RENEWED, None, action.from_ns
             if from_ns > now_ns:
                 raise BaselineRefusedError("a machine event cannot lie in the future")
             if versions.renewed_ns is not None and from_ns < versions.renewed_ns:
-                raise BaselineRefusedError("there has been a later machine event already")
-            return done(BaselineStep.RENEWED, None, from_ns)
+                raise BaselineRefusedError("there is already a later machine event")
+    return StoredStep(place.unit, place.bearing, version, step, now_ns, actor, reason, from_ns)
 
 
-def _require_version(version: int, entries: list[BaselineEntry]) -> BaselineEntry:
+def _entry(version: int, entries: list[BaselineEntry]) -> BaselineEntry:
     for entry in entries:
         if entry.version == version:
             return entry
@@ -121,32 +121,33 @@ def _require_version(version: int, entries: list[BaselineEntry]) -> BaselineEntr
 def _require_acceptable(
     version: int, place: FilmPlace, versions: Versions, entries: list[BaselineEntry]
 ) -> None:
-    entry = _require_version(version, entries)
+    entry = _entry(version, entries)
     if version == versions.in_force:
-        raise BaselineRefusedError(f"version {version} is in force already")
+        raise BaselineRefusedError(f"version {version} is already in force")
     if entry.estimator is not place.estimator:
         raise BaselineRefusedError(
-            f"version {version} was learned of {entry.estimator}, watched is {place.estimator}"
+            f"version {version} was learned with estimator {entry.estimator};"
+            f" the film is watched with {place.estimator}"
         )
     if versions.renewed_ns is not None and entry.learned_from_ns < versions.renewed_ns:
-        raise BaselineRefusedError(f"version {version} is of before the last machine event")
+        raise BaselineRefusedError(f"version {version} is older than the last machine event")
 
 
 class UnreadableCommandError(Exception):
-    """A command that this version of the program does not know."""
+    """A command that this version of the program cannot read."""
 
 
 @dataclass(frozen=True)
-class OnAlarm:
-    """Something that is done to an alarm."""
+class AlarmCommand:
+    """Action on an alarm."""
 
     alarm: str
     action: Action
 
 
 @dataclass(frozen=True)
-class OnBaselines:
-    """Something that is done to the baselines of a bearing."""
+class BaselineCommand:
+    """Action on the baselines of a bearing."""
 
     place: FilmPlace
     action: BaselineAction
@@ -155,71 +156,66 @@ class OnBaselines:
 
 
 @dataclass(frozen=True)
-class NewReference:
-    """A reference of 1× was stored for a bearing of a unit."""
+class ReferenceCommand:
+    """Notice that a 1× reference of a unit was stored."""
 
     unit: str
 
 
-Task: TypeAlias = OnAlarm | OnBaselines | NewReference
+OperatorCommand: TypeAlias = AlarmCommand | BaselineCommand | ReferenceCommand
 
-_ALARM_ACTIONS: dict[str, type[Any]] = {
-    kind.__name__: kind
+_ALARM_ACTIONS = {
+    kind.__name__: TypeAdapter[Any](tuple[str, kind])  # type: ignore[valid-type]
     for kind in (
         *(operation.Acknowledge, operation.Shelve, operation.Unshelve),
         *(operation.TakeOutOfService, operation.ReturnToService),
         *(operation.Reset, operation.Comment),
     )
 }
-_BASELINE_ACTIONS: dict[str, type[Any]] = {
-    kind.__name__: kind for kind in (Accept, Reject, Freeze, Thaw, Renew)
+_BASELINE_ACTIONS = {
+    kind.__name__: TypeAdapter[Any](tuple[FilmPlace, kind, str, str])  # type: ignore[valid-type]
+    for kind in (Accept, Reject, Freeze, Thaw, Renew)
 }
-_REFERENCE = NewReference.__name__
-_ON_ALARM = {k: TypeAdapter(tuple[str, c]) for k, c in _ALARM_ACTIONS.items()}  # type: ignore[valid-type]
-_ON_BASELINES = {
-    k: TypeAdapter(tuple[FilmPlace, c, str, str])  # type: ignore[valid-type]
-    for k, c in _BASELINE_ACTIONS.items()
-}
+_REFERENCE = TypeAdapter(ReferenceCommand)
 
 
-def written(task: Task) -> tuple[str, str]:
-    """Kind and document of a task; `read` gives an equal one."""
-    if isinstance(task, OnAlarm):
-        kind = type(task.action).__name__
-        return kind, _ON_ALARM[kind].dump_json((task.alarm, task.action)).decode()
-    if isinstance(task, OnBaselines):
-        kind = type(task.action).__name__
-        whole = (task.place, task.action, task.actor, task.reason)
-        return kind, _ON_BASELINES[kind].dump_json(whole).decode()
-    return _REFERENCE, TypeAdapter(NewReference).dump_json(task).decode()
+def encoded(command: OperatorCommand) -> tuple[str, str]:
+    """Return the kind and the JSON document of a command."""
+    if isinstance(command, ReferenceCommand):
+        return ReferenceCommand.__name__, _REFERENCE.dump_json(command).decode()
+    kind = type(command.action).__name__
+    if isinstance(command, AlarmCommand):
+        return kind, _ALARM_ACTIONS[kind].dump_json((command.alarm, command.action)).decode()
+    whole = (command.place, command.action, command.actor, command.reason)
+    return kind, _BASELINE_ACTIONS[kind].dump_json(whole).decode()
 
 
-def read(kind: str, document: str) -> Task:
-    """Read a task.
+def decoded(kind: str, document: str) -> OperatorCommand:
+    """Return the command of a kind and a JSON document.
 
     Raises
     ------
     UnreadableCommandError
-        If it is of another version, or damaged.
+        If it comes from another version of the program, or is damaged.
     """
     try:
-        if kind in _ON_ALARM:
-            return OnAlarm(*_ON_ALARM[kind].validate_json(document))
-        if kind in _ON_BASELINES:
-            return OnBaselines(*_ON_BASELINES[kind].validate_json(document))
-        if kind == _REFERENCE:
-            return TypeAdapter(NewReference).validate_json(document)
+        if kind in _ALARM_ACTIONS:
+            return AlarmCommand(*_ALARM_ACTIONS[kind].validate_json(document))
+        if kind in _BASELINE_ACTIONS:
+            return BaselineCommand(*_BASELINE_ACTIONS[kind].validate_json(document))
+        if kind == ReferenceCommand.__name__:
+            return _REFERENCE.validate_json(document)
     except ValidationError as error:
         raise UnreadableCommandError(f"command {kind} cannot be read: {error}") from error
-    raise UnreadableCommandError(f"this padwatch knows no command {kind!r}")
+    raise UnreadableCommandError(f"unknown command {kind!r}")
 
 
-class NotHereError(Exception):
-    """It exists only in the process that analyses; the message says so."""
+class NotAvailableError(Exception):
+    """Data exist only in the process that analyses the unit; the message states which."""
 
 
-class NotCarriedOutError(Exception):
-    """What somebody asked for is not done, or not on the disk; the message says which."""
+class CommandFailedError(Exception):
+    """A command was not carried out, or not stored; the message states which."""
 
     def __init__(self, title: str, detail: str) -> None:
         super().__init__(detail)

@@ -1,4 +1,4 @@
-"""How far learning the baseline of a bearing has come."""
+"""Progress of learning the baseline of a bearing."""
 
 from dataclasses import dataclass
 
@@ -19,18 +19,18 @@ RECENT_DAYS = 7.0
 
 @dataclass(frozen=True)
 class ReadingCounts:
-    """Readings of the last `RECENT_DAYS`: why a film is not learned or judged.
+    """Number of readings of the last `RECENT_DAYS`, each a part of the one before.
 
     Parameters
     ----------
     n_at_speed
-        At rated speed, in any state.
+        Readings at rated speed, in any state.
     n_settled
-        Of these, after the warm-up.
+        Readings after the warm-up.
     n_complete
-        Of these, with stiffness and condition in the direction that has fewer.
+        Readings with stiffness and condition, in the direction with fewer of them.
     n_judged
-        Of these, with a verdict on the film.
+        Readings with a verdict on the film.
     """
 
     n_at_speed: int
@@ -41,17 +41,17 @@ class ReadingCounts:
 
 @dataclass(frozen=True)
 class LearningProgress:
-    """How far learning has come.
+    """Progress of learning.
 
     Parameters
     ----------
     since_ns, until_ns
-        The learning period; None before the first reading.
+        Learning period; None before the first reading.
     n_readings, n_days
-        Readings that count so far, in the direction that has fewer, and days that they are from;
-        None once there is a baseline of this period.
+        Number of usable readings and of their days, in the direction with fewer of them; None
+        after a baseline was learned in this period.
     recent
-        What became of the newest readings.
+        Newest readings.
     """
 
     since_ns: int | None
@@ -70,13 +70,7 @@ def learning_progress(
     settings: FilmAlarmSettings,
     now_ns: int,
 ) -> LearningProgress:
-    """How far learning has come.
-
-    Parameters
-    ----------
-    entries
-        Every baseline of the bearing.
-    """
+    """Return the progress of learning; ``entries`` are all baselines of the bearing."""
     recent = _recent(store, place, settings, now_ns)
     since_ns = versions.renewed_ns
     if since_ns is None:
@@ -98,7 +92,7 @@ def learning_progress(
 def _counts(
     store: FilmStore, place: FilmPlace, since_ns: int, until_ns: int, settings: FilmAlarmSettings
 ) -> tuple[int, int]:
-    """Readings that count, and days that they are from."""
+    """Return the number of usable readings and of their days."""
     found = store.history(
         FilmQuery(place.unit, place.bearing, place.estimator, since_ns, until_ns + 1)
     )
@@ -127,6 +121,6 @@ def _recent(
 
 
 def _complete(found: FilmHistory, settings: FilmAlarmSettings) -> list[npt.NDArray[np.bool_]]:
-    """(n,) for each direction: whether readings have stiffness and condition."""
+    """Return for each direction, (n,), whether readings have stiffness and condition."""
     is_known = settings.baseline.settings().is_known(found.history.conditions)
     return [is_known & (outcome == ReadingOutcome.MEASURED) for outcome in found.history.outcome]

@@ -1,4 +1,4 @@
-"""What is known now: the link to each unit, its newest samples and each bearing's assessment."""
+"""Newest state: link and samples of each unit, assessment of each bearing."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -13,14 +13,14 @@ from core.samples.gaps import SampleAccount
 from service.live.samples import BlockHistory
 
 HELD_S = 10.0
-"""How much of the newest samples is held of each unit."""
+"""Duration of the samples held of each unit."""
 
 HELD_SAMPLES = 2_000_000
-"""Of all channels of a unit together, at most."""
+"""Maximum of all channels of a unit."""
 
 
 class LinkState(StrEnum):
-    """Whether samples of a unit arrive."""
+    """State of the link to a unit."""
 
     CONNECTING = "connecting"
     CONNECTED = "connected"
@@ -30,24 +30,24 @@ class LinkState(StrEnum):
 
 @dataclass(frozen=True)
 class UnitStatus:
-    """How samples of a unit arrive.
+    """Status of the samples of a unit.
 
     Parameters
     ----------
     reason
-        Why it is not connected, in words.
+        Why the unit is not connected.
     since_ns
-        Since when it has been in this state.
+        Start of the present link state.
     last_sample_ns
-        Time of the newest sample by the device's clock.
+        Time of the newest sample by the clock of the device.
     received_s
-        When that arrived, on the steady clock.
+        Monotonic time of its arrival.
     clock
-        How the device's clock stands against the host's, where it can be told.
+        Clock of the device compared with the clock of the host, if known.
     stamp_fault
-        Why the newest block's own time stamp was not used.
+        Why the time stamp of the newest block was not used.
     n_failed
-        How often connecting has failed, or a link was lost, since the service started.
+        Number of failed connection attempts and lost links since the start.
     """
 
     state: LinkState = LinkState.CONNECTING
@@ -63,12 +63,12 @@ class UnitStatus:
 
 @dataclass(frozen=True)
 class CurrentBearing:
-    """A bearing as it may be shown now: without numbers when they are not current.
+    """Newest result of a bearing; its readings have no values if it is not current.
 
     Parameters
     ----------
     age_s
-        Since the newest result; None if there has been none.
+        Age of the newest result; None before the first.
     """
 
     assessment: Assessment | None
@@ -79,12 +79,12 @@ class CurrentBearing:
 
 
 class LiveView:
-    """The newest of everything; written by the runner, read by the API, on one event loop.
+    """Newest state of all units, written by the analysis and read by the API on one event loop.
 
     Parameters
     ----------
     stale_after_s
-        A result older than this is no longer current.
+        Age above which a result is no longer current.
     """
 
     def __init__(self, units: Iterable[str], clock: Clock, stale_after_s: float) -> None:
@@ -94,19 +94,19 @@ class LiveView:
         self._assessments: dict[tuple[str, str], tuple[float, Assessment]] = {}
         self._blocks: dict[str, BlockHistory] = {}
         self.revision = 0
-        """Another number as soon as a link has changed or a result has come."""
+        """Number that changes with every link state and result."""
 
         self.store_error: str | None = None
         self.n_unstored = 0
         self.unstored_reason: str | None = None
 
     def note_unstored(self, n_findings: int, reason: str) -> None:
-        """Count findings that are not in the database and never will be."""
+        """Count findings that were not stored and will not be."""
         self.n_unstored += n_findings
         self.unstored_reason = reason
 
     def set_link(self, unit: str, state: LinkState, reason: str | None = None) -> bool:
-        """Note the state of a link; return whether it changed."""
+        """Set the state of a link; return whether it changed."""
         before = self._status[unit]
         if state is LinkState.NOT_CONNECTED:
             before = self._status[unit] = replace(before, n_failed=before.n_failed + 1)
@@ -120,8 +120,11 @@ class LiveView:
     def set_received(
         self, block: SampleBlock, account: SampleAccount, sampled_s: float | None = None
     ) -> None:
-        """Note the arrival of a block whose samples were there then; just now if none is given."""
-        self._hold(block)
+        """Set the newest block of a unit, which arrived at ``sampled_s``; default: now."""
+        if block.unit not in self._blocks:
+            most = HELD_SAMPLES // max(block.counts.shape[0], 1)
+            self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))
+        self._blocks[block.unit].add(block)
         self._status[block.unit] = replace(
             self._status[block.unit],
             last_sample_ns=block.stop_ns,
@@ -132,41 +135,41 @@ class LiveView:
         )
 
     def set_assessment(self, assessment: Assessment, sampled_s: float | None = None) -> None:
-        """Note a new result, of samples that were there then; just now if none is given."""
+        """Set the newest result, of samples that arrived at ``sampled_s``; default: now."""
         self.revision += 1
         key = (assessment.unit, assessment.bearing)
         since_s = self._clock.monotonic_s() if sampled_s is None else sampled_s
         self._assessments[key] = (since_s, assessment)
 
     def status(self, unit: str) -> UnitStatus:
-        """How samples of a unit arrive."""
+        """Return the status of the samples of a unit."""
         return self._status[unit]
 
     def blocks(self, unit: str) -> list[SampleBlock]:
-        """The newest blocks of a unit, oldest first, current or not."""
+        """Return the newest blocks of a unit, oldest first, current or not."""
         return list(self._blocks.get(unit, ()))
 
     def newest_block(self, unit: str) -> SampleBlock | None:
-        """The newest block of a unit, current or not; None if there has been none."""
+        """Return the newest block of a unit, current or not; None before the first."""
         blocks = self.blocks(unit)
         return blocks[-1] if blocks else None
 
     def why_no_samples(self, unit: str) -> Reason | None:
-        """Why the newest samples of a unit are not current; None if they are."""
+        """Return why the newest samples of a unit are not current; None if they are."""
         return self._why_not_current(unit, self.data_age_s(unit))
 
     def data_age_s(self, unit: str) -> float | None:
-        """Time since the newest block arrived; None if none has."""
+        """Return the time since the newest block arrived; None before the first."""
         received_s = self._status[unit].received_s
         return None if received_s is None else self._clock.monotonic_s() - received_s
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """The newest result, current or not."""
+        """Return the newest result, current or not."""
         entry = self._assessments.get((unit, bearing))
         return entry[1] if entry else None
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:
-        """The newest result as it may be shown: nothing old passes for current."""
+        """Return the newest result, without values if it is not current."""
         entry = self._assessments.get((unit, bearing))
         age_s = None if entry is None else self._clock.monotonic_s() - entry[0]
         reason = self._why_not_current(unit, age_s)
@@ -187,9 +190,3 @@ class LiveView:
         if age_s is None:
             return Reason.WAITING_FOR_DATA
         return Reason.STALE if age_s > self._stale_after_s else None
-
-    def _hold(self, block: SampleBlock) -> None:
-        if block.unit not in self._blocks:
-            most = HELD_SAMPLES // max(block.counts.shape[0], 1)
-            self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))
-        self._blocks[block.unit].add(block)

@@ -1,4 +1,4 @@
-"""`UnitState`: what is known of a unit now, as the process that analyses it writes it down."""
+"""`UnitState`: state of a unit as its process publishes it through the database."""
 
 import zlib
 from collections.abc import Mapping
@@ -20,16 +20,16 @@ from core.uncertainty import Budget
 from service.live.live_view import UnitStatus
 
 MAX_BYTES = 16_000_000
-"""Of a document, unpacked: many times what the largest unit needs."""
+"""Maximum size of an unpacked document: many times that of the largest unit."""
 
 
 class UnreadableStateError(Exception):
-    """What is written down of a unit cannot be read: another version's, or damaged."""
+    """A published state is damaged, or from another version of the program."""
 
 
 @dataclass(frozen=True)
 class BearingState:
-    """The newest result of a bearing, without the arrays that stay where it was found."""
+    """Newest result of a bearing without its arrays."""
 
     time_ns: int
     window: AveragingWindow
@@ -46,7 +46,7 @@ class BearingState:
 
 @dataclass(frozen=True)
 class FilmState:
-    """What was said of a film last."""
+    """Newest reading of a film and its findings."""
 
     reading: FilmReading
     findings: tuple[FilmFinding, FilmFinding]
@@ -54,16 +54,16 @@ class FilmState:
 
 @dataclass(frozen=True)
 class UnitState:
-    """What changes with each result: newest results, alarms and films, by bearing.
+    """State of a unit that changes with each result; results and films by bearing.
 
     Parameters
     ----------
     alarms
-        All of the unit, whatever their state.
+        All alarms of the unit.
     judged, chattering
-        Identifiers of alarms whose watched quantity is known now, and of those that come and go.
+        Identifiers of the alarms whose condition is known, and of the chattering ones.
     baselines
-        Version in force, by bearing that has one.
+        Version in force, by bearing.
     """
 
     bearings: Mapping[str, BearingState]
@@ -76,20 +76,18 @@ class UnitState:
 
 @dataclass(frozen=True)
 class UnitSigns:
-    """What changes all the time: how samples arrive, and how old everything is.
+    """State of a unit that changes continuously: link, and age of samples and results.
 
     Parameters
     ----------
     data_age_s, result_ages_s
-        Since the newest samples, and since the newest result of each bearing, at the moment of
-        writing; by a clock that never goes back.
+        Age of the newest samples, and of the newest result of each bearing.
     n_unstored
-        Findings that the process has given up.
+        Findings that the process could not store.
     store_error
-        Why it cannot store just now.
+        Why the process cannot store now.
     said_s
-        When this was so, by the steady clock of the process that says it; None from those that do
-        not say it yet.
+        Monotonic time of this report in the process; None in reports of older versions.
     """
 
     status: UnitStatus
@@ -100,43 +98,43 @@ class UnitSigns:
     said_s: float | None = None
 
 
-# within a tuple, so that NaN is written as such wherever it stands
+# in a tuple, so that the setting for NaN applies to all levels
 _WITH_NAN = ConfigDict(ser_json_inf_nan="constants")
 _STATE = TypeAdapter(tuple[UnitState], config=_WITH_NAN)
 _SIGNS = TypeAdapter(tuple[UnitSigns], config=_WITH_NAN)
 
 
 def packed_state(state: UnitState) -> bytes:
-    """Write a state; `unpacked_state` gives an equal one."""
+    """Return a state as a compressed document."""
     return zlib.compress(_STATE.dump_json((state,)), level=1)
 
 
 def unpacked_state(document: bytes) -> UnitState:
-    """Read a state.
+    """Return the state of a document of `packed_state`.
 
     Raises
     ------
     UnreadableStateError
-        If it is none, or one of another version of this program.
+        If the document is damaged, or from another version of the program.
     """
     try:
         unpacker = zlib.decompressobj()
         content = unpacker.decompress(document, MAX_BYTES)
         if unpacker.unconsumed_tail or not unpacker.eof:
-            raise UnreadableStateError("the state of a unit is cut off, or too long")
+            raise UnreadableStateError("the published state of a unit is truncated or too long")
         return _STATE.validate_json(content)[0]
     except (zlib.error, ValidationError) as error:
-        raise UnreadableStateError(f"the state of a unit cannot be read: {error}") from error
+        raise UnreadableStateError(f"state of a unit cannot be read: {error}") from error
 
 
 def written_signs(signs: UnitSigns) -> str:
-    """Write signs of life as text; `read_signs` gives equal ones."""
+    """Return signs as JSON."""
     return _SIGNS.dump_json((signs,)).decode()
 
 
 def read_signs(document: str) -> UnitSigns:
-    """Read signs of life; raises as `unpacked_state` does."""
+    """Return the signs of a document of `written_signs`; raises as `unpacked_state` does."""
     try:
         return _SIGNS.validate_json(document)[0]
     except ValidationError as error:
-        raise UnreadableStateError(f"how a unit does cannot be read: {error}") from error
+        raise UnreadableStateError(f"status of a unit cannot be read: {error}") from error

@@ -1,1 +1,1 @@
-"""Sources to monitors to alarms to store; knows no HTTP."""
+"""Acquisition, analysis, alarms and storage of results; no HTTP."""

@@ -1,4 +1,4 @@
-"""Sources to blocks and news of links, handed over within bounded memory."""
+"""Acquisition: blocks and link news from sources, and the bounded queue of blocks."""
 
 import asyncio
 import random
@@ -16,17 +16,16 @@ from core.samples.blocks import SampleBlock
 from service.live.live_view import LinkState, LiveView
 from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import Heartbeats, Pulse
-from service.runtime.polls import TimedSource
 
 
 @dataclass(frozen=True)
 class LinkNews:
-    """The link to a unit's device is up, has failed, or its recording has ended.
+    """Link state of a unit, reported at each change and at each failed attempt.
 
     Parameters
     ----------
     reason
-        Why there are no samples, in words; None while there are.
+        Why no samples arrive; None while they do.
     """
 
     unit: str
@@ -40,15 +39,15 @@ class LinkNews:
 
 
 class Bus:
-    """A queue of sample blocks within one process.
+    """Queue of sample blocks in one process.
 
-    A full bus makes publishers wait: a device's own ring then buffers, and should it overrun, the
-    sample index shows the exact gap. Nothing is dropped here.
+    Publishers wait while the queue is full: the device buffers samples in its ring, and if the
+    ring overruns, the sample index shows the exact gap. The queue drops nothing.
 
     Parameters
     ----------
     capacity
-        Most blocks that wait.
+        Maximum number of blocks.
     """
 
     def __init__(self, capacity: int, clock: Clock) -> None:
@@ -60,45 +59,39 @@ class Bus:
 
     @property
     def depth(self) -> int:
-        """Blocks waiting now."""
+        """Number of waiting blocks."""
         return self._queue.qsize()
 
     @property
     def oldest_wait_s(self) -> float:
-        """For how long the oldest block that is not dealt with has been here."""
+        """Age of the oldest block whose analysis has not finished."""
         if not self._published_s:
             return 0.0
         return self._clock.monotonic_s() - self._published_s[0]
 
     async def publish(self, block: SampleBlock) -> None:
-        """Hand a block over, waiting while the bus is full."""
+        """Add a block; wait while the queue is full."""
         await self._queue.put(block)
         self._published_s.append(self._clock.monotonic_s())
         self.n_published += 1
 
     async def blocks(self) -> AsyncIterator[SampleBlock]:
-        """All blocks in the order they were published, for ever."""
+        """Yield blocks in the order in which they were published."""
         while True:
             yield await self._queue.get()
 
     def done(self) -> None:
-        """Say that the block taken last has been dealt with."""
+        """Report that the analysis of the newest yielded block has finished."""
         self._queue.task_done()
         self._published_s.popleft()
 
     async def drained(self) -> None:
-        """Wait until every published block has been dealt with."""
+        """Wait until all published blocks are analysed."""
         await self._queue.join()
 
 
 class ConnectGate:
-    """Lets attempts at a connection through one after the other, evenly spaced.
-
-    Parameters
-    ----------
-    per_s
-        Most attempts in a second, over all links.
-    """
+    """Limiter of the rate of connection attempts, over all links; ``per_s`` is per second."""
 
     def __init__(self, per_s: float, clock: Clock) -> None:
         self._interval_s = 1.0 / per_s
@@ -106,7 +99,7 @@ class ConnectGate:
         self._next_s = clock.monotonic_s()
 
     async def turn(self) -> None:
-        """Wait for one's turn; first come, first served."""
+        """Wait until an attempt is allowed; callers are served in order."""
         now_s = self._clock.monotonic_s()
         turn_s = max(self._next_s, now_s)
         self._next_s = turn_s + self._interval_s
@@ -117,29 +110,29 @@ class ConnectGate:
 log = structlog.get_logger()
 
 CONNECTS_PER_S = 50.0
-"""Over all units, so that a hundred devices that come back together are not stormed."""
+"""Maximum rate over all units, for a hundred devices that come back at the same time."""
 
 CONFIG_RETRY_S = 15.0
-"""A device that cannot fit the settings may be replaced or reconfigured, but not in seconds."""
+"""Retry period of a device that does not fit the settings: replacing it takes longer."""
 
 ENDED = "the recording has ended"
 
 Publish = Callable[[SampleBlock], Awaitable[None]]
-"""Takes a block, and makes the source wait while it cannot."""
+"""Receives a block; the source waits for it."""
 
 
 class Acquirer:
-    """Reads all units.
+    """Reads the sources of all units.
 
     Parameters
     ----------
     publish
-        Where blocks go.
-    tell
-        Hears of links: of one that is up once, of one that is not each time that it is tried.
+        Receives blocks.
+    report
+        Receives link news.
     beats
-        Listens to the task that reads each unit: a device that is away is tried again and again,
-        which is heard; a driver that hangs is not.
+        Heartbeats of the task of each unit: they continue while a device is away, and stop if its
+        driver hangs.
     """
 
     def __init__(
@@ -148,16 +141,16 @@ class Acquirer:
         live: LiveView,
         clock: Clock,
         publish: Publish,
-        tell: Callable[[LinkNews], None],
+        report: Callable[[LinkNews], None],
         beats: Heartbeats | None = None,
     ) -> None:
         self._units, self._live, self._clock = units, live, clock
-        self._publish, self._tell = publish, tell
+        self._publish, self._report = publish, report
         self._gate = ConnectGate(CONNECTS_PER_S, clock)
         self._beats = beats or Heartbeats(clock)
 
     async def run(self) -> None:
-        """Read until every source has come to its end. A bug in reading one ends them all."""
+        """Read until all sources have ended. A bug in the task of one ends all."""
         async with asyncio.TaskGroup() as sources:
             for unit, watched in self._units.items():
                 name = f"acquire {unit}"
@@ -165,7 +158,7 @@ class Acquirer:
                 sources.create_task(self._beats.tend(name, acquire), name=name)
 
     async def _acquire(self, unit: str, watched: WatchedUnit, pulse: Pulse) -> None:
-        """Read one unit for ever; a lost link is tried again and again."""
+        """Read one unit and reconnect after each lost link, until its recording ends."""
         while True:
             pulse.beat()
             await self._gate.turn()
@@ -178,38 +171,33 @@ class Acquirer:
                 await self._clock.sleep(wait_s)
             else:
                 self._live.set_link(unit, LinkState.ENDED, ENDED)
-                self._tell(LinkNews(unit, LinkState.ENDED, ENDED))
+                self._report(LinkNews(unit, LinkState.ENDED, ENDED))
                 self._beats.release(f"acquire {unit}")
                 return
 
     async def _read(self, unit: str, source: SampleSource, pulse: Pulse) -> None:
-        resume = _listening(source, pulse)
+        resume = pulse.rest  # without heartbeats of its own, a source may wait without limit
+        if isinstance(source, TimedSource):
+            source.set_pulse(pulse)
+            resume = pulse.beat
         resume()
         async with source.connect() as blocks:
             async for block in blocks:
                 if self._live.set_link(unit, LinkState.CONNECTED):
                     log.info("connected", unit=unit)
-                    self._tell(LinkNews(unit, LinkState.CONNECTED))
-                pulse.rest()  # a full bus is the analysis' trouble
+                    self._report(LinkNews(unit, LinkState.CONNECTED))
+                pulse.rest()  # a full queue is a fault of the analysis
                 await self._publish(block)
                 resume()
 
     def _note_failure(self, unit: str, error: AcquisitionError) -> None:
         if self._live.set_link(unit, LinkState.NOT_CONNECTED, str(error)):
             log.warning("not connected", unit=unit, reason=str(error))
-        self._tell(LinkNews(unit, LinkState.NOT_CONNECTED, str(error)))
-
-
-def _listening(source: SampleSource, pulse: Pulse) -> Callable[[], None]:
-    """What to say before a source is waited for; one that cannot be heard may take for ever."""
-    if not isinstance(source, TimedSource):
-        return pulse.rest
-    source.set_pulse(pulse)
-    return pulse.beat
+        self._report(LinkNews(unit, LinkState.NOT_CONNECTED, str(error)))
 
 
 def _retry_s(error: AcquisitionError, retry_s: float) -> float:
     if isinstance(error, ConfigError):
         return CONFIG_RETRY_S
-    # devices that vanish together must not be called back together
+    # devices that vanished together must not be reconnected at the same moment
     return retry_s * random.uniform(0.5, 1.0)  # noqa: S311  not a secret

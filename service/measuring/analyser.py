@@ -1,4 +1,4 @@
-"""Blocks to findings, and what is remembered of a unit when it moves."""
+"""Analysis of blocks into findings, and the state of a unit that moves to another process."""
 
 import asyncio
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ from core.samples.gaps import Count, Counts, SampleAccount
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Acquirer, Bus, LinkNews
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.measuring.recorder import Findings, Recorder
 from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import Heartbeats, Pulse
@@ -25,16 +25,16 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class UnitMemory:
-    """A unit between two blocks.
+    """State of a unit between two blocks.
 
     Parameters
     ----------
     films
-        Where they are watched.
+        State of its films, if they are watched.
     count
-        That its blocks are in.
+        Sample count of its blocks.
     version
-        Of this form.
+        Version of this class.
     """
 
     monitor: MonitorState
@@ -50,13 +50,13 @@ NO_MEMORIES: Mapping[str, UnitMemory] = MappingProxyType({})
 NOTHING = Findings()
 
 TURNS = 3
-"""Of the event loop between two bearings: what a request takes from its arrival to its answer."""
+"""Turns of the event loop between two bearings: those from a request to its response."""
 
 
 class Analyser:
-    """Analyses the blocks of all units, one block after the other.
+    """Analyses the blocks of all units, one after the other.
 
-    A device that counts the same epoch anew is given another one here, for all that follows.
+    If a device restarts its count within an epoch, its blocks get a new epoch here.
     """
 
     def __init__(
@@ -65,36 +65,30 @@ class Analyser:
         live: LiveView,
         recorder: Recorder,
         alarms: AlarmEngine,
-        films: FilmKeeper,
+        films: FilmMonitor,
     ) -> None:
         self._monitors, self._live, self._recorder = monitors, live, recorder
         self._alarms, self._films = alarms, films
         self._counts = {unit: Counts() for unit in monitors}
 
     def require(self, block: SampleBlock) -> None:
-        """Refuse a block that does not fit its unit, with a `BlockMisfitError`."""
+        """Raise `BlockMisfitError` if a block does not fit its unit."""
         self._monitors[block.unit].require(block)
 
     async def take(self, block: SampleBlock, sampled_s: float) -> None:
-        """Take a block in, and hand over what it has taught.
-
-        Parameters
-        ----------
-        sampled_s
-            When its samples were there, by this process's steady clock.
-        """
-        findings = await self.learn(block, sampled_s)
+        """Analyse a block and store its findings; its samples arrived at ``sampled_s``."""
+        findings = await self.analyse(block, sampled_s)
         if findings != NOTHING:
             self._recorder.put(findings)
 
-    async def learn(self, block: SampleBlock, sampled_s: float) -> Findings:
-        """Take a block in, as `take` does, and return what it has taught."""
+    async def analyse(self, block: SampleBlock, sampled_s: float) -> Findings:
+        """Analyse a block, whose samples arrived at ``sampled_s``; return its findings."""
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].placed(block)
         found = []
         for assessment in monitor.steps(block):
             found.append(assessment)
-            await _others()
+            await _yield()
         assessments, films = self._films.take(block.unit, found)
         gaps = [UnitGap(block.unit, gap) for gap in monitor.drain_gaps()]
         for assessment in assessments:
@@ -105,29 +99,29 @@ class Analyser:
             return Findings(assessments, gaps, news, films)
         return NOTHING
 
-    async def relive(
+    async def replay(
         self, block: SampleBlock, sampled_s: float, account: SampleAccount | None = None
     ) -> None:
-        """Take a block in whose findings are stored already; nobody is told again.
+        """Analyse a block whose findings are already stored; publish no findings.
 
         Parameters
         ----------
         account
-            Of the unit's samples, as it was stored: the monitor counts these a second time.
+            Stored account of the samples of the unit; the monitor counts these a second time.
         """
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].replayed(block)
         for _ in monitor.steps(block):
-            await _others()
+            await _yield()
         monitor.drain_gaps()
         self._live.set_received(block, account or monitor.account, sampled_s)
 
     def state(self, unit: str) -> MonitorState:
-        """What must be known of a monitor beside its newest samples."""
+        """Return the state of a monitor without its newest samples."""
         return self._monitors[unit].state
 
     def memory(self, unit: str) -> UnitMemory:
-        """What must be known of a unit beside its newest samples."""
+        """Return the state of a unit that another process needs besides its newest samples."""
         return UnitMemory(
             self.state(unit),
             self._alarms.memory(unit),
@@ -136,30 +130,30 @@ class Analyser:
         )
 
     def rewind(self, unit: str, memory: UnitMemory) -> None:
-        """Let the monitor of a unit expect its newest samples once more, none of them missing."""
+        """Restore the monitor of a unit, which then expects its newest samples again."""
         self._monitors[unit].go_on(None)
         self._monitors[unit].rewind(memory.monitor)
         self._counts[unit].restore(memory.count)
 
     def settle(self, unit: str, memory: UnitMemory) -> None:
-        """Let the monitor of a unit, after these samples, be as it was."""
+        """Restore the monitor of a unit after these samples."""
         self._monitors[unit].settle(memory.monitor)
 
     def refuse(self, unit: str, reason: str) -> None:
-        """Let alarms know that a message of a unit cannot be used."""
+        """Report a message of a unit that was refused."""
         self._alarms.refuse(unit, reason)
 
-    def hear(self, news: LinkNews) -> None:
-        """Let alarms know whether samples of a unit arrive."""
+    def note_link(self, news: LinkNews) -> None:
+        """Report the state of a link to the alarms."""
         self._alarms.link(news.unit, news.is_connected, news.reason)
 
     def is_connected(self, unit: str) -> bool:
-        """Whether samples of a unit arrive, by what alarms have heard last."""
+        """Return whether samples of a unit arrive, as last reported."""
         return self._alarms.is_connected(unit)
 
 
-async def _others() -> None:
-    """Let all others have their turns: a bearing takes milliseconds, and many may be waiting."""
+async def _yield() -> None:
+    """Let other tasks run: a bearing takes milliseconds."""
     for _ in range(TURNS):
         await asyncio.sleep(0)
 
@@ -168,7 +162,7 @@ BUS_CAPACITY = 512
 
 
 class Runner:
-    """Runs all units until it is cancelled. A bug in any of its tasks ends them all."""
+    """Acquisition, analysis and storage in one process. A bug in one task ends all."""
 
     def __init__(
         self,
@@ -177,7 +171,7 @@ class Runner:
         recorder: Recorder,
         clock: Clock,
         alarms: AlarmEngine,
-        films: FilmKeeper,
+        films: FilmMonitor,
         bus: Bus | None = None,
         beats: Heartbeats | None = None,
     ) -> None:
@@ -187,11 +181,11 @@ class Runner:
         self._beats = beats or Heartbeats(clock)
         self._analyser = Analyser(monitors, live, recorder, alarms, films)
         self._acquirer = Acquirer(
-            units, live, clock, self._bus.publish, self._analyser.hear, self._beats
+            units, live, clock, self._bus.publish, self._analyser.note_link, self._beats
         )
 
     async def run(self) -> None:
-        """Acquire and analyse; ends when every source has come to its end."""
+        """Run until all sources have ended."""
         async with asyncio.TaskGroup() as tasks:
             recording = tasks.create_task(
                 self._beats.tend("record", self._recorder.run), name="record"
@@ -202,7 +196,7 @@ class Runner:
             analysis.cancel()
             await self._recorder.settled()
             recording.cancel()
-            self._beats.release("analyse", "record")  # there is nothing left for them
+            self._beats.release("analyse", "record")  # they have finished
 
     async def _analyse(self, pulse: Pulse) -> None:
         pulse.rest()
@@ -210,7 +204,7 @@ class Runner:
             pulse.beat()
             await self._analyser.take(block, self._sampled_s(block))
             self._bus.done()
-            await asyncio.sleep(0)  # more blocks may be waiting, but so may others
+            await asyncio.sleep(0)  # let other tasks run while blocks wait
             pulse.rest()
 
     def _sampled_s(self, block: SampleBlock) -> float:

@@ -1,11 +1,11 @@
-"""Learning the films of a unit from stored readings, and whether to believe what was learned."""
+"""Learning of baselines from stored readings, and doubts about what was learned."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial, reduce
 
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import TimeArray
 from core.baseline.agreement import far_readings, learning_drift, mean_difference
 from core.baseline.baseline import BearingBaseline, Origin
 from core.baseline.history import StiffnessHistory
@@ -19,20 +19,20 @@ from service.store.baselines import Versions, versions_after
 from service.store.film_port import BaselineStep, FilmHistory, FilmQuery, FilmStore, StoredStep
 
 PADWATCH = "padwatch"
-"""Who learns, and accepts where engineers leave it to padwatch."""
+"""Author of baselines that are learned and accepted automatically."""
 
 SURE = 3.0
-"""Standard uncertainties of a drift that is none by chance."""
+"""Minimum of a drift in standard uncertainties: a smaller one may be chance."""
 
 
 class Learner:
-    """Learns baselines; holds nothing between calls, and may be used in any thread."""
+    """Learns baselines; has no state and may be used in any thread."""
 
     def __init__(self, store: FilmStore, settings: FilmAlarmSettings) -> None:
         self._store, self._settings = store, settings
 
     def is_due(self, place: FilmPlace, now_ns: int) -> bool:
-        """Whether it is time to learn a bearing (again)."""
+        """Return whether a bearing is to be learned now, for the first time or again."""
         versions = self.versions(place)
         since_ns = self._since_ns(place, versions)
         if versions.is_frozen or since_ns is None:
@@ -53,13 +53,13 @@ class Learner:
         return now_ns - newest.created_ns >= self._settings.learn_every_days * DAY_NS
 
     def versions(self, place: FilmPlace) -> Versions:
-        """Where the baselines of a bearing stand."""
+        """Return the state of the baselines of a bearing."""
         return versions_after(self._store.steps(place.unit, place.bearing))
 
     def learn(
         self, place: FilmPlace, now_ns: int, author: str = PADWATCH, reason: str = ""
     ) -> BearingBaseline | None:
-        """Learn a bearing, store what was learned, and put it in force where that is padwatch's.
+        """Learn and store a baseline, and put it in force if acceptance is automatic.
 
         Returns
         -------
@@ -69,7 +69,7 @@ class Learner:
         found = self._readings(place, versions, now_ns)
         if not len(found):
             return None
-        is_healthy = found.is_settled & ~np.any(found.level > 0, axis=0)
+        is_healthy = healthy(found)
         baseline = learn(
             found.history,
             is_healthy,
@@ -86,10 +86,12 @@ class Learner:
         return baseline
 
     def learn_response(self, unit: str, rules: FilmRules, now_ns: int) -> ShaftResponse | None:
-        """Learn how a unit's shaft answers to its films, and store it."""
+        """Learn and store the response of the shaft of a unit to its films."""
         places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
         found = {p.bearing: self._readings(p, self.versions(p), now_ns) for p in places}
-        histories, is_settled = at_same_times(found)
+        rows = common_rows(found)
+        histories = {bearing: film.history.where(rows[bearing]) for bearing, film in found.items()}
+        is_settled = np.logical_and.reduce([healthy(f)[rows[b]] for b, f in found.items()])
         if not is_settled.size:
             return None
         response = learn_response(histories, is_settled)
@@ -122,21 +124,20 @@ class Learner:
         noticed = "; ".join(filter(None, (doubt, far))) or baseline.origin.event
         steps = [_step(baseline, BaselineStep.LEARNED, noticed)]
         if self._settings.acceptance == "automatic" and doubt is None:
-            steps.append(_step(baseline, BaselineStep.ACCEPTED, "nothing speaks against it"))
+            steps.append(_step(baseline, BaselineStep.ACCEPTED, "no objection found"))
         return steps
 
     def _disagreement(self, baseline: BearingBaseline, versions: Versions) -> str | None:
-        """How it differs from the first that was accepted, if it does.
+        """Return the difference from the first accepted version, if it is too large.
 
-        From the first and not from the last: a film that softens slowly would be learned little by
-        little.
+        A comparison with the last version would accept a film that softens slowly.
         """
         origin = baseline.origin
         if versions.first_accepted is None:
             return None
         first = self._store.baseline(origin.unit, origin.bearing, versions.first_accepted)
         if first is None or first.origin.estimator != origin.estimator:
-            return "learned with another estimator than the first"
+            return "learned with another estimator than the first accepted version"
         worst = max(mean_difference(first, baseline).values(), key=abs, default=0.0)
         if abs(worst) < self._settings.change.alert_change:
             return None
@@ -149,13 +150,13 @@ def drifted(
     baseline: BearingBaseline,
     limit: float,
 ) -> str | None:
-    """By how much films changed while they were learned, if they did: a fault may be in it."""
+    """Return the change of a film during learning, if it is significant: it may show a fault."""
     for quantity in baseline.quantities:
         found = learning_drift(history, is_healthy, quantity)
         if found and abs(found.change) >= max(limit, SURE * found.std):
             return (
                 f"{quantity.direction} changed by {100 * found.change:+.1f} %"
-                f" ± {200 * found.std:.1f} % under like conditions while it was learned"
+                f" ± {200 * found.std:.1f} % under like conditions during learning"
             )
     return None
 
@@ -173,22 +174,14 @@ def _step(baseline: BearingBaseline, step: BaselineStep, reason: str) -> StoredS
     )
 
 
-def at_same_times(
-    found: Mapping[str, FilmHistory],
-) -> tuple[dict[str, StiffnessHistory], npt.NDArray[np.bool_]]:
-    """Histories of all bearings where all have a reading, and whether the unit had settled."""
-    common = common_times([history.history.time_ns for history in found.values()])
-    histories, settled = {}, np.ones(common.size, np.bool_)
-    for bearing, film in found.items():
-        rows = np.isin(film.history.time_ns, common)
-        histories[bearing] = film.history.where(rows)
-        settled &= (film.is_settled & ~np.any(film.level > 0, axis=0))[rows]
-    return histories, settled
+def healthy(film: FilmHistory) -> npt.NDArray[np.bool_]:
+    """Return which readings are settled and without an alarm."""
+    is_healthy: npt.NDArray[np.bool_] = film.is_settled & ~np.any(film.level > 0, axis=0)
+    return is_healthy
 
 
-def common_times(times_ns: Sequence[TimeArray]) -> TimeArray:
-    """Times that all have, each of them increasing."""
-    common = times_ns[0]
-    for other in times_ns[1:]:
-        common = np.intersect1d(common, other, assume_unique=True)
-    return common
+def common_rows(found: Mapping[str, FilmHistory]) -> dict[str, npt.NDArray[np.bool_]]:
+    """Return for each history which readings are at times that all histories contain."""
+    times = {bearing: film.history.time_ns for bearing, film in found.items()}
+    common = reduce(partial(np.intersect1d, assume_unique=True), times.values())
+    return {bearing: np.isin(time_ns, common) for bearing, time_ns in times.items()}

@@ -1,7 +1,6 @@
-"""The version of a baseline in force, and resuming films after a start."""
+"""The version of a baseline in force, and the state of films after a start."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,54 +10,45 @@ from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.change.backtest import last_decision, last_operation
 from core.change.decision import INITIAL_DECISION, Decision
 from core.change.film_judge import MAX_RECENT
+from core.change.film_watch import FilmWatch
 from core.change.settings import FilmRules
 from core.change.shaft_response import ShaftResponse
-from core.condition.operating_state import OilSettling, Operation
-from core.units import NS_PER_S
+from core.units import DAY_NS
 from service.live.commands import FilmPlace
-from service.measuring.baseline_learning import common_times
+from service.measuring.baseline_learning import common_rows
 from service.store.baselines import versions_after
 from service.store.film_port import FilmHistory, FilmQuery, FilmStore
 
-TAIL_NS = 2 * 86_400 * NS_PER_S
-"""How far operation is looked back on: longer than warming up."""
+TAIL_NS = 2 * DAY_NS
+"""History that the operating state is computed from: longer than the warm-up."""
 
-CATCH_UP_NS = 21 * 86_400 * NS_PER_S
-"""How far decisions are: several times the longest mean."""
-
-
-@dataclass(frozen=True)
-class InForce:
-    """What a bearing is compared with, and where its decisions stand; all empty without one."""
-
-    baseline: BearingBaseline | None = None
-    decisions: tuple[Decision, ...] = ()
+CATCH_UP_NS = 21 * DAY_NS
+"""History that decisions are computed from: several times the longest mean."""
 
 
-def in_force(store: FilmStore, place: FilmPlace, rules: FilmRules) -> InForce:
-    """The baseline of a bearing that is in force, and its decisions so far."""
+def in_force(
+    store: FilmStore, place: FilmPlace, rules: FilmRules
+) -> tuple[BearingBaseline | None, tuple[Decision, ...]]:
+    """Return the baseline of a bearing that is in force, and the newest decisions with it."""
     version = versions_after(store.steps(place.unit, place.bearing)).in_force
-    if version is None:
-        return InForce()
-    baseline = store.baseline(place.unit, place.bearing, version)
+    baseline = None if version is None else store.baseline(place.unit, place.bearing, version)
     if baseline is None or baseline.origin.estimator != place.estimator:
-        return InForce()
+        return None, ()
     stored = [
         found.decision
         for found in store.decisions(place.unit, place.bearing)
         if (found.baseline_version, found.estimator) == (version, place.estimator)
     ]
-    if len(stored) == 2:
-        return InForce(baseline, tuple(stored))
-    return InForce(baseline, caught_up(store, place, rules, baseline))
+    if len(stored) == len(DIRECTIONS):
+        return baseline, tuple(stored)
+    return baseline, _decisions(store, place, rules, baseline)
 
 
-def caught_up(
+def _decisions(
     store: FilmStore, place: FilmPlace, rules: FilmRules, baseline: BearingBaseline
 ) -> tuple[Decision, ...]:
-    """Decisions x and y as if a baseline had been in force for the newest readings."""
-    newest_ns = _newest_ns(store, place)
-    start_ns = newest_ns - round(CATCH_UP_NS / rules.time_lapse)
+    """Return the decisions x and y as if a baseline had been in force for the newest readings."""
+    start_ns = _newest_ns(store, place) - round(CATCH_UP_NS / rules.time_lapse)
     found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, start_ns))
     learned = (baseline.of(direction) for direction in DIRECTIONS)
     return tuple(
@@ -69,46 +59,27 @@ def caught_up(
     )
 
 
-@dataclass(frozen=True)
-class UnitStart:
-    """Where the films of a unit go on.
-
-    Parameters
-    ----------
-    oil, bearings
-        By bearing.
-    recent
-        Newest readings, as `FilmJudge.add_recent` takes them.
-    """
-
-    operation: Operation
-    oil: dict[str, OilSettling]
-    bearings: dict[str, InForce]
-    recent: list[FloatArray]
-    response: ShaftResponse | None
-
-
-def unit_start(
-    store: FilmStore, unit: str, rules: FilmRules, response: ShaftResponse | None
-) -> UnitStart:
-    """Where the films of a unit go on after everything that is stored."""
+def resume_films(
+    store: FilmStore,
+    unit: str,
+    rules: FilmRules,
+    response: ShaftResponse | None,
+    watch: FilmWatch,
+) -> None:
+    """Restore the watch of the films of a unit from all stored readings."""
     places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
-    newest_ns = _newest_ns(store, places[0])
+    start_ns = _newest_ns(store, places[0]) - TAIL_NS
     found = {
-        place.bearing: store.history(
-            FilmQuery(unit, place.bearing, place.estimator, newest_ns - TAIL_NS)
-        )
+        place.bearing: store.history(FilmQuery(unit, place.bearing, place.estimator, start_ns))
         for place in places
     }
     seen = {bearing: last_operation(film.history, rules) for bearing, film in found.items()}
-    bearings = {place.bearing: in_force(store, place, rules) for place in places}
-    return UnitStart(
-        seen[places[0].bearing][0],
-        {bearing: oil for bearing, (_, oil) in seen.items()},
-        bearings,
-        _recent(found, bearings),
-        response,
-    )
+    operation = seen[places[0].bearing][0]
+    watch.restore_operation(operation, {bearing: oil for bearing, (_, oil) in seen.items()})
+    for place in places:
+        watch.judge.activate_baseline(place.bearing, *in_force(store, place, rules))
+    watch.judge.add_recent(_recent(found, watch))
+    watch.judge.response = response
 
 
 def _newest_ns(store: FilmStore, place: FilmPlace) -> int:
@@ -116,24 +87,23 @@ def _newest_ns(store: FilmStore, place: FilmPlace) -> int:
     return int(newest.history.time_ns[-1]) if len(newest) else 0
 
 
-def _recent(found: Mapping[str, FilmHistory], bearings: Mapping[str, InForce]) -> list[FloatArray]:
-    """Newest settled readings at the same times, (5, n_films) each."""
-    common = common_times([history.history.time_ns for history in found.values()])
-    columns, settled = [], np.ones(common.size, np.bool_)
+def _recent(found: Mapping[str, FilmHistory], watch: FilmWatch) -> list[FloatArray]:
+    """Return the newest settled readings at common times, (5, n_films) each."""
+    common, columns = common_rows(found), []
+    settled = np.logical_and.reduce([film.is_settled[common[b]] for b, film in found.items()])
     for bearing, film in found.items():
-        rows = np.isin(film.history.time_ns, common)
-        settled &= film.is_settled[rows]
-        history, baseline = film.history.where(rows), bearings[bearing].baseline
+        history = film.history.where(common[bearing])
         shaft = np.where(history.shaft_um_pk > 0.0, history.shaft_um_pk, np.nan)
         attitude = np.stack([history.attitude_deg] * 2)
-        rows_of = (history.ln_k, np.log(shaft), film.deviation[:, rows])
-        columns.append(np.stack([*rows_of, _rises(history, baseline), attitude]))
+        deviation = film.deviation[:, common[bearing]]
+        rises = _rises(history, watch.judge.baseline(bearing))
+        columns.append(np.stack([history.ln_k, np.log(shaft), deviation, rises, attitude]))
     whole = np.concatenate(columns, axis=1)[:, :, settled]
     return [whole[:, :, i] for i in range(max(0, whole.shape[2] - MAX_RECENT), whole.shape[2])]
 
 
 def _rises(history: StiffnessHistory, baseline: BearingBaseline | None) -> FloatArray:
-    """(2, n) rise of the baseline with eccentricity; NaN where there is none."""
+    """Return the rise of the baseline with eccentricity, (2, n); NaN where there is none."""
     rises = np.full((len(DIRECTIONS), len(history)), np.nan)
     for row, direction in enumerate(DIRECTIONS):
         learned = baseline.of(direction) if baseline else None

@@ -1,33 +1,33 @@
-"""What operators ask, done in the process that measures."""
+"""Commands of operators, carried out in the measuring process."""
 
 import asyncio
 
 from core.alarms.alarm import Alarm
 from core.alarms.judgements import VectorReference
 from core.alarms.operation import Action
-from service.live.commands import BaselineAction, FilmPlace, NotCarriedOutError
+from service.live.commands import BaselineAction, CommandFailedError, FilmPlace
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.measuring.recorder import NotStoredError, Recorder
 from service.store.port import StoreError
 
 STORED_WITHIN_S = 10.0
-"""How long an operator waits for the disk at most."""
+"""Maximum wait for the disk."""
 
 ANSWERS_WITHIN_S = 10.0
-"""And how long before that, to see whether it takes anything."""
+"""Maximum wait for the empty transaction before an action."""
 
 
-class InProcess:
-    """Asks the engine and the keeper of this process."""
+class LocalCommands:
+    """Applies commands to the alarms and films of this process."""
 
-    def __init__(self, alarms: AlarmEngine, films: FilmKeeper, recorder: Recorder) -> None:
+    def __init__(self, alarms: AlarmEngine, films: FilmMonitor, recorder: Recorder) -> None:
         self._alarms, self._films, self._recorder = alarms, films, recorder
 
     async def operate(self, id_: str, action: Action) -> Alarm:
-        """Do something to an alarm, and return when it is on the disk.
+        """Apply an action to an alarm; return after it is on the disk.
 
-        While the store takes nothing, nothing is done: what people did must be in the audit trail.
+        The action is refused while the store fails, since it must be in the audit trail.
         """
         await self._require_store(self._alarms.alarm(id_))
         alarm = self._alarms.operate(id_, action)
@@ -35,15 +35,15 @@ class InProcess:
             async with asyncio.timeout(STORED_WITHIN_S):
                 await self._recorder.stored()
         except TimeoutError as error:
-            raise NotCarriedOutError(
+            raise CommandFailedError(
                 "Not on the disk yet",
                 f"alarm {id_} is {alarm.state.value}, but the store does not answer:"
-                " a restart now would undo it. It is tried again until it is stored",
+                " a restart now would undo the action; storing is retried until it succeeds",
             ) from error
         except NotStoredError as error:
-            raise NotCarriedOutError(
+            raise CommandFailedError(
                 "Not stored",
-                f"alarm {id_} is {alarm.state.value}, but this is not in its history, and a restart"
+                f"alarm {id_} is {alarm.state.value}, but the action is not stored, and a restart"
                 f" undoes it: {error}",
             ) from error
         return alarm
@@ -53,16 +53,16 @@ class InProcess:
             async with asyncio.timeout(ANSWERS_WITHIN_S):
                 await self._recorder.require_store()
         except (StoreError, TimeoutError) as error:
-            raise NotCarriedOutError(
+            raise CommandFailedError(
                 "Nothing was done",
-                f"alarm {alarm.identity.id} is {alarm.state.value}, as before: what people do is"
-                f" done only if it can be stored ({error or 'the store does not answer'})",
+                f"alarm {alarm.identity.id} is {alarm.state.value}, as before: an action is applied"
+                f" only if it can be stored ({error or 'the store does not answer'})",
             ) from error
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
-        """Do something to the baselines of a bearing."""
+        """Apply an action to the baselines of a bearing."""
         await self._films.act(place, action, actor, reason)
 
     async def refer_to(self, reference: VectorReference) -> None:
         """Compare 1× vectors with a new reference."""
-        self._alarms.refer_to(reference)
+        self._alarms.set_reference(reference)

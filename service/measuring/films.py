@@ -10,16 +10,15 @@ from acquisition.clock import Clock
 from core.alarms.alarm import AlarmIdentity
 from core.alarms.kinds import FILM_KINDS
 from core.baseline.baseline import BearingBaseline
-from core.baseline.history import DIRECTIONS
 from core.change.film_judge import FilmJudge, FilmMemory, FilmNews, alarm_condition
 from core.change.film_watch import FilmWatch
 from core.change.settings import FilmRules
 from core.limits import Judgement
 from core.machine.unit import Unit
 from core.monitor.assessment import Assessment
-from service.live.commands import BaselineAction, FilmPlace, step_of
+from service.live.commands import BaselineAction, FilmPlace, baseline_step
 from service.measuring.baseline_learning import Learner
-from service.measuring.baseline_versions import UnitStart, in_force, unit_start
+from service.measuring.baseline_versions import in_force, resume_films
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.core_values import film_rules_of
 from service.settings.films import FilmAlarmSettings
@@ -31,27 +30,25 @@ from service.store.port import StoreError
 log = structlog.get_logger()
 
 MAX_LEARN_S = 900.0
-"""Longest that learning one bearing from its whole history may take."""
-
-KINDS = dict(zip(DIRECTIONS, FILM_KINDS, strict=True))
+"""Maximum duration of learning one bearing from its whole history."""
 
 
 @dataclass(frozen=True)
 class WatchedFilms:
-    """A unit's films with their rules and what has been said of them last."""
+    """Films of a unit with their rules, watch and newest news by bearing."""
 
     rules: FilmRules
     watch: FilmWatch
     newest: dict[str, FilmNews]
 
 
-class FilmKeeper:
-    """Watches films on the event loop; reads and learns in threads.
+class FilmMonitor:
+    """Monitor of the films of all units; judges on the event loop, reads and learns in threads.
 
     Parameters
     ----------
     rules
-        Of every unit; where films cannot be watched, why.
+        Rules of every unit, or why its films cannot be watched.
     """
 
     def __init__(
@@ -64,7 +61,7 @@ class FilmKeeper:
     ) -> None:
         self._store, self._clock, self.settings = store, clock, settings
         self.learner = Learner(store, settings)
-        self._acting = asyncio.Lock()  # what is done next stands on what was done before
+        self._acting = asyncio.Lock()  # each action depends on the result of the one before
         self.unwatched = {unit: why for unit, why in rules.items() if isinstance(why, str)}
         self._films = {
             unit: _watched(units[unit], found)
@@ -73,71 +70,70 @@ class FilmKeeper:
         }
 
     async def start(self) -> None:
-        """Go on where the service stopped, before anything arrives.
+        """Continue from stored readings, before the first result.
 
         Raises
         ------
         StoreError
-            If what is stored cannot be read: to begin again would lose what was found.
+            If they cannot be read; a start without them would lose findings.
         """
         responses = await asyncio.to_thread(self._store.responses)
         for unit, films in self._films.items():
-            response = responses.get(unit)
-            found = await asyncio.to_thread(unit_start, self._store, unit, films.rules, response)
-            _restore(films.watch, found)
+            how = (unit, films.rules, responses.get(unit), films.watch)
+            await asyncio.to_thread(resume_films, self._store, *how)
 
     def memory(self, unit: str) -> FilmMemory | None:
-        """What must be known of the films of a unit, beside stored readings, to go on elsewhere."""
+        """Return the state of the films of a unit that another process needs to continue."""
         return self._films[unit].watch.memory if unit in self._films else None
 
     def resume(self, unit: str, memory: FilmMemory | None) -> None:
-        """Go on where another process stopped; after `start`."""
+        """Continue where another process stopped; called after `start`."""
         if memory is not None and unit in self._films:
             self._films[unit].watch.restore(memory)
 
     def rules(self, unit: str) -> FilmRules | None:
-        """How the films of a unit are watched; None if they are not."""
+        """Return the rules of the films of a unit; None if they are not watched."""
         return self._films[unit].rules if unit in self._films else None
 
     def place(self, unit: str, bearing: str) -> FilmPlace | None:
-        """A bearing with the estimator that it is watched by; None if it is not watched."""
+        """Return a bearing with the estimator of its stiffness; None if it is not watched."""
         rules = self.rules(unit)
         if rules is None or bearing not in rules.estimators:
             return None
         return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """What has been said of a bearing last since the service started."""
+        """Return the newest news of a bearing since the service started."""
         return self._films[unit].newest.get(bearing) if unit in self._films else None
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
-        """What a bearing is compared with now."""
+        """Return the baseline of a bearing that is in force."""
         films = self._films.get(unit)
         return films.watch.judge.baseline(bearing) if films else None
 
     def take(
         self, unit: str, assessments: Sequence[Assessment]
     ) -> tuple[Sequence[Assessment], list[FilmNews]]:
-        """Say under which condition results were found, and take readings when it is time."""
+        """Add the operating condition to results, and judge films if a reading is due."""
         films = self._films.get(unit)
         if films is None or not assessments:
             return assessments, []
         seen, news = films.watch.take(assessments)
-        films.newest.update({told.reading.bearing: told for told in news})
+        films.newest.update({each.reading.bearing: each for each in news})
         return seen, news
 
     def conditions(self, news: Sequence[FilmNews]) -> dict[str, Judgement]:
-        """What alarms make of it, by alarm."""
+        """Return the conditions of the alarms about films, by id of the alarm."""
         return {
-            alarm_id(told.reading.unit, told.reading.bearing, direction): alarm_condition(
-                finding, self._films[told.reading.unit].rules.change
+            AlarmIdentity(each.reading.unit, each.reading.bearing, kind).id: alarm_condition(
+                finding, self._films[each.reading.unit].rules.change
             )
-            for told in news
-            for direction, finding in zip(DIRECTIONS, told.findings, strict=True)
+            for each in news
+            for kind, finding in zip(FILM_KINDS, each.findings, strict=True)
         }
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Learn whatever is due, for ever."""
+        """Learn baselines that are due, until cancelled."""
         period_s = min(3600.0, 86_400.0 * self.settings.learn_every_days / 4)
         while True:
             try:
@@ -148,7 +144,7 @@ class FilmKeeper:
             await self._clock.sleep(period_s)
 
     async def learn_due(self, pulse: Pulse = UNHEARD) -> None:
-        """Learn every bearing whose turn it is, one after the other."""
+        """Learn every bearing that is due."""
         for unit, films in self._films.items():
             pulse.beat(MAX_LEARN_S)
             due = [
@@ -164,7 +160,7 @@ class FilmKeeper:
                 await self._learn_response(unit)
 
     async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:
-        """Learn a bearing now; None if there are too few readings."""
+        """Learn a bearing now; return None if there are too few readings."""
         now_ns = self._clock.now_ns()
         async with self._acting:
             learned = await asyncio.to_thread(self.learner.learn, place, now_ns, **why)
@@ -186,14 +182,14 @@ class FilmKeeper:
     async def act(
         self, place: FilmPlace, action: BaselineAction, actor: str, reason: str
     ) -> Versions:
-        """Do to the baselines of a bearing what an engineer asks for.
+        """Apply an action of an engineer to the baselines of a bearing.
 
         Raises
         ------
         BaselineRefusedError
-            If it does not fit the baselines as they are now.
+            If the action does not fit the state of the baselines.
         StoreError
-            If it could not be written; then nothing has changed.
+            If it was not stored; then nothing has changed.
         """
         async with self._acting:
             step = await asyncio.to_thread(self._step, place, action, actor, reason)
@@ -207,20 +203,15 @@ class FilmKeeper:
     ) -> StoredStep:
         entries = list(self._store.baselines(place.unit, place.bearing))
         versions = self.learner.versions(place)
-        return step_of(action, place, versions, entries, actor, reason, self._clock.now_ns())
+        return baseline_step(action, place, versions, entries, actor, reason, self._clock.now_ns())
 
     async def put_in_force(self, place: FilmPlace) -> None:
-        """Compare a bearing with what its stored steps say from now on."""
+        """Compare a bearing with the baseline that its stored steps put in force."""
         films = self._films[place.unit]
         held = films.watch.judge.baseline(place.bearing)
-        found = await asyncio.to_thread(in_force, self._store, place, films.rules)
-        if found.baseline is None or held is None or found.baseline.origin != held.origin:
-            films.watch.judge.activate_baseline(place.bearing, found.baseline, found.decisions)
-
-
-def alarm_id(unit: str, bearing: str, direction: str) -> str:
-    """Alarm of the change of a film."""
-    return AlarmIdentity(unit, bearing, KINDS[direction]).id
+        found, decisions = await asyncio.to_thread(in_force, self._store, place, films.rules)
+        if found is None or held is None or found.origin != held.origin:
+            films.watch.judge.activate_baseline(place.bearing, found, decisions)
 
 
 def _watched(unit: Unit, rules: FilmRules) -> WatchedFilms:
@@ -228,25 +219,17 @@ def _watched(unit: Unit, rules: FilmRules) -> WatchedFilms:
     return WatchedFilms(rules, FilmWatch(rules, FilmJudge(rules, brackets)), {})
 
 
-def _restore(watch: FilmWatch, found: UnitStart) -> None:
-    watch.restore_operation(found.operation, found.oil)
-    for bearing, its in found.bearings.items():
-        watch.judge.activate_baseline(bearing, its.baseline, its.decisions)
-    watch.judge.add_recent(found.recent)
-    watch.judge.response = found.response
-
-
-async def film_keeper(
+async def film_monitor(
     plant: PlantFile, machines: Mapping[str, Unit], store: FilmStore, clock: Clock
-) -> FilmKeeper:
-    """Put the keeper of all films together and let it go on where the service stopped.
+) -> FilmMonitor:
+    """Build the monitor of all films and continue from stored readings.
 
     Raises
     ------
     StoreError
-        If what is stored of films cannot be read.
+        If they cannot be read.
     """
     rules = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
-    keeper = FilmKeeper(machines, rules, plant.films, store, clock)
-    await keeper.start()
-    return keeper
+    monitor = FilmMonitor(machines, rules, plant.films, store, clock)
+    await monitor.start()
+    return monitor

@@ -1,4 +1,4 @@
-"""Findings on their way to the store: in order, in batches, tried again."""
+"""Recorder of findings: in order, in batches, with retries and a file of refused rows."""
 
 import asyncio
 import json
@@ -28,23 +28,17 @@ from service.store.sharing import StreamPosition
 FILE = "parked.jsonl"
 
 MAX_BYTES = 16_000_000
-"""Of the file; then it is renamed once, and begun anew: a damaged page refuses every result."""
+"""Maximum size of the file and of its predecessor: a damaged page refuses every result."""
 
 
 class ParkedRows:
-    """One JSON object a line, with the reason; in the data folder, for padwatch's user alone.
-
-    Parameters
-    ----------
-    path
-        Created when something is parked.
-    """
+    """File of refused rows with the reasons, one JSON object per line; readable by the owner."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def add(self, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
-        """Append rows and why each was refused; on the disk when this returns.
+        """Append rows with the reason of each, and sync them to the disk.
 
         Raises
         ------
@@ -83,7 +77,7 @@ log = structlog.get_logger()
 RETRY_S = 1.0
 
 MAX_NEWS = 100_000
-"""News of alarms that wait for a store that does not answer; about 100 MB."""
+"""Maximum number of alarm news in the queue; about 100 MB."""
 
 GIVEN_UP = "given_up"
 
@@ -91,12 +85,12 @@ T = TypeVar("T")
 
 
 class NotStoredError(Exception):
-    """News of an alarm was given up, or refused by the database; the message says why."""
+    """Alarm news was not stored; the message states why."""
 
 
 @dataclass(frozen=True)
 class Findings:
-    """What one block has taught: to be stored together or not at all."""
+    """Findings from one block, stored together or not at all."""
 
     assessments: Sequence[Assessment] = ()
     gaps: Sequence[UnitGap] = ()
@@ -106,7 +100,7 @@ class Findings:
 
     @property
     def parts(self) -> Iterator["Findings"]:
-        """Each row by itself, in an order in which they may be stored one after the other."""
+        """Each row by itself, in an order in which they can be stored."""
         yield from (Findings(alarms=[news]) for news in self.alarms)
         yield from (Findings([assessment]) for assessment in self.assessments)
         yield from (Findings(gaps=[gap]) for gap in self.gaps)
@@ -116,30 +110,28 @@ class Findings:
 
     @property
     def row(self) -> object:
-        """The one row of a part."""
+        """The only row of a part."""
         return next(iter((*self.alarms, *self.assessments, *self.gaps, *self.films, self.position)))
 
 
 class Recorder:
-    """Writes findings to the store in a thread, so that a slow disk delays no samples.
+    """Writes findings to the store in a thread, so that a slow disk does not delay samples.
 
-    A row that the database refuses is parked in a file, and the rest is stored without it.
+    A row that the database refuses is written to a file, and the others are stored.
 
     Parameters
     ----------
     parked
-        The file.
+        File of refused rows.
     capacity
-        Most findings that wait for a store that does not answer, besides those being written;
-        beyond it the oldest are given up and counted in :attr:`LiveView.n_unstored`. News of alarms
-        wait apart from them, up to `MAX_NEWS`, and are given up last.
-    told
-        Called when news of alarms has been written.
+        Maximum number of queued findings; above it the oldest are dropped and counted in
+        :attr:`LiveView.n_unstored`. Alarm news has a queue of its own, up to `MAX_NEWS`.
+    on_stored
+        Called after alarm news was written.
     timed
-        Entered, in the thread, while the store writes.
+        Context manager around each write, in the thread.
     finds_again
-        Whether what was not written when the process ends is found once more by the next one, as
-        by blocks that stay on a stream.
+        Whether the next process repeats the findings that were not written, from a stream.
     """
 
     def __init__(
@@ -149,13 +141,13 @@ class Recorder:
         clock: Clock,
         parked: ParkedRows,
         capacity: int = 5000,
-        told: Callable[[], None] = lambda: None,
+        on_stored: Callable[[], None] = lambda: None,
         timed: Callable[[], AbstractContextManager[None]] = nullcontext,
         *,
         finds_again: bool = False,
     ) -> None:
         self._store, self._live, self._clock, self._parked = store, live, clock, parked
-        self._capacity, self._told, self._timed = capacity, told, timed
+        self._capacity, self._on_stored, self._timed = capacity, on_stored, timed
         self._finds_again = finds_again
         self._waiting: deque[Findings] = deque()
         self._alarms: deque[AlarmNews] = deque()
@@ -164,17 +156,17 @@ class Recorder:
         self._news = asyncio.Event()
         self._progress = asyncio.Condition()
         self._outcomes: dict[int, asyncio.Future[str | None]] = {}
-        # its own: the others may all be busy answering
+        # not the default threads, which may all be busy with requests
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="recorder")
 
     @property
     def n_waiting(self) -> int:
-        """Findings and news of alarms that are still to be written."""
+        """Number of queued findings and alarm news."""
         return len(self._waiting) + len(self._alarms)
 
     @property
     def behind_s(self) -> float:
-        """For how long something has been waiting without anything being written."""
+        """Time for which the queue has waited without any write."""
         if not (self._waiting or self._alarms):
             return 0.0
         return self._clock.monotonic_s() - self._waits_since_s
@@ -185,56 +177,56 @@ class Recorder:
             self._waits_since_s = self._clock.monotonic_s()
         if findings.assessments or findings.gaps or findings.position:
             self._waiting.append(replace(findings, alarms=()))
-        self._give_up_oldest()
+        self._drop_oldest()
         self._alarms += findings.alarms
         while len(self._alarms) > MAX_NEWS:
-            self._resolve(self._alarms.popleft(), "too much waits for the store")
+            self._resolve(self._alarms.popleft(), "the queue to the store is full")
             self._live.note_unstored(1, GIVEN_UP)
         self._news.set()
 
     async def stored(self) -> None:
-        """Wait until the newest news of alarms is on the disk, however long it takes.
+        """Wait without limit until the newest alarm news is on the disk.
 
         Raises
         ------
         NotStoredError
-            If it was given up, or the database refused it.
+            If it was dropped or refused.
         """
         if not self._alarms:
             return
         key, loop = id(self._alarms[-1]), asyncio.get_running_loop()
         outcome = self._outcomes.setdefault(key, loop.create_future())
-        refusal = await asyncio.shield(outcome)  # others may wait for it as well
+        refusal = await asyncio.shield(outcome)  # other callers may wait for it
         if refusal is not None:
             raise NotStoredError(refusal)
 
     async def reached(self, position: StreamPosition) -> None:
-        """Wait until a position that was put is on the disk, however long it takes."""
+        """Wait without limit until a queued position is on the disk."""
         async with self._progress:
             await self._progress.wait_for(
                 lambda: all(findings.position is not position for findings in self._waiting)
             )
 
     async def require_store(self) -> None:
-        """See whether something could be written now, by a transaction without anything in it.
+        """Write an empty transaction.
 
         Raises
         ------
         StoreError
-            If not.
+            If nothing can be written now.
         """
         loop = asyncio.get_running_loop()
         await loop.run_in_executor(self._thread, self._store.append, [], [])
 
     async def settled(self) -> None:
-        """Wait until everything is on the disk, or the store has refused to take it."""
+        """Wait until the queue is on the disk, or the store has failed."""
         async with self._progress:
             await self._progress.wait_for(
                 lambda: self._live.store_error or not (self._waiting or self._alarms)
             )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Write whatever is queued, for ever."""
+        """Write queued findings until cancelled."""
         while True:
             pulse.rest()
             await self._news.wait()
@@ -245,18 +237,16 @@ class Recorder:
                     await self._clock.sleep(RETRY_S)
 
     async def flush(self) -> None:
-        """Write what is queued now, once; used at the end."""
+        """Write the queue once, at the end of the process."""
         if (self._waiting or self._alarms) and not await self._write():
             counts = {"n_findings": len(self._waiting), "n_alarm_news": len(self._alarms)}
             if self._finds_again:
-                log.warning(
-                    "results were not stored; they are found again at the next start", **counts
-                )
+                log.warning("results were not stored; the next start repeats them", **counts)
             else:
                 log.error("results are lost", **counts)
 
-    def _give_up_oldest(self) -> None:
-        """Keep to the capacity; what is being written may yet be stored, and is kept."""
+    def _drop_oldest(self) -> None:
+        """Drop the oldest findings above the capacity, except those being written."""
         while len(self._waiting) > self._capacity + self._n_writing:
             del self._waiting[self._n_writing]
             self._live.note_unstored(1, GIVEN_UP)
@@ -272,8 +262,8 @@ class Recorder:
                 log.error("results are not being stored", reason=str(error))
             self._live.store_error = str(error)
             self._n_writing = 0
-            self._give_up_oldest()
-            await self._tell_progress()
+            self._drop_oldest()
+            await self._notify()
             return False
         if self._live.store_error is not None:
             log.info("results are being stored again")
@@ -287,12 +277,12 @@ class Recorder:
         for news in alarms:
             self._resolve(news, reasons.get(id(news)))
         if alarms:
-            self._told()
-        await self._tell_progress()
+            self._on_stored()
+        await self._notify()
         return True
 
     def _append(self, batch: Iterable[Findings]) -> list[tuple[object, str]]:
-        """Store what can be stored; return the rows that cannot, which are parked, and why."""
+        """Store findings; park the rows that are refused and return them with the reasons."""
         refused: list[tuple[object, str]] = []
         with self._timed():
             self._append_parts([part for findings in batch for part in findings.parts], refused)
@@ -304,7 +294,7 @@ class Recorder:
         return refused
 
     def _append_parts(self, parts: Sequence[Findings], refused: list[tuple[object, str]]) -> None:
-        """Store parts in one transaction; where that is refused, in halves."""
+        """Store parts in one transaction; if that is refused, store each half."""
         try:
             self._store.append(
                 [row for part in parts for row in part.assessments],
@@ -319,12 +309,12 @@ class Recorder:
                 self._append_parts(parts[:middle], refused)
                 self._append_parts(parts[middle:], refused)
                 return
-            self._store.append([], [])  # or it is not the row that is refused
+            self._store.append([], [])  # raises if the store refuses every write
             refused.append((parts[0].row, str(error)))
             self._append_without_spectrum(parts[0].assessments)
 
     def _append_without_spectrum(self, assessments: Sequence[Assessment]) -> None:
-        """Store the readings of a result whose spectrum alone may have been refused."""
+        """Store a result without its spectrum, which may be the refused part."""
         if any(assessment.spectrum.frequency_hz.size for assessment in assessments):
             with suppress(RefusedRowError):
                 self._store.append([replace(a, spectrum=NO_SPECTRUM) for a in assessments], [])
@@ -336,18 +326,18 @@ class Recorder:
             log.error("results cannot be stored", n_parked=len(refused), reason=reason)
 
     def _resolve(self, news: AlarmNews, refusal: str | None) -> None:
-        """Tell whoever waits for news of an alarm what has become of it."""
+        """Report to waiting callers whether alarm news was stored."""
         outcome = self._outcomes.pop(id(news), None)
         if outcome is not None and not outcome.done():
             outcome.set_result(refusal)
 
-    async def _tell_progress(self) -> None:
+    async def _notify(self) -> None:
         async with self._progress:
             self._progress.notify_all()
 
 
 def _drop(queue: deque[T], written: Sequence[T]) -> None:
-    """Take off the queue what has been written, and nothing that has come since."""
+    """Remove written entries from the front of a queue."""
     ids = {id(entry) for entry in written}
     while queue and id(queue[0]) in ids:
         queue.popleft()

@@ -1,16 +1,15 @@
 """Alarms about the service itself."""
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.board import AlarmBoard, AlarmMemory
-from core.alarms.kinds import Watch, watch
+from core.alarms.kinds import watch
 from core.alarms.rules import LimitRule, rule_of
 from core.condition.cells import NOWHERE_KNOWN
 from core.limits import WITHIN, AlarmLevel, Judgement, Limits
@@ -18,115 +17,84 @@ from core.quality import Reading
 from core.samples.gaps import SampleAccount
 from core.units import NS_PER_S
 from service.settings.alarm_kinds import (
-    ANALYSIS_GONE,
+    DANGER_KINDS,
     MESSAGES_REFUSED,
     SAMPLES_LOST,
     SERVICE_KINDS,
-    STREAM,
     UNIT,
 )
 from service.settings.alarms import AlarmSettings
 
-DiskJudge = Callable[[AlarmLevel | None], Judgement]
-"""What is to be said of the fullest disk, by the level that it had before."""
-
-
-def enough_room(held: AlarmLevel | None) -> Judgement:
-    """Say so where nobody looks at the disks."""
-    del held
-    return WITHIN
-
 
 @dataclass(frozen=True)
 class ServiceHealth:
-    """How the service does at one moment.
+    """Health of the service at one time.
 
     Parameters
     ----------
+    readings
+        Readings that the table of alarm kinds names: a number for the limits of the kind, the text
+        of a fault, or None.
     store_error
-        Why the store refused what was written last; None if it did not.
+        Why the store refused the newest write; None if it did not.
     store_behind_s
-        For how long something has been waiting for the store without anything being written.
-    n_unstored
-        Findings since the start that the store did not take: given up, or refused and parked.
-    unstored_reason
-        Why the newest of them is not stored.
-    waiting_share
-        How far the queue from acquisition to analysis is filled, 0 to 1.
-    analysis_delay_s
-        For how long the oldest block in it has waited, or how far behind its device the block from
-        a stream was that was taken in last.
-    captures_error
-        Why samples around alarms are not kept; None if they are.
-    recording_error
-        Why not all samples are recorded that should be, or recordings are not looked after, so that
-        there may soon be no room for more; None if all is well.
+        Time for which findings have waited without any being written.
+    n_unstored, unstored_reason
+        Findings since the start that were not stored, and why the newest of them was not.
     n_recordings_damaged
         Recordings that were found damaged or missing since the start.
-    refused
-        Which questions are refused because the service is behind; None if none are.
-    stored_trouble
-        In what stored data are not what was stored; None as far as nothing is known to be wrong.
-    stream_trouble
-        Why blocks are not read from the stream just now; None if they are, or need not be.
     accounts
-        Where samples went, by unit of which some have come since the start.
+        Account of samples of each unit that has sent samples since the start.
     disk
-        Judges how full the disks are.
+        Judges the fullest disk, given the level of the condition before.
     """
 
+    readings: Mapping[str, float | str | None] = field(default_factory=dict)
     store_error: str | None = None
     store_behind_s: float = 0.0
     n_unstored: int = 0
     unstored_reason: str | None = None
-    waiting_share: float = 0.0
-    analysis_delay_s: float = 0.0
-    captures_error: str | None = None
-    recording_error: str | None = None
     n_recordings_damaged: int = 0
-    refused: str | None = None
-    stored_trouble: str | None = None
-    stream_trouble: str | None = None
     accounts: Mapping[str, SampleAccount] = field(default_factory=dict)
-    disk: DiskJudge = enough_room
+    disk: Callable[[AlarmLevel | None], Judgement] = lambda _: WITHIN
+
+
+HealthProbe = Callable[[], ServiceHealth]
 
 
 @dataclass(frozen=True)
-class StreamLook:
-    """How blocks come over the stream, where they come that way.
+class StreamStatus:
+    """Status of a stream of blocks.
 
     Parameters
     ----------
     trouble
-        Why none come; None if they do.
+        Returns why no blocks arrive; None if they do.
     behind_s
-        How far behind their devices those are that are taken in now.
+        Returns the age of the block analysed last.
     """
 
     trouble: Callable[[], str | None]
     behind_s: Callable[[], float]
 
 
-LookAtHealth = Callable[[], ServiceHealth]
-
-
 log = structlog.get_logger()
 
 STEP_S = 0.5
-"""A clock that is kept right is slewed; one that moves so much at once has been set."""
+"""Change of the clock at once that shows it was set; a disciplined clock is slewed."""
 
 
 class HostTime:
-    """The host's wall clock, held against its steady one."""
+    """Wall clock of the host, compared with its monotonic clock."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._seen: tuple[int, float] | None = None
 
     def look(self) -> tuple[int, bool]:
-        """UTC nanoseconds, and whether the clock has been set since the look before.
+        """Return UTC nanoseconds, and whether the clock was set since the last call.
 
-        Time that seems to have passed by that must count for no delay.
+        The difference then counts for no delay.
         """
         now_ns, steady_s = self._clock.now_ns(), self._clock.monotonic_s()
         before, self._seen = self._seen, (now_ns, steady_s)
@@ -140,30 +108,30 @@ class HostTime:
 
 
 FULL_SHARE = 0.9
-"""Of the queue: about to make acquisition wait."""
+"""Filled share of the queue at which acquisition is about to wait."""
 
 LOSS_MINUTES = 10
-"""Time over which lost samples are counted, and for which lost results are told."""
+"""Window of the share of lost samples, and duration of an alarm about lost results."""
 
 AT_ONCE, STEADY = rule_of(0.0, 0.0), rule_of(5.0, 30.0)
 
 
 @dataclass(frozen=True)
 class ServiceRules:
-    """Rules of the service's own alarms.
+    """Rules of the alarms about the service.
 
     Parameters
     ----------
     store_behind
-        How long results may wait for the store, s.
+        Limit of the time that results wait for the store, s.
     waiting
-        How far the queue to the analysis may be filled.
+        Limits of the filled share of the queue to the analysis.
     delay
-        How long samples may wait in it, s.
+        Limit of the time that samples wait in it, s.
     loss
-        Share of a unit's samples that may get lost in ten minutes.
+        Limit of the share of lost samples of a unit in ten minutes.
     at_once, steady, lasting
-        Of alarms without limits: without delay, delayed, and lasting for ten minutes.
+        Rules without limits: without delay, with delays, and lasting for ten minutes.
     """
 
     store_behind: LimitRule = field(default_factory=lambda: LimitRule(Limits(10.0), AT_ONCE))
@@ -178,7 +146,7 @@ class ServiceRules:
 
 
 def service_rules_of(alarms: AlarmSettings) -> ServiceRules:
-    """Rules as the plant file has them."""
+    """Return the rules of the plant file."""
     share, delay_s = alarms.max_waiting_share, alarms.max_analysis_delay_s
     waiting = Limits(share, FULL_SHARE if share < FULL_SHARE else None, share / 5)
     return ServiceRules(
@@ -189,56 +157,37 @@ def service_rules_of(alarms: AlarmSettings) -> ServiceRules:
     )
 
 
-def service_watches(units: Iterable[str], rules: ServiceRules) -> dict[str, Watch]:
-    """The alarms about the service, by kind; those about lost samples by unit.
-
-    Refused messages and units without analysis are judged elsewhere, by unit.
-    """
-    subjects = {
-        kind.name: (kind.subject, kind)
-        for kind in SERVICE_KINDS.values()
-        if kind.subject != UNIT and kind.name != MESSAGES_REFUSED
-    }
-    subjects |= {loss_key(unit): (unit, SERVICE_KINDS[SAMPLES_LOST]) for unit in units}
-    return {
-        key: watch(AlarmIdentity(PLANT, subject, kind.name), getattr(rules, kind.rule), subject)
-        for key, (subject, kind) in subjects.items()
-    }
-
-
 def loss_key(unit: str) -> str:
-    """Key of the alarm about lost samples of a unit among the watches."""
+    """Return the key of the alarm about lost samples of a unit."""
     return f"{SAMPLES_LOST}:{unit}"
 
 
-def told_by(identity: AlarmIdentity) -> str:
-    """Unit whose process tells of an alarm: of lost samples, the one that analyses their unit."""
+def reporting_unit(identity: AlarmIdentity) -> str:
+    """Return the unit whose process reports an alarm, also an alarm of the plant."""
     return identity.subject if identity.kind == SAMPLES_LOST else identity.unit
 
 
 LOSS_NS = 60 * LOSS_MINUTES * NS_PER_S
-LEVELS = {"stored_data_damaged": AlarmLevel.DANGER, "stream_away": AlarmLevel.DANGER}
-"""Levels of alarms about a trouble; of others, an alert."""
 
 LOOK_EVERY_NS = 10 * NS_PER_S
 
 
 class SampleLoss:
-    """Which share of a unit's samples got lost or was refused in the last ten minutes.
+    """Share of the samples of a unit that were lost or rejected in the last ten minutes.
 
-    Where more is dropped as repeated than is new, that is lost, too: nothing repeats itself for
-    minutes but a device that counts anew and has its clock put back, of which nobody would hear.
+    Repeated samples count as lost if they outnumber the new ones: only a device that restarts its
+    count with its clock set back repeats samples for minutes.
     """
 
     def __init__(self) -> None:
         self._seen: deque[tuple[int, int, int, int]] = deque()
 
     def share(self, account: SampleAccount, now_ns: int) -> float:
-        """Take in the unit's account; ask once in a while."""
+        """Update with the account of the unit and return the share."""
         offered = account.n_offered
         lost = account.n_gap + sum(account.rejected.values())
         if self._seen and offered < self._seen[-1][1]:
-            self._seen.clear()  # the account begins anew
+            self._seen.clear()  # the account was restarted
         if not self._seen or now_ns - self._seen[-1][0] >= LOOK_EVERY_NS:
             self._seen.append((now_ns, offered, lost, account.n_repeated))
         while len(self._seen) > 1 and now_ns - self._seen[0][0] > LOSS_NS:
@@ -248,53 +197,61 @@ class SampleLoss:
         n_dropped = n_repeated if n_repeated > n_new else 0
         return (lost - lost_then + n_dropped) / max(n_new + n_dropped, 1)
 
-    def reaches_back(self, now_ns: int) -> bool:
-        """Whether all of the last ten minutes was seen here, or nearly."""
+    def is_complete(self, now_ns: int) -> bool:
+        """Return whether the account covers the last ten minutes, or nearly."""
         return bool(self._seen) and now_ns - self._seen[0][0] >= LOSS_NS - LOOK_EVERY_NS
 
 
 class ServiceAlarms(AlarmBoard):
-    """Owns the alarms that belong to no unit, and those of units that are there no more.
+    """Alarms without a unit, and alarms of units that are no longer in the plant file.
 
     Parameters
     ----------
     units
-        Whose samples may get lost.
+        Units whose lost samples are judged.
     rules
-        Limits of the service.
+        Rules of the alarms.
     look
-        How the service does now; None where nobody looks at that.
+        Returns the health of the service; without it nothing is judged.
     leads
-        Whether it is this process that raises what there is one alarm of for the whole plant; lost
-        samples of its units are each process's own.
+        Whether this process judges what concerns the whole plant; each process judges the lost
+        samples of its own units.
     """
 
     def __init__(
         self,
         units: Iterable[str] = (),
         rules: ServiceRules | None = None,
-        look: LookAtHealth | None = None,
+        look: HealthProbe | None = None,
         *,
         leads: bool = True,
     ) -> None:
-        self._look, self._leads = look, leads
-        names = list(units) if look else []
-        watches = service_watches(names, rules or ServiceRules()) if look else {}
-        own = {loss_key(unit) for unit in names}
-        self._watches = {key: its for key, its in watches.items() if leads or key in own}
+        self._look, names = look, list(units) if look else []
+        subjects = {loss_key(unit): (unit, SERVICE_KINDS[SAMPLES_LOST]) for unit in names}
+        # refused messages and units without analysis are judged by unit, elsewhere
+        self._judged = [
+            kind
+            for kind in SERVICE_KINDS.values()
+            if look and leads and kind.subject != UNIT and kind.name != MESSAGES_REFUSED
+        ]
+        subjects = {kind.name: (kind.subject, kind) for kind in self._judged} | subjects
+        rules = rules or ServiceRules()
+        self._watches = {
+            key: watch(AlarmIdentity(PLANT, subject, kind.name), getattr(rules, kind.rule), subject)
+            for key, (subject, kind) in subjects.items()
+        }
         super().__init__(self._watches.values())
         self._losses = {unit: SampleLoss() for unit in names}
         self._inherited: set[str] = set()
-        self._n_unstored = 0
-        self._n_damaged = 0
+        self._counted: dict[str, int] = {}
 
     def restore(
         self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
     ) -> list[AlarmNews]:
-        """Go on where the service stopped.
+        """Continue from stored alarms.
 
-        Of what was lost before nothing is known here: lost samples that are an alarm stay one until
-        this process has seen ten minutes without.
+        Earlier losses are unknown, so an active alarm about lost samples stays active until this
+        process has seen ten minutes without losses.
         """
         news = super().restore(stored, host_ns, memory)
         self._inherited = {
@@ -305,153 +262,52 @@ class ServiceAlarms(AlarmBoard):
         return news
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Look at the service once."""
+        """Judge the health of the service."""
         if self._look is not None:
             health = self._look()
-            if self._leads:
-                self._judge(health, host_ns)
-            self._count_losses(health, host_ns)
+            for kind in self._judged:
+                self.update(self._watches[kind.name], self._judgement(kind.name, health), host_ns)
+            self._judge_losses(health, host_ns)
         return super().tick(host_ns)
 
-    def _judge(self, health: ServiceHealth, now_ns: int) -> None:
-        judges = {
-            "results_not_stored": self._store,
-            "results_lost": self._lost,
-            "recordings_damaged": self._damaged,
-            "disk_nearly_full": self._disk,
-        }
-        for name in filter(SERVICE_KINDS.__contains__, self._watches):
-            judge = judges.get(name, partial(self._by_reading, name))
-            self.update(self._watches[name], judge(health), now_ns)
-
-    def _by_reading(self, name: str, health: ServiceHealth) -> Judgement:
-        """Judge the reading of a kind: a value, or the words of a trouble."""
-        found: float | str | None = getattr(health, SERVICE_KINDS[name].reading or "")
-        if found is None:
+    def _judgement(self, name: str, health: ServiceHealth) -> Judgement:
+        match name:
+            case "results_not_stored":
+                found = self._compared(name, health.store_behind_s)
+                reason = health.store_error or "the store does not answer"
+                return found if found.level is None else replace(found, reason=reason)
+            case "results_lost":
+                reason = health.unstored_reason or "given_up"
+                return self._increase(name, health.n_unstored, AlarmLevel.DANGER, reason)
+            case "recordings_damaged":
+                n_damaged = health.n_recordings_damaged
+                return self._increase(name, n_damaged, AlarmLevel.ALERT, "damaged_or_missing")
+            case "disk_nearly_full":
+                return health.disk(self._held(name))
+        reading = health.readings.get(SERVICE_KINDS[name].reading or "")
+        if reading is None:
             return WITHIN
-        if isinstance(found, str):
-            return Judgement(LEVELS.get(name, AlarmLevel.ALERT), reason=found)
-        return self._compared(name, found)
+        if isinstance(reading, str):
+            level = AlarmLevel.DANGER if name in DANGER_KINDS else AlarmLevel.ALERT
+            return Judgement(level, reason=reading)
+        return self._compared(name, reading)
 
-    def _count_losses(self, health: ServiceHealth, now_ns: int) -> None:
+    def _increase(self, name: str, n_found: int, level: AlarmLevel, reason: str) -> Judgement:
+        """Judge a count that should not increase."""
+        n_more, self._counted[name] = n_found - self._counted.get(name, 0), n_found
+        return Judgement(level, value=float(n_found), reason=reason) if n_more > 0 else WITHIN
+
+    def _judge_losses(self, health: ServiceHealth, now_ns: int) -> None:
         for unit, account in health.accounts.items():
-            seen = self._losses[unit]
-            condition = self._compared(loss_key(unit), seen.share(account, now_ns))
-            if condition.level is not None or seen.reaches_back(now_ns):
+            loss, key = self._losses[unit], loss_key(unit)
+            condition = self._compared(key, loss.share(account, now_ns))
+            if condition.level is not None or loss.is_complete(now_ns):
                 self._inherited.discard(unit)
             if unit not in self._inherited:
-                self.update(self._watches[loss_key(unit)], condition, now_ns)
+                self.update(self._watches[key], condition, now_ns)
 
-    def _store(self, health: ServiceHealth) -> Judgement:
-        found = self._compared("results_not_stored", health.store_behind_s)
-        if found.level is None:
-            return found
-        return replace(found, reason=health.store_error or "the store does not answer")
-
-    def _disk(self, health: ServiceHealth) -> Judgement:
-        watch = self._watches["disk_nearly_full"]
-        return health.disk(self.alarm(watch.id).condition.level)
-
-    def _lost(self, health: ServiceHealth) -> Judgement:
-        n_more = health.n_unstored - self._n_unstored
-        self._n_unstored = health.n_unstored
-        if n_more <= 0:
-            return WITHIN
-        reason = health.unstored_reason or "given_up"
-        return Judgement(AlarmLevel.DANGER, value=float(health.n_unstored), reason=reason)
-
-    def _damaged(self, health: ServiceHealth) -> Judgement:
-        n_more = health.n_recordings_damaged - self._n_damaged
-        self._n_damaged = health.n_recordings_damaged
-        if n_more <= 0:
-            return WITHIN
-        n_all = float(health.n_recordings_damaged)
-        return Judgement(AlarmLevel.ALERT, value=n_all, reason="damaged_or_missing")
+    def _held(self, key: str) -> AlarmLevel | None:
+        return self.alarm(self._watches[key].id).condition.level
 
     def _compared(self, key: str, value: float) -> Judgement:
-        watch = self._watches[key]
-        return watch.judge(Reading(value), NOWHERE_KNOWN, self.alarm(watch.id).condition.level)
-
-
-class ToldAlarms(AlarmBoard):
-    """Owns alarms of some watches; what was told of each counts from the next tick on."""
-
-    def __init__(self, watches: Iterable[Watch]) -> None:
-        self._watches = {watch.id: watch for watch in watches}
-        super().__init__(self._watches.values())
-        self._found: dict[str, Judgement] = {}
-        self._once: set[str] = set()
-
-    def tell(self, id_: str, condition: Judgement) -> None:
-        """Note what is found; it lasts until something else is told."""
-        self._found[id_] = condition
-        self._once.discard(id_)
-
-    def tell_once(self, id_: str, condition: Judgement) -> None:
-        """Note what has happened, and is over already."""
-        self.tell(id_, condition)
-        self._once.add(id_)
-
-    def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Judge what was told last."""
-        for id_, condition in self._found.items():
-            self.update(self._watches[id_], condition, host_ns)
-        for id_ in self._once:
-            self._found[id_] = WITHIN
-        self._once.clear()
-        return super().tick(host_ns)
-
-
-SHARED = "shared work"
-"""In the place of a unit: reports and commands about these alarms. No unit can be called so."""
-
-
-def is_shared(alarm: Alarm) -> bool:
-    """Whether an alarm belongs to whoever does the shared work."""
-    return alarm.identity.kind == ANALYSIS_GONE
-
-
-def gone_alarms(units: Iterable[str]) -> ToldAlarms:
-    """The alarms of some units; nothing is known yet of any."""
-    return ToldAlarms(Watch(identity_of(unit), rule_of(0.0, 0.0), unit) for unit in units)
-
-
-def judge(alarms: ToldAlarms, silent: Sequence[str], heard: Sequence[str], after_s: float) -> None:
-    """Take in which units were heard of lately, and which were not."""
-    reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
-    gone = Judgement(AlarmLevel.DANGER, reason=reason)
-    for units, condition in ((silent, gone), (heard, WITHIN)):
-        for unit in units:
-            alarms.tell(identity_of(unit).id, condition)
-
-
-def identity_of(unit: str) -> AlarmIdentity:
-    """The alarm about a unit that nobody analyses."""
-    return AlarmIdentity(PLANT, unit, ANALYSIS_GONE)
-
-
-REFUSED_FOR_S = 600.0
-"""How long an alarm stands after the last message that was refused."""
-
-MAX_REASON = 200
-"""Longest reason, letters: a message that is refused may hold anything."""
-
-
-def stream_alarms(units: Iterable[str]) -> ToldAlarms:
-    """Alarms about messages of units that cannot be used."""
-    alarms = ToldAlarms(
-        Watch(_refused(unit), rule_of(0.0, REFUSED_FOR_S), STREAM) for unit in units
-    )
-    for alarm in alarms.alarms:
-        alarms.tell(alarm.identity.id, WITHIN)
-    return alarms
-
-
-def refuse(alarms: ToldAlarms, unit: str, reason: str) -> None:
-    """Note that a message of a unit was refused."""
-    words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
-    alarms.tell_once(_refused(unit).id, Judgement(AlarmLevel.ALERT, reason=words))
-
-
-def _refused(unit: str) -> AlarmIdentity:
-    return AlarmIdentity(unit, STREAM, MESSAGES_REFUSED)
+        return self._watches[key].judge(Reading(value), NOWHERE_KNOWN, self._held(key))

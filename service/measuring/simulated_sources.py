@@ -1,4 +1,4 @@
-"""Simulated machines and lives as sources."""
+"""Simulated machines as sources: with constant films, or with a life of wear and damage."""
 
 from collections.abc import Mapping
 
@@ -31,41 +31,28 @@ from service.settings.sources.simulated import (
 from service.settings.units import UnitSettings
 
 NOISES = {"gap_noise_um_rms", "velocity_noise_mm_s_rms", "acceleration_noise_m_s2_rms"}
-"""Keys of a simulation; without any of them, transducers are as noisy as real ones."""
+"""Keys of the noise of transducers; by default it is that of real ones."""
 
-MOST_APART = 0.005
-"""Relative difference of a unit from its life that is let pass."""
-
-
-def course_of_life(unit: UnitSettings, simulation: SimulationSettings, now_ns: int) -> LifeCourse:
-    """The life of a unit from now on.
-
-    Raises
-    ------
-    ConfigError
-        If the unit cannot have this life; the message says why.
-    """
-    _refuse_misfit(unit, simulation)
-    return course_from(_plan(simulation, now_ns), now_ns, machine_of(unit), _noise(simulation))
+MAX_MISFIT = 0.005
+"""Maximum relative difference between the settings of a unit and its life."""
 
 
 def simulated_history(
     unit: UnitSettings, now_ns: int, years: float = 1.0
 ) -> Mapping[str, StiffnessHistory]:
-    """Readings of a unit's life until now, by bearing; none if it has no life.
+    """Return the readings of a unit's life until now, by bearing; none if it has no life.
 
     Parameters
     ----------
     now_ns
-        On the day on which the simulated machine starts, for its samples to go on where these
-        readings stop.
+        Start of the simulated machine, whose samples continue these readings.
 
     Raises
     ------
     ConfigError
-        If the unit cannot have this life.
+        If the settings of the unit do not fit its life.
     ValueError
-        If the life does not reach so far back.
+        If the life is shorter.
     """
     simulation = unit.simulation
     if simulation is None or simulation.life_seed is None:
@@ -93,8 +80,6 @@ def _damage(settings: SimulatedDamageSettings, now_ns: int) -> Damage:
 
 
 def _noise(simulation: SimulationSettings) -> TransducerNoise:
-    if not NOISES & simulation.model_fields_set:
-        return TRANSDUCER_NOISE
     return TransducerNoise(
         gap_um_rms=simulation.gap_noise_um_rms,
         displacement_um_rms=simulation.gap_noise_um_rms,
@@ -104,44 +89,51 @@ def _noise(simulation: SimulationSettings) -> TransducerNoise:
 
 
 def _refuse_misfit(unit: UnitSettings, simulation: SimulationSettings) -> None:
-    """Refuse a unit whose readings would not be those of its life."""
+    """Raise `ConfigError` if the settings of a unit do not fit its life."""
     speed_rpm = rated_speed_rpm(simulation.life_seed or 0)
     _compare(unit, "rated_speed_rpm", unit.rated_speed_rpm, speed_rpm)
     if unit.rated_power_mw is not None:
         _compare(unit, "rated_power_mw", unit.rated_power_mw, RATED_POWER_MW)
-    told_um = {life.id: life.configured_clearance_um for life in LIFE_BEARINGS}
+    clearances_um = {life.id: life.configured_clearance_um for life in LIFE_BEARINGS}
     brackets = {b.bearing: b for b in RotorParameters().brackets}
     for bearing in unit.bearing:
         bracket, name = brackets[bearing.id], bearing.id
-        _compare(unit, f"{name} clearance_um", bearing.clearance_um, told_um[name])
+        _compare(unit, f"{name} clearance_um", bearing.clearance_um, clearances_um[name])
         stiffness = bearing.bracket_stiffness_n_per_m
         _compare(unit, f"{name} bracket_stiffness_n_per_m", stiffness, bracket.stiffness_n_per_m)
 
 
 def _compare(unit: UnitSettings, key: str, found: float, wanted: float) -> None:
-    if abs(found - wanted) > MOST_APART * wanted:
-        raise ConfigError(f"unit {unit.id}: {key} = {found:g}, but its life is of {wanted:g}")
+    if abs(found - wanted) > MAX_MISFIT * wanted:
+        raise ConfigError(f"unit {unit.id}: {key} = {found:g}, but its life requires {wanted:g}")
 
 
 def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:
-    """The simulated machine of a unit, its first sample now.
+    """Return the simulated machine of a unit, whose first sample is now.
 
     Raises
     ------
     LookupError
         If the unit has none.
     ConfigError
-        If the unit cannot have the life that it is to live.
+        If the settings of the unit do not fit its life.
     """
-    simulation, now_ns = simulation_of(unit), clock.now_ns()
-    lives = simulation.life_seed is not None
-    scenario = course_of_life(unit, simulation, now_ns) if lives else scenario_of(simulation)
+    simulation, now_ns = unit.simulation, clock.now_ns()
+    if simulation is None:
+        raise LookupError(f"unit {unit.id} has no [unit.simulation] table")
     machine, calibration = machine_of(unit), calibration_of(unit)
+    scenario: Scenario | LifeCourse
+    if simulation.life_seed is None:
+        scenario = scenario_of(simulation)
+    else:
+        _refuse_misfit(unit, simulation)
+        noise = _noise(simulation) if NOISES & simulation.model_fields_set else TRANSDUCER_NOISE
+        scenario = course_from(_plan(simulation, now_ns), now_ns, machine, noise)
     return SimulatedUnit(machine, calibration, scenario, simulation.seed, now_ns)
 
 
 def scenario_of(simulation: SimulationSettings) -> Scenario:
-    """What a simulated unit with fixed films goes through.
+    """Return the scenario of a simulated unit with constant films.
 
     Raises
     ------
@@ -149,7 +141,7 @@ def scenario_of(simulation: SimulationSettings) -> Scenario:
         If it has a life instead.
     """
     if simulation.speed_rpm is None or simulation.power_mw is None:
-        raise LookupError("a simulated unit with a life has no fixed scenario")
+        raise LookupError("a simulated unit with a life has no constant scenario")
     return Scenario(
         bearings={bearing.bearing: _bearing_scenario(bearing) for bearing in simulation.bearing},
         speed_rpm=simulation.speed_rpm,
@@ -158,26 +150,8 @@ def scenario_of(simulation: SimulationSettings) -> Scenario:
         unbalance_grade_mm_s=simulation.unbalance_grade_mm_s,
         hydraulic=HydraulicNoise(simulation.hydraulic_force_n_rms, simulation.hydraulic_cutoff_hz),
         rope=VortexRope(simulation.rope_force_n, simulation.rope_order),
-        noise=TransducerNoise(
-            gap_um_rms=simulation.gap_noise_um_rms,
-            displacement_um_rms=simulation.gap_noise_um_rms,
-            velocity_mm_s_rms=simulation.velocity_noise_mm_s_rms,
-            acceleration_m_s2_rms=simulation.acceleration_noise_m_s2_rms,
-        ),
+        noise=_noise(simulation),
     )
-
-
-def simulation_of(unit: UnitSettings) -> SimulationSettings:
-    """The settings of a unit's simulated machine.
-
-    Raises
-    ------
-    LookupError
-        If there are none.
-    """
-    if unit.simulation is None:
-        raise LookupError(f"unit {unit.id} has no [unit.simulation] table")
-    return unit.simulation
 
 
 def _bearing_scenario(bearing: SimulatedBearingSettings) -> BearingScenario:

@@ -23,20 +23,25 @@ from service.runtime.polls import TimedSource
 from service.settings.adapter_values import can_settings_of, link_fields
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.plant import AnalysisModel, PlantFile
-from service.settings.sources import devices
 from service.settings.sources.can import CanSettings
 from service.settings.sources.devices import (
     MappedDeviceSettings,
     ModbusFifoSettings,
     ModbusPolledSettings,
+    ModbusRingSettings,
     ModbusVectorSettings,
-    SlowDeviceSettings,
+    SimulatedSettings,
+    SourceSettings,
 )
 from service.settings.units import UnitSettings
 
+ModbusSettings = (
+    ModbusRingSettings | ModbusFifoSettings | ModbusPolledSettings | ModbusVectorSettings
+)
+
 
 def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
-    """How a mapped device is asked."""
+    """Return the adapter's settings of a device with a register map."""
     return PolledSettings(
         **link_fields(device),
         poll_period_s=device.poll_period_s,
@@ -44,94 +49,61 @@ def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
     )
 
 
-def polled_source(
-    source: ModbusPolledSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
+def modbus_source(
+    source: ModbusSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
 ) -> SampleSource:
-    """Registers as a source; goes with a monitor of the unit :func:`at_poll_rate`."""
-    rows = [channel.id for channel in unit.channels]
-    calibration = replace(calibration, rate_hz=source.rate_hz)
-    return PolledSource(polled_settings(source), source.registers, rows, calibration, clock)
-
-
-def at_poll_rate(source: ModbusPolledSettings | ModbusVectorSettings, unit: Unit) -> Unit:
-    """The unit as its polled source shows it: a sample is a poll."""
-    return replace(unit, rate_hz=source.rate_hz)
-
-
-def vector_source(
-    source: ModbusVectorSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
-) -> SampleSource:
-    """A vector rack as a source; goes with :func:`vector_monitor`."""
+    """Return the source of a Modbus device; its monitor is that of `monitor_for`."""
     ids = [channel.id for channel in unit.channels]
-    return PolledSource(
-        polled_settings(source),
-        source.registers,
-        [row.id for row in source.rows],
-        vector_calibration(replace(calibration, rate_hz=source.rate_hz), ids, source.rows),
-        clock,
-    )
+    match source:
+        case ModbusPolledSettings():
+            calibration = replace(calibration, rate_hz=source.rate_hz)
+            return PolledSource(polled_settings(source), source.registers, ids, calibration, clock)
+        case ModbusVectorSettings():
+            calibration = replace(calibration, rate_hz=source.rate_hz)
+            calibration = vector_calibration(calibration, ids, source.rows)
+            rows = [row.id for row in source.rows]
+            return PolledSource(polled_settings(source), source.registers, rows, calibration, clock)
+        case ModbusRingSettings():
+            ring = RingSettings(
+                **link_fields(source),
+                function=source.function,
+                base_address=source.base_address,
+                poll_period_s=source.poll_period_s,
+                stale_after_s=source.stale_after_s,
+            )
+            return RingSource(ring, calibration, clock)
+        case ModbusFifoSettings():
+            fifo = FifoSettings(
+                **link_fields(source),
+                poll_period_s=source.poll_period_s,
+                stale_after_s=source.stale_after_s,
+                loss_tolerance_s=source.loss_tolerance_s,
+            )
+            return FifoSource(fifo, source.fifo_layout(len(ids)), calibration, clock)
 
 
-def vector_monitor(
-    source: ModbusVectorSettings, unit: Unit, settings: AnalysisSettings
-) -> UnitMonitor:
-    """The monitor of a unit with a vector rack."""
-    unit = at_poll_rate(source, unit)
-    transform = PollTransform(unit, source.rows, settings, source.averaging)
-    return UnitMonitor(unit, settings, transform)
-
-
-def fifo_source(
-    source: ModbusFifoSettings, calibration: UnitCalibration, clock: Clock
-) -> SampleSource:
-    """Queues as a source."""
-    settings = FifoSettings(
-        **link_fields(source),
-        poll_period_s=source.poll_period_s,
-        stale_after_s=source.stale_after_s,
-        loss_tolerance_s=source.loss_tolerance_s,
-    )
-    layout = source.fifo_layout(len(calibration.channels))
-    return FifoSource(settings, layout, calibration, clock)
-
-
-def slow_channels_of(slow: SlowDeviceSettings) -> frozenset[str]:
-    """Slow channels that another device measures: leave them out of the source's calibration."""
-    return frozenset(slow.mapped_channels)
-
-
-def without_channels_of(slow: SlowDeviceSettings, calibration: UnitCalibration) -> UnitCalibration:
-    """Calibration of the source that sends the waveforms."""
-    return without_slow(calibration, slow_channels_of(slow))
-
-
-def joined_source(
-    source: SampleSource, slow: SlowDeviceSettings, calibration: UnitCalibration, clock: Clock
-) -> SampleSource:
-    """Waveforms of one device with slow values of another.
-
-    Parameters
-    ----------
-    source
-        Built with `without_channels_of` the unit's calibration.
-    calibration
-        Of the whole unit.
-    """
-    channels = only_slow(calibration, slow_channels_of(slow)).slow
-    return JoinedSource(
-        source, PolledSlowValues(polled_settings(slow), slow.registers, channels, clock)
-    )
+def monitor_for(source: SourceSettings, unit: Unit, settings: AnalysisSettings) -> UnitMonitor:
+    """Return the monitor of a unit; a poll of a polled device is a sample or a set of vectors."""
+    match source:
+        case ModbusVectorSettings():
+            unit = replace(unit, rate_hz=source.rate_hz)
+            transform = PollTransform(unit, source.rows, settings, source.averaging)
+            return UnitMonitor(unit, settings, transform)
+        case ModbusPolledSettings():
+            return UnitMonitor(replace(unit, rate_hz=source.rate_hz), settings)
+        case _:
+            return UnitMonitor(unit, settings)
 
 
 @dataclass(frozen=True)
 class WatchedUnit:
-    """A unit's source and the monitor that its blocks go to.
+    """Source of a unit, and the monitor of its blocks.
 
     Parameters
     ----------
     retry_s
-        Longest wait before a lost link is tried again: the source's poll period, so that the first
-        sample is here within two of them after the device is back.
+        Maximum wait before a lost link is tried again: the poll period of the source, so that
+        samples arrive within two periods after the device is back.
     """
 
     source: SampleSource
@@ -140,16 +112,16 @@ class WatchedUnit:
 
 
 DEFAULT_RETRY_S = 0.5
-"""Of sources that are not polled."""
+"""Retry period of sources that are not polled."""
 
 QUEUE_RETRY_S = 0.25
-"""A queue is looked at 200 times a second; its device, when it is away, is not to be called so."""
+"""Retry period of queues, which are polled 200 times a second."""
 
 
 def watched_units(
     plant: PlantFile, source: Callable[[UnitSettings], SampleSource]
 ) -> dict[str, WatchedUnit]:
-    """Source and monitor of every unit of a plant."""
+    """Return source and monitor of every unit of a plant."""
     return {
         unit.id: WatchedUnit(source(unit), monitor_of(unit, plant.analysis), retry_s(unit))
         for unit in plant.unit
@@ -157,70 +129,50 @@ def watched_units(
 
 
 def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
-    """What the samples of a unit are analysed by: its rack may give vectors instead of them."""
-    machine, settings, source = machine_of(unit), analysis_of(analysis), unit.source
-    match source:
-        case devices.ModbusVectorSettings():
-            return vector_monitor(source, machine, settings)
-        case devices.ModbusPolledSettings():
-            return UnitMonitor(at_poll_rate(source, machine), settings)
-        case _:
-            return UnitMonitor(machine, settings)
+    """Return the monitor of a unit of a plant file."""
+    return monitor_for(unit.source, machine_of(unit), analysis_of(analysis))
 
 
 def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
-    """All units with the sources that the plant file names."""
+    """Return all units with the sources of the plant file."""
     return watched_units(plant, lambda unit: TimedSource(partial(source_of, unit), clock))
 
 
 def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
-    """Which channel each row of a block is about, for units that give vectors."""
+    """Return the channel of each row of the blocks of units whose devices deliver vectors."""
     return {
         unit.id: [row.channel for row in unit.source.rows]
         for unit in plant.unit
-        if isinstance(unit.source, devices.ModbusVectorSettings)
+        if isinstance(unit.source, ModbusVectorSettings)
     }
 
 
 def retry_s(unit: UnitSettings) -> float:
-    """How soon a unit's lost link is tried again: as often as it is looked at, but no storm."""
-    if isinstance(unit.source, devices.ModbusFifoSettings):
+    """Return the wait before a lost link of a unit is tried again."""
+    if isinstance(unit.source, ModbusFifoSettings):
         return QUEUE_RETRY_S
     period_s: float = getattr(unit.source, "poll_period_s", DEFAULT_RETRY_S)
     return period_s
 
 
 def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
-    """Where the samples of a unit come from, and its slow values, if from elsewhere."""
-    calibration, beside = calibration_of(unit), unit.slow_source
-    if beside is None:
+    """Return the source of a unit, joined with that of its slow values if there is one."""
+    calibration, slow = calibration_of(unit), unit.slow_source
+    if slow is None:
         return _main_source(unit, calibration, clock)
-    source = _main_source(unit, without_channels_of(beside, calibration), clock)
-    return joined_source(source, beside, calibration, clock)
+    ids = frozenset(slow.mapped_channels)
+    channels = only_slow(calibration, ids).slow
+    return JoinedSource(
+        _main_source(unit, without_slow(calibration, ids), clock),
+        PolledSlowValues(polled_settings(slow), slow.registers, channels, clock),
+    )
 
 
 def _main_source(unit: UnitSettings, calibration: UnitCalibration, clock: Clock) -> SampleSource:
-    source = unit.source
-    match source:
-        case devices.ModbusRingSettings():
-            return RingSource(_ring_settings(source), calibration, clock)
-        case devices.ModbusFifoSettings():
-            return fifo_source(source, calibration, clock)
-        case devices.ModbusPolledSettings():
-            return polled_source(source, machine_of(unit), calibration, clock)
-        case devices.ModbusVectorSettings():
-            return vector_source(source, machine_of(unit), calibration, clock)
-        case CanSettings():
+    match unit.source:
+        case CanSettings() as source:
             return CanSource(can_settings_of(unit, source), calibration, clock)
-        case devices.SimulatedSettings():
+        case SimulatedSettings():
             return SimulatedSource(simulated_feed(unit, clock), calibration, clock)
-
-
-def _ring_settings(source: devices.ModbusRingSettings) -> RingSettings:
-    return RingSettings(
-        **link_fields(source),
-        function=source.function,
-        base_address=source.base_address,
-        poll_period_s=source.poll_period_s,
-        stale_after_s=source.stale_after_s,
-    )
+        case source:
+            return modbus_source(source, machine_of(unit), calibration, clock)

@@ -1,4 +1,4 @@
-"""How long polls, evaluations and commits take."""
+"""Durations of evaluations and commits."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -15,24 +15,11 @@ ASSESSMENT_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 
 """An assessment takes some milliseconds."""
 
 COMMIT_BOUNDS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
-"""A commit waits for the disk, and for up to five seconds for who holds the database."""
+"""A commit waits for the disk, and for at most five seconds for the lock of the database."""
 
 
 class Timings:
-    """Durations by what took them.
-
-    Parameters
-    ----------
-    units
-        Units of the plant: all that may be told apart.
-
-    Attributes
-    ----------
-    assessments
-        What results took, by unit.
-    commits
-        What the store took to write findings.
-    """
+    """Durations of assessments, by unit, and of commits."""
 
     def __init__(self, units: Iterable[str], clock: Clock) -> None:
         self._clock = clock
@@ -40,21 +27,21 @@ class Timings:
         self.commits = Durations(COMMIT_BOUNDS_S, clock)
 
     def begin(self) -> float:
-        """When something begins, for `assessed`."""
+        """Return the time at which an assessment begins, for `assessed`."""
         return self._clock.monotonic_s()
 
     def assessed(self, unit: str, began_s: float) -> None:
-        """Note what a result took."""
+        """Add the duration of an assessment that ends now."""
         self.assessments[unit].observe(self._clock.monotonic_s() - began_s)
 
 
 class TimedMonitor(UnitMonitor):
-    """A monitor whose results are timed.
+    """A monitor that measures the durations of its assessments.
 
     Parameters
     ----------
     monitor
-        Taken over with all its state; it must not be used apart from this one.
+        Monitor whose state is taken over; it must not be used any more.
     """
 
     def __init__(self, monitor: UnitMonitor, timings: Timings) -> None:
@@ -62,7 +49,7 @@ class TimedMonitor(UnitMonitor):
         self._timings = timings
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
-        """Take a block in, one bearing at a time; raises as the monitor does."""
+        """Analyse a block, one bearing at a time; raises as `UnitMonitor.steps` does."""
         steps = super().steps(block)
         began_s = self._timings.begin()
         for assessment in steps:
@@ -71,13 +58,8 @@ class TimedMonitor(UnitMonitor):
             began_s = self._timings.begin()
 
 
-def timed_monitors(monitors: Mapping[str, UnitMonitor], timings: Timings) -> dict[str, UnitMonitor]:
-    """The same monitors, timed."""
-    return {unit: TimedMonitor(monitor, timings) for unit, monitor in monitors.items()}
-
-
 def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, WatchedUnit]:
-    """The same units with monitors that are timed."""
+    """Return the units with timed monitors."""
     return {
         unit: replace(watched, monitor=TimedMonitor(watched.monitor, timings))
         for unit, watched in units.items()
@@ -85,9 +67,6 @@ def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, Watch
 
 
 def timed_sources(units: Mapping[str, WatchedUnit]) -> dict[str, TimedSource]:
-    """The sources that are timed, by unit."""
-    return {
-        unit: watched.source
-        for unit, watched in units.items()
-        if isinstance(watched.source, TimedSource)
-    }
+    """Return the timed sources by unit."""
+    sources = {unit: watched.source for unit, watched in units.items()}
+    return {unit: each for unit, each in sources.items() if isinstance(each, TimedSource)}

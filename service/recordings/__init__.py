@@ -1,1 +1,1 @@
-"""Recordings of samples around alarms, as they lie on the disk."""
+"""Recordings of samples on the disk: around alarms and continuous; their library and retention."""

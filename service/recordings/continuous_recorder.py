@@ -1,9 +1,8 @@
-"""Continuous recording: all samples of units, and what is left out under pressure."""
+"""Continuous recording: all samples of units, and the samples that are dropped under pressure."""
 
 import asyncio
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -17,13 +16,13 @@ from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import RecordedUnit, read_manifest
 from acquisition.recordings.reader import open_recording
 from core.samples.blocks import Rejection, SampleBlock
-from service.recordings.folders import KIND, unit_of
-from service.recordings.segment import Stretch, TapeSettings, clear_unfinished, join, unjoined
+from service.recordings.folders import CONTINUOUS, remove_incomplete, unit_of
+from service.recordings.segment import Segment, SegmentSettings, WriterThread, join, unjoined
 from service.runtime.heartbeats import UNHEARD, Pulse
 
 
-class Shed(StrEnum):
-    """Why samples are not in a continuous recording; what the recording itself says."""
+class DropReason(StrEnum):
+    """Why samples are missing from a continuous recording, as written in it."""
 
     ANALYSIS_BEHIND = "analysis_behind"
     DISK_SLOW = "disk_slow"
@@ -31,35 +30,46 @@ class Shed(StrEnum):
     DISK_REFUSED = "disk_refused"
     NOT_RUNNING = "not_running"
     GAP_BEFORE = "gap_before"
-    """A gap of the device itself, where one recording ends and the next begins."""
+    """A gap of the device between two recordings."""
+
+
+WORDS = {
+    DropReason.ANALYSIS_BEHIND: "the analysis is behind and has priority",
+    DropReason.DISK_SLOW: "the disk is too slow",
+    DropReason.DISK_FULL: "the disk is nearly full",
+    DropReason.DISK_REFUSED: "the disk refuses writes",
+}
+
+Position = tuple[int, int]
+"""Epoch, and index after the last sample."""
 
 
 @dataclass
-class Hole:
-    """Samples that were offered and are left out, all of one epoch.
+class Omission:
+    """Samples of one epoch that were dropped since the last recorded block.
 
     Parameters
     ----------
     n_samples
-        By reason, per channel.
+        Samples per channel, by reason.
     """
 
     epoch: int = 0
     n_samples: Counter[str] = field(default_factory=Counter)
 
     def add(self, epoch: int, rejected: Iterable[Rejection]) -> None:
-        """Leave out more; what was of an earlier epoch has no place in a later one."""
+        """Add dropped samples; those of an earlier epoch are forgotten."""
         if epoch != self.epoch:
             self.epoch, self.n_samples = epoch, Counter()
         for each in rejected:
             self.n_samples[each.reason] += each.n_samples
 
-    def skip(self, block: SampleBlock, reason: str) -> None:
-        """Leave out a block, with what was refused before it."""
+    def add_block(self, block: SampleBlock, reason: str) -> None:
+        """Add a block, and the samples that were rejected before it."""
         self.add(block.epoch, (*block.rejected, Rejection(reason, block.n_samples)))
 
     def before(self, block: SampleBlock) -> SampleBlock:
-        """The block that says what is missing before it."""
+        """Return a block that reports the dropped samples as rejected before it."""
         if not self.n_samples or self.epoch != block.epoch:
             return block
         total = self.n_samples.copy()
@@ -68,169 +78,160 @@ class Hole:
         return replace(block, rejected=tuple(Rejection(r, n) for r, n in total.items()))
 
     def clear(self) -> None:
-        """Begin anew: it has been said."""
+        """Forget samples that a recorded block has reported."""
         self.n_samples = Counter()
 
 
-class TapeError(Exception):
-    """Samples could not be kept; the message says of which unit and why."""
+def unseen_part(block: SampleBlock, end: Position | None) -> SampleBlock | None:
+    """Return the part of a block after a position; None if all of it lies before."""
+    if end is None or end[0] != block.epoch or block.first_index >= end[1]:
+        return block
+    return None if block.stop_index <= end[1] else block.from_sample(end[1] - block.first_index)
 
 
-class UnitTape:
-    """Puts blocks one after the other into stretches.
+class RecordingError(Exception):
+    """Samples were not recorded; the message states the unit and the reason."""
+
+
+class UnitRecorder:
+    """Writes the blocks of one unit into consecutive segments.
 
     Parameters
     ----------
     end
-        Epoch and index up to which the unit is recorded already; None if nothing is known.
+        Position up to which the unit is already recorded; None if unknown.
 
     Attributes
     ----------
     ended
-        Stretches that are to be joined.
+        Segments that are to be joined.
     n_written, n_refused
-        Samples per channel that are on the disk since the start, and that the disk refused.
+        Samples per channel since the start that were synced, and that the disk refused.
     """
 
     def __init__(
         self,
         root: Path,
         unit: RecordedUnit,
-        settings: TapeSettings,
-        end: tuple[int, int] | None = None,
+        settings: SegmentSettings,
+        end: Position | None = None,
     ) -> None:
         self._root, self._unit, self._settings = root, unit, settings
         self._end = end
         self._has_begun = False
-        self._stretch: Stretch | None = None
-        self._hole = Hole()
+        self._segment: Segment | None = None
+        self._omission = Omission()
         self.ended: list[Path] = []
         self.n_written = self.n_refused = 0
 
-    def skip(self, hole: Hole) -> None:
-        """Note what was left out before the next block."""
-        self._hole.add(hole.epoch, (Rejection(r, n) for r, n in hole.n_samples.items()))
-
     def write(self, block: SampleBlock, now_s: float) -> None:
-        """Append a block; a stretch that it does not fit is ended.
+        """Append a block; start a new segment if it does not fit the open one.
 
         Raises
         ------
-        TapeError
-            If it cannot be kept, or if what was to be kept before it cannot.
+        RecordingError
+            If the block, or samples before it, cannot be recorded.
         """
-        fresh = self._fresh(block)
-        if fresh is None:
+        unseen = unseen_part(block, self._end)
+        if unseen is None:
             return
-        block = fresh
-        if self._stretch is not None and not self._stretch.goes_on_to(block):
+        if self._segment is not None and not self._segment.covers(unseen):
             self.end()
         try:
-            self._put(block, now_s)
+            self._put(unseen, now_s)
         except (ConfigError, OSError):
-            with suppress(TapeError):  # counted; it may be of another type than the stretch
+            with suppress(RecordingError):  # counted; samples may be of another type now
                 self.end()
-            self._try_again(block, now_s)
-        self._hole.clear()
-        self._has_begun, self._end = True, (block.epoch, block.stop_index)
+            self._retry(unseen, now_s)
+        self._omission.clear()
+        self._has_begun, self._end = True, (unseen.epoch, unseen.stop_index)
         self.sync(now_s)
 
     def sync(self, now_s: float) -> None:
-        """Bring the part that is being written to the disk, if it is time.
+        """Sync the open part to the disk if it is due.
 
         Raises
         ------
-        TapeError
-            If it cannot be kept.
+        RecordingError
+            If the disk refuses.
         """
-        if self._stretch is not None and self._stretch.is_due(now_s):
-            self._finish_part(self._stretch)
+        if self._segment is not None and self._segment.is_due(now_s):
+            self._finish_part(self._segment)
 
     def end(self) -> None:
-        """End the stretch, with what there is.
+        """End the open segment.
 
         Raises
         ------
-        TapeError
-            If its last part cannot be kept.
+        RecordingError
+            If its last part cannot be recorded.
         """
-        stretch, self._stretch = self._stretch, None
-        if stretch is not None:
-            self.ended.append(stretch.folder)
-            self._finish_part(stretch)
-
-    def _fresh(self, block: SampleBlock) -> SampleBlock | None:
-        """What of a block is not recorded already, as after a restart; None if all of it is."""
-        if self._end is None or self._end[0] != block.epoch or block.first_index >= self._end[1]:
-            return block
-        if block.stop_index <= self._end[1]:
-            return None
-        return block.from_sample(self._end[1] - block.first_index)
+        segment, self._segment = self._segment, None
+        if segment is not None:
+            self.ended.append(segment.folder)
+            self._finish_part(segment)
 
     def _put(self, block: SampleBlock, now_s: float) -> None:
-        told = self._hole.before(block)
-        if self._stretch is None:
-            told = self._after_end(told)
+        block = self._omission.before(block)
+        if self._segment is None:
+            block = self._after_end(block)
             self._root.mkdir(parents=True, exist_ok=True)
-            self._stretch = Stretch(self._root, self._unit, told, self._settings)
-        self._stretch.write(told, now_s)
+            self._segment = Segment(self._root, self._unit, block, self._settings)
+        self._segment.write(block, now_s)
 
-    def _try_again(self, block: SampleBlock, now_s: float) -> None:
+    def _retry(self, block: SampleBlock, now_s: float) -> None:
         try:
             self._put(block, now_s)
         except (ConfigError, OSError) as error:
-            self._hole.skip(block, Shed.DISK_REFUSED)
+            self._omission.add_block(block, DropReason.DISK_REFUSED)
             self.n_refused += block.n_samples
-            with suppress(TapeError):
+            with suppress(RecordingError):
                 self.end()
-            raise self._told(error) from error
+            raise self._error(error) from error
 
-    def _finish_part(self, stretch: Stretch) -> None:
-        n_samples = stretch.n_unsynced
+    def _finish_part(self, segment: Segment) -> None:
+        n_samples = segment.n_unsynced
         try:
-            self.n_written += stretch.finish_part()
+            self.n_written += segment.finish_part()
         except (ConfigError, OSError) as error:
             self.n_refused += n_samples
             if self._end is not None:
-                self._hole.add(self._end[0], [Rejection(Shed.DISK_REFUSED, n_samples)])
-            raise self._told(error) from error
+                self._omission.add(self._end[0], [Rejection(DropReason.DISK_REFUSED, n_samples)])
+            raise self._error(error) from error
 
     def _after_end(self, block: SampleBlock) -> SampleBlock:
-        """The first block of a stretch, which says what is missing since the one before it."""
+        """Return the first block of a segment with the samples missing since the last segment."""
         if self._end is None or self._end[0] != block.epoch:
             return block
         n_missing = block.first_index - self._end[1] - sum(r.n_samples for r in block.rejected)
         if n_missing <= 0:
             return block
-        reason = Shed.GAP_BEFORE if self._has_begun else Shed.NOT_RUNNING
+        reason = DropReason.GAP_BEFORE if self._has_begun else DropReason.NOT_RUNNING
         return replace(block, rejected=(*block.rejected, Rejection(reason, n_missing)))
 
-    def _told(self, error: Exception) -> TapeError:
-        return TapeError(f"samples of unit {self._unit.unit} are not recorded: {error}")
+    def _error(self, error: Exception) -> RecordingError:
+        return RecordingError(f"samples of unit {self._unit.unit} are not recorded: {error}")
 
 
 MAX_TRIED = 3
-"""Newest recordings that are looked at, should the newest be damaged."""
+"""Number of newest recordings that are tried if the newest is damaged."""
 
 
-def last_end(root: Path, unit: str) -> tuple[int, int] | None:
-    """Epoch and index after the last sample that is recorded of a unit; None if none is known."""
-    # another unit may have a name that begins like that of this one
-    of_unit = (path for path in root.glob(f"{unit}-*-{KIND}*") if unit_of(path.name) == unit)
-    for folder in sorted(of_unit, reverse=True)[:MAX_TRIED]:
+def last_end(root: Path, unit: str) -> Position | None:
+    """Return the position up to which a unit is recorded; None if unknown."""
+    # the identifier of another unit may begin with that of this one
+    names = (path for path in root.glob(f"{unit}-*-{CONTINUOUS}*") if unit_of(path.name) == unit)
+    for folder in sorted(names, reverse=True)[:MAX_TRIED]:
         try:
-            if read_manifest(folder).unit == unit:
-                return _end_of(folder)
+            if read_manifest(folder).unit != unit:
+                continue
+            end = None
+            for head in open_recording(folder).heads():
+                end = (head.epoch, head.first_index + head.n_samples)
         except ConfigError:
-            continue  # the check of recordings tells of it
+            continue  # reported by the check of recordings
+        return end
     return None
-
-
-def _end_of(folder: Path) -> tuple[int, int] | None:
-    end = None
-    for head in open_recording(folder).heads():
-        end = (head.epoch, head.first_index + head.n_samples)
-    return end
 
 
 log = structlog.get_logger()
@@ -238,114 +239,102 @@ log = structlog.get_logger()
 WRITE_EVERY_S = 1.0
 
 MAX_WAIT_S = 20.0
-"""Longest that blocks wait for a slow disk, which is also what a kill may cost beyond a part."""
+"""Maximum time in the queue to a slow disk; a kill costs at most the queue and the open part."""
 
 MAX_WAITING_SAMPLES = 20_000_000
-"""Of all channels and units together: 80 MB."""
+"""Maximum of all channels and units in the queue: 80 MB."""
 
 MAX_BUSY_S = 60.0
-"""Longest that the disk may take for what is handed to it at once."""
+"""Maximum duration of one write."""
 
 MAX_END_S = 2.0
-"""Longest that the end of the service waits for stretches to be joined; the next start does it."""
+"""Maximum time for joining segments at the end; the next start joins the others."""
 
-TOLD_S = 60.0
-"""For how long after the last sample that was let go of this counts as trouble."""
-
-
-def unpressed() -> Shed | None:
-    """Nothing is more urgent."""
-    return None
+REPORTED_S = 60.0
+"""Time after the last dropped sample for which recording counts as failing."""
 
 
-class Tape:
-    """The continuous recordings of all units; told of every block, writes in a thread of its own.
+class ContinuousRecorder(WriterThread):
+    """Continuous recordings of all units; receives every block.
 
     Parameters
     ----------
     root
         Folder of the recordings.
     units
-        What is recorded; blocks of others are let pass.
-    press
-        Why nothing is to be recorded just now, if so.
+        Units to record; blocks of others are ignored.
+    pressure
+        Returns why recording pauses now, or None.
     owned
-        Units whose recordings may have been left unfinished, recorded now or not.
+        Further units whose recordings may have been left unfinished.
 
     Attributes
     ----------
-    n_shed
-        Samples per channel that were offered and are not recorded, by reason.
-    n_finished
-        Recordings that have got their name.
-    error
-        Why samples could not be written last; None since they could.
+    n_dropped
+        Samples per channel that were not recorded, by reason.
     """
 
     def __init__(
         self,
         root: Path,
         units: Mapping[str, RecordedUnit],
-        settings: TapeSettings,
+        settings: SegmentSettings,
         clock: Clock,
-        press: Callable[[], Shed | None] = unpressed,
+        pressure: Callable[[], DropReason | None] = lambda: None,
         owned: Collection[str] = (),
     ) -> None:
+        super().__init__("tape", "samples", clock)
         self._owned = {*units, *owned}
         self._root, self._units, self._settings = root, units, settings
-        self._clock, self._press = clock, press
-        self._tapes: dict[str, UnitTape] = {}
-        self._seen: dict[str, tuple[int, int]] = {}
-        self._holes: dict[str, Hole] = {unit: Hole() for unit in units}
+        self._pressure = pressure
+        self._recorders: dict[str, UnitRecorder] = {}
+        self._seen: dict[str, Position] = {}
+        self._omissions: dict[str, Omission] = {unit: Omission() for unit in units}
         self._waiting: deque[tuple[float, SampleBlock]] = deque()
         self._n_waiting = 0
-        self._busy_since_s: float | None = None
-        self._shed_s: float | None = None
-        self._shed_reason: Shed | None = None
+        self._dropped: tuple[float, DropReason] | None = None
         self._unjoined: deque[Path] = deque()
         self._is_closed = False
-        self._thread = ThreadPoolExecutor(1, thread_name_prefix="tape")
-        self.error: str | None = None
-        self.n_shed: Counter[Shed] = Counter()
-        self.n_finished = 0
+        self.n_dropped: Counter[DropReason] = Counter()
 
     @property
     def units(self) -> Iterable[str]:
-        """Whose samples are recorded."""
+        """Units whose samples are recorded."""
         return self._units
 
     @property
     def n_written(self) -> int:
-        """Samples per channel that are on the disk, of all units since the start."""
-        return sum(tape.n_written for tape in self._tapes.values())
+        """Samples per channel synced to the disk since the start, of all units."""
+        return sum(recorder.n_written for recorder in self._recorders.values())
 
     @property
     def trouble(self) -> str | None:
-        """Why samples are not recorded now, or were not in the last minute."""
+        """Why samples were not recorded in the last minute."""
         if self.error is not None:
             return self.error
-        if self._shed_s is None or self._clock.monotonic_s() - self._shed_s > TOLD_S:
+        if self._dropped is None or self._clock.monotonic_s() - self._dropped[0] > REPORTED_S:
             return None
-        return WORDS[self._shed_reason or Shed.DISK_SLOW]
+        return WORDS[self._dropped[1]]
 
     def take(self, block: SampleBlock) -> None:
-        """Take in a block, or let it go and remember how much that was; never waits."""
+        """Queue a block, or drop and count it; never waits."""
         if block.unit not in self._units or self._is_closed:
             return
-        fresh = self._fresh(block)
-        if fresh is None:
+        unseen = unseen_part(block, self._seen.get(block.unit))
+        if unseen is None:
             return
-        reason = self._press() or self._slow()
+        self._seen[block.unit] = (block.epoch, block.stop_index)
+        reason = self._pressure() or self._slowness()
         if reason is not None:
-            self._shed(fresh, reason)
+            self._drop(unseen, reason)
             return
-        told = self._holes[block.unit].before(fresh)
-        self._holes[block.unit].clear()
-        self._waiting.append((self._clock.monotonic_s(), told))
-        self._n_waiting += told.counts.size
+        unseen = self._omissions[block.unit].before(unseen)
+        self._omissions[block.unit].clear()
+        self._waiting.append((self._clock.monotonic_s(), unseen))
+        self._n_waiting += unseen.counts.size
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Write what is to be written, for ever; afterwards `close`."""
+        """Write queued blocks until cancelled; call `close` afterwards."""
         pulse.beat(10 * MAX_BUSY_S)
         await self._in_thread(self._recover)
         if not self._units:
@@ -357,37 +346,26 @@ class Tape:
             await self._clock.sleep(WRITE_EVERY_S)
 
     async def close(self) -> None:
-        """Finish what is being made, with what there is, and let go of the thread."""
+        """Finish all recordings with the samples so far, and stop the thread."""
         self._is_closed = True
         await self._write()
         await self._in_thread(self._end)
         self._thread.shutdown(wait=False)
 
-    def _fresh(self, block: SampleBlock) -> SampleBlock | None:
-        """What of a block has not been here; None if all of it has."""
-        epoch, stop = self._seen.get(block.unit, (None, 0))
-        if epoch == block.epoch and block.first_index < stop:
-            if block.stop_index <= stop:
-                return None
-            block = block.from_sample(stop - block.first_index)
-        self._seen[block.unit] = (block.epoch, block.stop_index)
-        return block
-
-    def _slow(self) -> Shed | None:
-        """Whether the disk does not keep up."""
-        now_s = self._clock.monotonic_s()
-        since = [self._busy_since_s] if self._busy_since_s is not None else []
+    def _slowness(self) -> DropReason | None:
+        """Return `DISK_SLOW` if the disk does not keep up."""
+        since = [] if self._busy_since_s is None else [self._busy_since_s]
         since += [self._waiting[0][0]] if self._waiting else []
-        is_late = bool(since) and now_s - min(since) > MAX_WAIT_S
-        is_late = is_late or self._n_waiting > MAX_WAITING_SAMPLES
-        return Shed.DISK_SLOW if is_late else None
+        is_late = bool(since) and self._clock.monotonic_s() - min(since) > MAX_WAIT_S
+        is_slow = is_late or self._n_waiting > MAX_WAITING_SAMPLES
+        return DropReason.DISK_SLOW if is_slow else None
 
-    def _shed(self, block: SampleBlock, reason: Shed) -> None:
+    def _drop(self, block: SampleBlock, reason: DropReason) -> None:
         if self.trouble is None:
             log.warning("samples are not recorded", reason=WORDS[reason])
-        self._holes[block.unit].skip(block, reason)
-        self.n_shed[reason] += block.n_samples
-        self._shed_s, self._shed_reason = self._clock.monotonic_s(), reason
+        self._omissions[block.unit].add_block(block, reason)
+        self.n_dropped[reason] += block.n_samples
+        self._dropped = (self._clock.monotonic_s(), reason)
 
     async def _write(self) -> None:
         blocks = [block for _, block in self._waiting]
@@ -396,40 +374,38 @@ class Tape:
         await self._in_thread(self._put, blocks)
 
     def _put(self, blocks: Sequence[SampleBlock]) -> None:
-        """Write blocks, and join one stretch; in the thread."""
+        """Write blocks and join one segment; runs in the thread."""
         now_s, error = self._clock.monotonic_s(), None if blocks else self.error
         for block in blocks:
-            write = methodcaller("write", block, now_s)
-            error = self._tried(block.unit, write) or error
-        for unit in self._tapes:
-            error = self._tried(unit, methodcaller("sync", now_s)) or error
-        self._tell(self._join_one() or error)
+            error = self._try(block.unit, methodcaller("write", block, now_s)) or error
+        for unit in self._recorders:
+            error = self._try(unit, methodcaller("sync", now_s)) or error
+        self._note(self._join_one() or error)
 
-    def _tried(self, unit: str, do: Callable[[UnitTape], None]) -> str | None:
-        tape = self._tapes.get(unit) or self._begin(unit)
-        before = tape.n_refused
+    def _try(self, unit: str, do: Callable[[UnitRecorder], None]) -> str | None:
+        """Call a recorder, which is created at its first block; return the error, if any."""
+        if unit not in self._recorders:
+            self._recorders[unit] = UnitRecorder(
+                self._root, self._units[unit], self._settings, last_end(self._root, unit)
+            )
+        recorder = self._recorders[unit]
+        before = recorder.n_refused
         try:
-            do(tape)
-        except TapeError as error:
-            self.n_shed[Shed.DISK_REFUSED] += tape.n_refused - before
+            do(recorder)
+        except RecordingError as error:
             return str(error)
         finally:
-            self._unjoined.extend(tape.ended)
-            tape.ended.clear()
-        self.n_shed[Shed.DISK_REFUSED] += tape.n_refused - before
+            self._unjoined.extend(recorder.ended)
+            recorder.ended.clear()
+            self.n_dropped[DropReason.DISK_REFUSED] += recorder.n_refused - before
         return None
-
-    def _begin(self, unit: str) -> UnitTape:
-        end = last_end(self._root, unit)
-        tape = self._tapes[unit] = UnitTape(self._root, self._units[unit], self._settings, end)
-        return tape
 
     def _join_one(self) -> str | None:
         if not self._unjoined:
             return None
         folder = self._unjoined[0]
         try:
-            self.n_finished += join(folder)
+            join(folder)
         except (ConfigError, OSError) as error:
             self._unjoined.rotate(-1)
             return f"{folder.name} cannot be finished: {error}"
@@ -437,44 +413,24 @@ class Tape:
         return None
 
     def _end(self) -> None:
-        """End all stretches, and join what there is time for; in the thread."""
-        for unit in list(self._tapes):
-            self._tell(self._tried(unit, UnitTape.end))
+        """End all segments, and join them while there is time; runs in the thread."""
+        for unit in list(self._recorders):
+            self._note(self._try(unit, UnitRecorder.end))
         until_s = self._clock.monotonic_s() + MAX_END_S
         for _ in range(len(self._unjoined)):
             if self._clock.monotonic_s() < until_s:
-                self._tell(self._join_one())
+                self._note(self._join_one())
 
     def _recover(self) -> None:
-        """Make recordings of what a crash has left; in the thread."""
+        """Finish the recordings that a crash left in parts; runs in the thread."""
         try:
             left = unjoined(self._root, self._owned)
-            clear_unfinished(self._root, self._owned)
+            remove_incomplete(self._root, self._owned)
         except OSError as error:
-            self._tell(str(error))
+            self._note(str(error))
             return
         self._unjoined.extend(left)
         for folder in left:
-            self._tell(self._join_one())
+            self._note(self._join_one())
             if folder.exists():
-                log.warning("an unfinished recording is finished", folder=folder.name)
-
-    def _tell(self, error: str | None) -> None:
-        if error is not None and error != self.error:
-            log.error("samples are not recorded", reason=error)
-        if error is None and self.error is not None:
-            log.info("samples are recorded again")
-        self.error = error
-
-    async def _in_thread(self, do: Callable[..., None], *arguments: object) -> None:
-        self._busy_since_s = self._clock.monotonic_s()
-        await asyncio.get_running_loop().run_in_executor(self._thread, do, *arguments)
-        self._busy_since_s = None
-
-
-WORDS = {
-    Shed.ANALYSIS_BEHIND: "the analysis is behind, and comes first",
-    Shed.DISK_SLOW: "the disk is too slow for them",
-    Shed.DISK_FULL: "the disk is nearly full",
-    Shed.DISK_REFUSED: "the disk refuses them",
-}
+                log.warning("an unfinished recording is completed", folder=folder.name)

@@ -1,132 +1,104 @@
-"""Names, places and states of recordings in their folders."""
+"""Names and states of recordings in their folders."""
 
 import os
 import re
 import uuid
 from collections.abc import Container, Iterator
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 
 from acquisition.recordings.manifest import BLOCKS, MANIFEST, SAMPLES
 from acquisition.recordings.writer import INCOMPLETE
-from core.alarms.alarm import AlarmEvent
 from core.units import NS_PER_S
 from service.runtime.files import write_whole
 
-KIND = "continuous"
-"""Last word of a stretch's name, where a capture has the kind of its alarm."""
+CONTINUOUS = "continuous"
+"""Last word of the name of a continuous recording; that of a capture is the kind of its alarm."""
 
 PARTS = ".parts"
-"""Ending of the folder that holds the parts of a stretch until they are joined."""
+"""Suffix of the folder that holds the parts of a segment until they are joined."""
 
-NAME = re.compile(r"(.+)-\d{8}T\d{6}\.\d{3}Z-")
-"""How the name of a recording begins: with its unit and its time."""
+REMOVED = ".removed"
+"""Suffix while a recording is being removed."""
+
+LEFT = ".left"
+"""Suffix of what remains of a removed recording: files that padwatch did not write."""
 
 DAMAGED = ".damaged"
-"""Ending of what was set aside because it cannot be read."""
+"""Suffix of a recording that cannot be read."""
 
-
-def stretch_folder(root: Path, unit: str, start_ns: int) -> Path:
-    """A folder for a stretch that is not there yet, in any state."""
-    seconds, ns = divmod(start_ns, NS_PER_S)
-    moment = f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{ns // 1_000_000:03d}Z"
-    name = f"{unit}-{moment}-{KIND}"
-    folder, n = root / name, 1
-    while os.path.lexists(folder) or os.path.lexists(parts_folder(folder)):
-        n += 1
-        folder = root / f"{name}-{n}"
-    return folder
-
-
-def unit_of(name: str) -> str | None:
-    """The unit that a recording is of by its name; None if that is not the name of one."""
-    found = NAME.match(name)
-    return found[1] if found else None
-
-
-def parts_folder(folder: Path) -> Path:
-    """Where the parts of a stretch are until they are joined."""
-    return folder.with_name(folder.name + PARTS)
-
-
-def joined_folder(parts: Path) -> Path:
-    """Where the stretch is going to be whose parts are in a folder."""
-    return parts.with_name(parts.name.removesuffix(PARTS))
-
-
-def part_folder(folder: Path, number: int) -> Path:
-    """A part of a stretch."""
-    return parts_folder(folder) / f"{number:05d}"
-
-
-def damaged_folder(parts: Path, part: Path) -> Path:
-    """Where a part goes that cannot be read."""
-    stem = joined_folder(parts).name
-    folder, n = parts.with_name(f"{stem}-{part.name}{DAMAGED}"), 1
-    while os.path.lexists(folder):
-        n += 1
-        folder = parts.with_name(f"{stem}-{part.name}-{n}{DAMAGED}")
-    return folder
-
+UNFINISHED = (INCOMPLETE, PARTS, REMOVED)
 
 ALARM = "alarm.json"
 
 FILES = (ALARM, MANIFEST, BLOCKS, SAMPLES)
-"""All that is ever removed: a folder with anything else in it is none of ours."""
+"""Files of a recording. Nothing else is ever removed."""
+
+_NAME = re.compile(r"(.+)-\d{8}T\d{6}\.\d{3}Z-")
 
 
-def capture_folder(root: Path, event: AlarmEvent) -> Path:
-    """A folder for the capture of an alarm that is not there yet."""
-    seconds, ns = divmod(event.time_ns, NS_PER_S)
+def new_folder(root: Path, unit: str, time_ns: int, kind: str) -> Path:
+    """Return a free folder for a recording of a unit that starts at a time."""
+    seconds, ns = divmod(time_ns, NS_PER_S)
     moment = f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{ns // 1_000_000:03d}Z"
-    name = f"{event.identity.unit}-{moment}-{event.identity.kind}"
-    folder, n = root / name, 1
-    while os.path.lexists(folder) or os.path.lexists(aside(folder)):
-        n += 1
-        folder = root / f"{name}-{n}"
-    return folder
+    return _free(root / f"{unit}-{moment}-{kind}", "", PARTS, INCOMPLETE)
 
 
-def aside(folder: Path) -> Path:
-    """Where a capture is while it is being written."""
+def unit_of(name: str) -> str | None:
+    """Return the unit in the name of a recording; None if it is not such a name."""
+    found = _NAME.match(name)
+    return found[1] if found else None
+
+
+def incomplete_folder(folder: Path) -> Path:
+    """Return the folder of a recording while it is being written."""
     return folder.with_name(folder.name + INCOMPLETE)
 
 
-def clear_leftovers(root: Path, units: Container[str | None]) -> list[Path]:
-    """Remove what was being written of units when the service was killed: it cannot be read.
+def parts_folder(folder: Path) -> Path:
+    """Return the folder of the parts of a segment until they are joined."""
+    return folder.with_name(folder.name + PARTS)
 
-    Other processes may be writing captures of other units.
+
+def damaged_folder(folder: Path, part: Path) -> Path:
+    """Return a free folder for an unreadable part of a segment."""
+    return _suffixed(folder.with_name(f"{folder.name}-{part.name}"), DAMAGED)
+
+
+def remove_incomplete(root: Path, units: Container[str | None]) -> list[Path]:
+    """Remove what was being written for units when the service was killed; it is not readable.
+
+    Recordings of other units are kept: another process may be writing them.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses.
     """
-    left = [p for p in _folders(root) if p.name.endswith(INCOMPLETE) and unit_of(p.name) in units]
-    for path in left:
-        _remove(path)
-    return left
+    found = [
+        path
+        for path in sorted(root.glob(f"*{INCOMPLETE}"))
+        if unit_of(path.name) in units
+        and path.is_dir()
+        and not path.is_symlink()
+        and all(file.name in FILES for file in path.iterdir())
+    ]
+    for path in found:
+        remove_recording(path)
+    return found
 
 
-def _folders(root: Path) -> Iterator[Path]:
-    if not root.is_dir():
-        return iter(())
-    folders = (path for path in root.iterdir() if path.is_dir() and not path.is_symlink())
-    return (path for path in folders if all(file.name in FILES for file in path.iterdir()))
-
-
-def _remove(folder: Path) -> None:
-    for name in FILES:
-        (folder / name).unlink(missing_ok=True)
-    folder.rmdir()
-
-
-REMOVED = ".removed"
-"""Ending of the name while a recording is being taken away."""
-
-LEFT = ".left"
-"""Ending of what is left of one that is gone: files of others, which are none of our business."""
-
-UNFINISHED = (INCOMPLETE, PARTS, REMOVED)
+def remove_recording(folder: Path) -> None:
+    """Remove a recording if it exists, manifest first: without one it is not a recording."""
+    if folder.is_dir():
+        for name in FILES:
+            (folder / name).unlink(missing_ok=True)
+        folder.rmdir()
 
 
 def finished(root: Path) -> Iterator[str]:
-    """Names of the recordings in a folder, damaged ones too; nothing else that lies there.
+    """Yield the names of finished recordings in a folder, including damaged ones.
 
     Raises
     ------
@@ -137,17 +109,16 @@ def finished(root: Path) -> Iterator[str]:
         return
     with os.scandir(root) as entries:
         names = [e.name for e in entries if e.is_dir(follow_symlinks=False)]
-    others = (*UNFINISHED, LEFT)
-    yield from (name for name in names if not name.endswith(others) and name[0] != ".")
+    yield from (n for n in names if not n.endswith((*UNFINISHED, LEFT)) and n[0] != ".")
 
 
 def is_recording(folder: Path) -> bool:
-    """Whether a folder holds a recording or what is left of one, and nothing else.
+    """Return whether a folder holds a recording, or the rest of one, and nothing else.
 
     Raises
     ------
     OSError
-        If the disk refuses; a folder that has no name of ours may be closed to us.
+        If the disk refuses. A folder without the name of a recording may be inaccessible.
     """
     try:
         names = {path.name for path in folder.iterdir()}
@@ -161,17 +132,17 @@ def is_recording(folder: Path) -> bool:
 
 
 def being_removed(root: Path) -> list[str]:
-    """Names of recordings that are being taken away."""
+    """Return the names of recordings whose removal has begun."""
     return sorted(p.name.removesuffix(REMOVED) for p in root.glob(f"*{REMOVED}") if p.is_dir())
 
 
-def put_out_of_sight(folder: Path) -> None:
-    """Begin to take a recording away: from now on there is none of that name."""
-    folder.rename(_hidden(folder))
+def begin_removal(folder: Path) -> None:
+    """Rename a recording that is to be removed: it is no longer listed."""
+    folder.rename(_removed(folder))
 
 
-def empty(folder: Path) -> None:
-    """Delete the files of a recording that was put out of sight; may be done again.
+def delete_files(folder: Path) -> None:
+    """Delete the files of a recording whose removal has begun; may be repeated.
 
     Raises
     ------
@@ -179,52 +150,40 @@ def empty(folder: Path) -> None:
         If the disk refuses.
     """
     for name in FILES:
-        (_hidden(folder) / name).unlink(missing_ok=True)
+        (_removed(folder) / name).unlink(missing_ok=True)
 
 
 def finish_removal(folder: Path) -> Path | None:
-    """Remove what `empty` has left; where it is from now on if it holds what is not ours.
+    """Remove the folder after `delete_files`.
 
-    That gets a name by which nobody takes it for a recording or tries to remove it again.
+    Returns
+    -------
+    The renamed folder if it holds files that padwatch did not write, else None.
 
     Raises
     ------
     OSError
         If the disk refuses.
     """
-    hidden = _hidden(folder)
-    names = {path.name for path in hidden.iterdir()}
+    removed = _removed(folder)
+    names = {path.name for path in removed.iterdir()}
     if names & set(FILES):
-        return None  # it was not emptied, which was told
+        return None  # the failure was reported when files were deleted
     if not names:
-        hidden.rmdir()
+        removed.rmdir()
         return None
-    return _renamed(hidden, folder.name, LEFT)
+    return removed.rename(_suffixed(folder, LEFT))
 
 
 def set_aside(folder: Path) -> Path:
-    """Give what cannot be read a name that says so; return where it is then."""
+    """Mark a recording as damaged by its name; return its new folder."""
     if folder.name.endswith(DAMAGED):
         return folder
-    return _renamed(folder, folder.name, DAMAGED)
-
-
-def _hidden(folder: Path) -> Path:
-    return folder.with_name(folder.name + REMOVED)
-
-
-def _renamed(folder: Path, stem: str, ending: str) -> Path:
-    """Give a folder a name that is free."""
-    wanted, n = folder.with_name(f"{stem}{ending}"), 1
-    while os.path.lexists(wanted):
-        n += 1
-        wanted = folder.with_name(f"{stem}-{n}{ending}")
-    folder.rename(wanted)
-    return wanted
+    return folder.rename(_suffixed(folder, DAMAGED))
 
 
 def n_bytes_of(folder: Path) -> int:
-    """Size of all files of a recording that are there."""
+    """Return the size of those files of a recording that can be read."""
     sizes = 0
     for name in FILES:
         try:
@@ -234,18 +193,18 @@ def n_bytes_of(folder: Path) -> int:
     return sizes
 
 
-FILE = "place.txt"
+PLACE_FILE = "place.txt"
 
 
 def place_of(data_folder: Path) -> str:
-    """A name that the data folder keeps for ever; made when it is asked for first.
+    """Return the permanent identifier of a data folder; create it on first use.
 
     Raises
     ------
     OSError
         If the disk refuses.
     """
-    path = data_folder / FILE
+    path = data_folder / PLACE_FILE
     try:
         found = path.read_text(encoding="ascii", errors="replace").strip()
         if re.fullmatch(r"[0-9a-f]{32}", found):
@@ -255,3 +214,23 @@ def place_of(data_folder: Path) -> str:
     name = uuid.uuid4().hex
     write_whole(path, f"{name}\n".encode("ascii"))
     return name
+
+
+def _removed(folder: Path) -> Path:
+    return folder.with_name(folder.name + REMOVED)
+
+
+def _suffixed(folder: Path, suffix: str) -> Path:
+    """Return a free folder with a suffix, numbered before the suffix if necessary."""
+    free = _free(folder, suffix)
+    return free.with_name(free.name + suffix)
+
+
+def _free(folder: Path, *suffixes: str) -> Path:
+    """Return a folder, numbered if necessary, that exists with none of the suffixes."""
+    names = (folder.name if n == 1 else f"{folder.name}-{n}" for n in count(1))
+    return next(
+        found
+        for found in map(folder.with_name, names)
+        if not any(os.path.lexists(f"{found}{suffix}") for suffix in suffixes)
+    )

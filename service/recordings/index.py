@@ -1,4 +1,4 @@
-"""Which recordings there are, and whether each is whole."""
+"""Index of recordings, and the inspection of each."""
 
 import errno
 import hashlib
@@ -23,33 +23,38 @@ ON_DISK = (WaveformState.PRESENT, WaveformState.DAMAGED)
 
 
 class Index:
-    """All entries but those of what was removed; used by one thread."""
+    """Entries of all recordings but removed ones; used by one thread."""
 
     def __init__(self, store: WaveformStore, place: str) -> None:
         self._store, self.place = store, place
         self._files = {(file.kind, file.name): file for file in store.files(place)}
-        self._owed: dict[Key, WaveformFile] = {}
+        self._removed: dict[Key, WaveformFile] = {}
 
     def get(self, kind: WaveformKind, name: str) -> WaveformFile | None:
-        """The entry of a recording."""
+        """Return the entry of a recording."""
         return self._files.get((kind, name))
 
     def names(self, kind: WaveformKind) -> set[str]:
-        """Names of the recordings of a kind that should be on the disk."""
-        return {f.name for f in self._files.values() if f.kind is kind and f.state in ON_DISK}
+        """Return the names of the recordings of a kind that should be on the disk."""
+        return {file.name for file in self.on_disk if file.kind is kind}
 
     @property
     def on_disk(self) -> Sequence[WaveformFile]:
-        """Recordings that are there, damaged or not."""
+        """Recordings on the disk, including damaged ones."""
         return [file for file in self._files.values() if file.state in ON_DISK]
 
     @property
+    def whole(self) -> Sequence[WaveformFile]:
+        """Recordings on the disk that are not known to be damaged."""
+        return [f for f in self._files.values() if f.state is WaveformState.PRESENT]
+
+    @property
     def faults(self) -> Mapping[str, str]:
-        """Why each damaged recording is none to be served, by name."""
+        """Fault of each damaged recording, by name."""
         return {f.name: f.reason for f in self._files.values() if f.state is WaveformState.DAMAGED}
 
     def put(self, files: Iterable[WaveformFile]) -> None:
-        """Write entries.
+        """Add or replace entries.
 
         Raises
         ------
@@ -61,77 +66,58 @@ class Index:
             self._store.put(list(found.values()))
             self._files |= found
             for key in found:
-                self._owed.pop(key, None)  # there is one of that name again
+                self._removed.pop(key, None)  # the name is in use again
 
     def remove(self, file: WaveformFile, reason: str, now_ns: int) -> None:
-        """Strike out what is gone; `settle` tells the store."""
+        """Remove an entry; `store_removals` writes this to the store."""
         gone = replace(file, state=WaveformState.REMOVED, reason=reason, changed_ns=now_ns)
         self._files.pop((file.kind, file.name), None)
-        self._owed[file.kind, file.name] = gone
+        self._removed[file.kind, file.name] = gone
 
-    def settle(self) -> None:
-        """Tell the store what is gone; what it does not take is told the next time.
-
-        Raises
-        ------
-        StoreError
-            If it takes nothing.
-        """
-        if self._owed:
-            self._store.put(list(self._owed.values()))
-            self._owed.clear()
-
-    def mark(
-        self, files: Iterable[WaveformFile], state: WaveformState, reason: str, now_ns: int
-    ) -> None:
-        """Give entries another state.
+    def store_removals(self) -> None:
+        """Write removals to the store; after an error, the next call writes them.
 
         Raises
         ------
         StoreError
             If none was written.
         """
-        self.put(replace(f, state=state, reason=reason, changed_ns=now_ns) for f in files)
-
-    @property
-    def whole(self) -> Sequence[WaveformFile]:
-        """Recordings that are there and not known to be damaged."""
-        return [f for f in self._files.values() if f.state is WaveformState.PRESENT]
+        if self._removed:
+            self._store.put(list(self._removed.values()))
+            self._removed.clear()
 
     def forget(self, before_ns: int) -> None:
-        """Drop what has long been gone.
+        """Delete old entries of recordings that are gone.
 
         Raises
         ------
         StoreError
-            If nothing was dropped.
+            If none was deleted.
         """
         self._store.forget(self.place, before_ns)
-        gone = [
-            key
+        self._files = {
+            key: file
             for key, file in self._files.items()
-            if file.state is WaveformState.MISSING and file.changed_ns < before_ns
-        ]
-        for key in gone:
-            del self._files[key]
+            if file.state is not WaveformState.MISSING or file.changed_ns >= before_ns
+        }
 
 
-OF_THE_FILES = (
+DAMAGE_ERRORS = (
     *(errno.ENOENT, errno.EISDIR, errno.ENOTDIR),
     *(errno.ELOOP, errno.EINVAL, errno.EFBIG),
 )
-"""What the system says of what lies there; all else may be otherwise at the next try."""
+"""Errors that show damage of a recording; after all others a retry may succeed."""
 
 
 def inspected(folder: Path, place: str, kind: WaveformKind, now_ns: int) -> WaveformFile:
-    """Read all of a recording and describe it; one that is not what it should be is damaged.
+    """Read all of a recording and return its entry, with its fault if it is damaged.
 
     Raises
     ------
     OSError
-        If the disk or the system refuses to read it now: that says nothing of the recording.
+        If the disk or the system refuses to read it now; the recording may be whole.
     """
-    bare = WaveformFile(
+    entry = WaveformFile(
         place=place,
         kind=kind,
         name=folder.name,
@@ -147,20 +133,21 @@ def inspected(folder: Path, place: str, kind: WaveformKind, now_ns: int) -> Wave
     try:
         summary = summary_of(recording := open_recording(folder))
         return replace(
-            bare,
+            entry,
             unit=recording.manifest.unit,
             start_ns=summary.start_ns,
             stop_ns=summary.stop_ns,
             n_samples=summary.n_samples,
-            checksum=manifest_checksum(folder),
+            checksum=hashlib.sha256((folder / MANIFEST).read_bytes()).hexdigest(),
         )
     except (ConfigError, OSError) as error:
         _raise_refusal(error, folder)
-        return replace(bare, state=WaveformState.DAMAGED, reason=told(error, folder))
+        reason = str(error).replace(str(folder), folder.name)[:500]
+        return replace(entry, state=WaveformState.DAMAGED, reason=reason)
 
 
-def again(known: WaveformFile, folder: Path, now_ns: int) -> WaveformFile:
-    """Read all of a recording that is known; what is otherwise than it was is damaged.
+def reinspected(known: WaveformFile, folder: Path, now_ns: int) -> WaveformFile:
+    """Read all of a known recording again and return its entry; a changed one is damaged.
 
     Raises
     ------
@@ -168,53 +155,30 @@ def again(known: WaveformFile, folder: Path, now_ns: int) -> WaveformFile:
         If the disk or the system refuses to read it now.
     """
     found = inspected(folder, known.place, known.kind, now_ns)
-    if found.state is WaveformState.PRESENT and found.checksum != known.checksum:
-        reason = "its manifest is not the one that it was finished with"
-        found = replace(found, state=WaveformState.DAMAGED, reason=reason)
-    if found.state is WaveformState.PRESENT:
+    if found.state is WaveformState.PRESENT and found.checksum == known.checksum:
         return replace(known, checked_ns=now_ns)
-    return replace(
-        known,
-        state=WaveformState.DAMAGED,
-        reason=found.reason,
-        changed_ns=now_ns,
-        checked_ns=now_ns,
-    )
-
-
-def manifest_checksum(folder: Path) -> str:
-    """SHA-256 of the manifest of a recording.
-
-    Raises
-    ------
-    OSError
-        If it cannot be read.
-    """
-    return hashlib.sha256((folder / MANIFEST).read_bytes()).hexdigest()
+    reason = found.reason or "its manifest is not the one that it was finished with"
+    state = WaveformState.DAMAGED
+    return replace(known, state=state, reason=reason, changed_ns=now_ns, checked_ns=now_ns)
 
 
 def _raise_refusal(error: BaseException, folder: Path) -> None:
-    """Raise what the disk or the system said, unless it said what lies there.
+    """Raise the cause of an error if it is one of the disk or the system, not damage.
 
-    A reader puts its own words around that. An error without a number is one of the format, for
-    which libraries have the same name.
+    The reader wraps such errors. An `OSError` without a number is one of the file format, for
+    which libraries use the same class.
     """
-    said: BaseException | None = error
-    while said is not None:
-        if isinstance(said, MemoryError):
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, MemoryError):
             raise OSError(errno.ENOMEM, os.strerror(errno.ENOMEM), folder.name) from error
-        if isinstance(said, OSError) and said.errno is not None and said.errno not in OF_THE_FILES:
-            raise OSError(said.errno, said.strerror, folder.name) from error
-        said = said.__cause__
+        if isinstance(cause, OSError) and cause.errno not in (None, *DAMAGE_ERRORS):
+            raise OSError(cause.errno, cause.strerror, folder.name) from error
+        cause = cause.__cause__
 
 
-def told(error: Exception, folder: Path) -> str:
-    """An error without the way to the folder."""
-    return str(error).replace(str(folder), folder.name)[:500]
-
-
-class Found(StrEnum):
-    """What a recording is found to be."""
+class RecordingState(StrEnum):
+    """Result of the check of one recording."""
 
     SOUND = "sound"
     NOT_ENTERED = "not_entered"
@@ -224,28 +188,22 @@ class Found(StrEnum):
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What was found of one recording.
-
-    Parameters
-    ----------
-    reason
-        Why it is not sound; empty if it is.
-    """
+class CheckResult:
+    """Result of the check of one recording, with the reason if it is not sound."""
 
     kind: WaveformKind
     name: str
-    found: Found
+    found: RecordingState
     reason: str = ""
 
 
 class RecordingCheck:
-    """Reads all recordings below some folders.
+    """Check of all recordings in some folders.
 
     Parameters
     ----------
     files
-        What the index says of them.
+        Entries of the index.
     """
 
     def __init__(
@@ -261,8 +219,8 @@ class RecordingCheck:
         ]
         self.n_to_read = len(self._there)
 
-    def verdicts(self) -> Iterator[Verdict]:
-        """Read one after the other.
+    def results(self) -> Iterator[CheckResult]:
+        """Read one recording after the other.
 
         Raises
         ------
@@ -272,73 +230,64 @@ class RecordingCheck:
         for kind, name in self._there:
             yield self._read(kind, name)
         for kind, name in sorted(set(self._known) - set(self._there)):
-            yield Verdict(kind, name, Found.MISSING, "the index has it, its folder does not")
+            reason = "the index lists it, but its folder is missing"
+            yield CheckResult(kind, name, RecordingState.MISSING, reason)
         for kind, root in self._roots.items():
             for path in sorted(root.iterdir()) if root.is_dir() else ():
                 if path.name.endswith(UNFINISHED):
-                    words = "it is being written, or a start of the service finishes it"
-                    yield Verdict(kind, path.name, Found.UNFINISHED, words)
+                    reason = "it is being written, or the next start of the service finishes it"
+                    yield CheckResult(kind, path.name, RecordingState.UNFINISHED, reason)
 
-    def _read(self, kind: WaveformKind, name: str) -> Verdict:
+    def _read(self, kind: WaveformKind, name: str) -> CheckResult:
         folder, known = self._roots[kind] / name, self._known.get((kind, name))
         try:
             if known is None or not known.checksum or name.endswith(DAMAGED):
                 found = inspected(folder, "", kind, self._now_ns)
             else:
-                found = again(known, folder, self._now_ns)
-        except OSError as error:  # nothing comes of it here but that somebody looks
-            return Verdict(kind, name, Found.DAMAGED, f"it cannot be read: {error.strerror}")
+                found = reinspected(known, folder, self._now_ns)
+        except OSError as error:  # reported as damaged, so that it is examined
+            reason = f"it cannot be read: {error.strerror}"
+            return CheckResult(kind, name, RecordingState.DAMAGED, reason)
         if found.state is WaveformState.DAMAGED:
-            return Verdict(kind, name, Found.DAMAGED, found.reason)
+            return CheckResult(kind, name, RecordingState.DAMAGED, found.reason)
         if known is None:
-            words = "the running service enters it into the index"
-            return Verdict(kind, name, Found.NOT_ENTERED, words)
-        return Verdict(kind, name, Found.SOUND)
+            reason = "the running service adds it to the index"
+            return CheckResult(kind, name, RecordingState.NOT_ENTERED, reason)
+        return CheckResult(kind, name, RecordingState.SOUND)
 
 
-AGAIN_S = 60.0
-"""After how long one is tried again; the others come meanwhile."""
-
-Words = tuple[int, str, str]
-"""Number and text of an error, and of which recording."""
+RETRY_S = 60.0
+"""Time until a recording is read again after an error of the disk."""
 
 
-class Unread:
-    """Remembers what the disk or the system refused to read, and when that is tried again."""
+class RetryList:
+    """Recordings that the disk or the system refused to read, with the time of the next try."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._refused: dict[tuple[WaveformKind, str], tuple[float, Words]] = {}
+        self._refused: dict[Key, tuple[float, OSError]] = {}
 
     def is_due(self, kind: WaveformKind, name: str) -> bool:
-        """Whether a recording may be read now."""
+        """Return whether a recording may be read now."""
         tried = self._refused.get((kind, name))
-        return tried is None or self._clock.monotonic_s() - tried[0] >= AGAIN_S
+        return tried is None or self._clock.monotonic_s() - tried[0] >= RETRY_S
 
     @contextmanager
     def noted(self, kind: WaveformKind, name: str) -> Iterator[None]:
-        """Remember it if the disk refuses in here, and forget it if it does not."""
+        """Add the recording if the body raises `OSError`, else remove it."""
         try:
             yield
         except OSError as error:
-            words = (error.errno or 0, error.strerror or str(error), name)
-            self._refused[kind, name] = (self._clock.monotonic_s(), words)
+            refusal = OSError(error.errno or 0, error.strerror or str(error), name)
+            self._refused[kind, name] = (self._clock.monotonic_s(), refusal)
         else:
             self._refused.pop((kind, name), None)
 
     def keep(self, kind: WaveformKind, names: Collection[str]) -> None:
-        """Forget all others of a kind."""
-        gone = [key for key in self._refused if key[0] is kind and key[1] not in names]
-        for key in gone:
-            del self._refused[key]
+        """Remove all other recordings of a kind."""
+        self._refused = {k: v for k, v in self._refused.items() if k[0] != kind or k[1] in names}
 
-    def tell(self) -> None:
-        """Raise what was refused first and still is.
-
-        Raises
-        ------
-        OSError
-            If anything is.
-        """
-        for _, words in self._refused.values():
-            raise OSError(*words)
+    def raise_first(self) -> None:
+        """Raise the error of the recording that was refused first, if there is one."""
+        for _, refusal in self._refused.values():
+            raise refusal.with_traceback(None)

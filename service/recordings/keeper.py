@@ -1,34 +1,38 @@
-"""The loop that looks after the recordings of a folder, in one process."""
+"""Loop that maintains the recordings of a data folder, in one process."""
 
 import asyncio
 import fcntl
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import MappingProxyType
 
 import structlog
 
 from acquisition.clock import Clock
-from service.recordings.retention import Caretaker, Findings, Gauge, Troubles
+from service.recordings.retention import (
+    FirstError,
+    RecordingRetention,
+    RetentionCounts,
+    SpaceGauge,
+)
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.store.waveform_port import WaveformFile, WaveformKind
+from service.store.waveform_port import WaveformKind
 
 log = structlog.get_logger()
 
 LOCK = "recordings.lock"
 
 
-class WatchKeeping:
-    """Held until the process ends, however that happens; the file means nothing by itself."""
+class RecordingLock:
+    """File lock of the process that maintains the recordings; ends with the process."""
 
     def __init__(self, data_folder: Path) -> None:
         self._path = data_folder / LOCK
         self._descriptor: int | None = None
 
-    def take(self) -> bool:
-        """Whether this process is the one; asks anew each time until it is.
+    def acquire(self) -> bool:
+        """Return whether this process holds the lock; try again if it does not.
 
         Raises
         ------
@@ -48,7 +52,7 @@ class WatchKeeping:
         return True
 
     def release(self) -> None:
-        """Let another process do it."""
+        """Release the lock."""
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
@@ -57,56 +61,58 @@ class WatchKeeping:
 LOOK_EVERY_S = 5.0
 
 SHARE = 0.02
-"""Of the time that goes into looking, however many recordings there are."""
+"""Maximum share of time for a run, however many recordings there are."""
 
 MAX_LOOK_S = 600.0
-"""Longest that a look may take: a large recording is read from end to end."""
+"""Maximum duration of a run: a large recording is read from end to end."""
 
-TOLD_AFTER_S = 60.0
-"""For how long something has to fail before an alarm tells of it: what passes is done next time."""
-
-NONE_DAMAGED: Mapping[str, str] = MappingProxyType({})
+LASTING_S = 60.0
+"""Time for which runs must fail before an alarm is raised."""
 
 
-class WaveformKeeper:
-    """Keeps index and folders of recordings together while the service runs.
+class RecordingIndexer:
+    """Maintains the index and the folders of recordings while the service runs.
 
     Parameters
     ----------
     gauge
-        Says how much room is left, whoever looks after the recordings, and if nobody can.
-    hire
-        Makes the caretaker; called in the thread, and again while the store or the disk refuses.
-    watch
-        Says whether it is this process that looks after them.
+        Measures the free space, in every process.
+    open_retention
+        Creates the retention; called in the thread, again after an error.
+    lock
+        Held by the one process that maintains the recordings.
 
     Attributes
     ----------
     faults
-        Why each damaged recording is not served, by name.
+        Fault of each damaged recording, by name.
     n_files, n_bytes
-        Recordings on the disk, by kind.
+        Number and size of the recordings on the disk, by kind.
     trouble
-        Why something of the last look failed; None if nothing did.
+        First error of the last run; None if there was none.
     """
 
     def __init__(
-        self, gauge: Gauge, hire: Callable[[], Caretaker], clock: Clock, watch: WatchKeeping
+        self,
+        gauge: SpaceGauge,
+        open_retention: Callable[[], RecordingRetention],
+        clock: Clock,
+        lock: RecordingLock,
     ) -> None:
         self._gauge = gauge
-        self._hire, self._clock, self._watch = hire, clock, watch
-        self._caretaker: Caretaker | None = None
+        self._open_retention, self._clock, self._lock = open_retention, clock, lock
+        self._retention: RecordingRetention | None = None
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="waveforms")
-        self.faults = NONE_DAMAGED
+        self.faults: Mapping[str, str] = {}
         self.n_files: Mapping[WaveformKind, int] = {}
         self.n_bytes: Mapping[WaveformKind, int] = {}
         self.trouble: str | None = None
-        self._trouble_from_s: float | None = None
+        self._failing_since_s = 0.0
 
     @property
-    def found(self) -> Findings:
-        """What was found and done since the start."""
-        return self._caretaker.found if self._caretaker else Findings()
+    def found(self) -> RetentionCounts:
+        """Counts since the start."""
+        return self._retention.found if self._retention else RetentionCounts()
 
     @property
     def n_lost(self) -> int:
@@ -115,57 +121,51 @@ class WaveformKeeper:
 
     @property
     def lasting_trouble(self) -> str | None:
-        """Why recordings are not looked after as they should be, if that goes on for a minute."""
-        if self.trouble is None or self._trouble_from_s is None:
+        """Why recordings are not maintained, if that has lasted for a minute."""
+        lasts_s = self._clock.monotonic_s() - self._failing_since_s
+        if self.trouble is None or lasts_s < LASTING_S:
             return None
-        if self._clock.monotonic_s() - self._trouble_from_s < TOLD_AFTER_S:
-            return None
-        return f"recordings are not looked after: {self.trouble}"
+        return f"recordings are not maintained: {self.trouble}"
 
     def is_full(self) -> bool:
-        """Whether there is no room for more of what can be done without."""
+        """Return whether too little space is left for continuous recording."""
         return self._gauge.is_full
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Look for ever."""
+        """Maintain the recordings until cancelled."""
         while True:
             pulse.beat(MAX_LOOK_S)
             start_s = self._clock.monotonic_s()
             await asyncio.get_running_loop().run_in_executor(self._thread, self.look)
-            took_s = self._clock.monotonic_s() - start_s
-            pause_s = min(max(LOOK_EVERY_S, took_s / SHARE), MAX_LOOK_S)
+            taken_s = self._clock.monotonic_s() - start_s
+            pause_s = min(max(LOOK_EVERY_S, taken_s / SHARE), MAX_LOOK_S)
             pulse.beat(pause_s)
             await self._clock.sleep(pause_s)
 
     def close(self) -> None:
-        """Let go of the thread."""
+        """Stop the thread and release the lock."""
         self._thread.shutdown(wait=False)
-        self._watch.release()
+        self._lock.release()
 
     def look(self) -> None:
-        """Look once; in the thread."""
-        troubles = Troubles()
-        with troubles.borne():
-            self._gauge.measure()  # first of all: what comes then may take long, or fail
-        with troubles.borne():
-            if self._watch.take():
-                self._caretaker = self._caretaker or self._hire()
-                self._caretaker.look()
-        self._tell(None if troubles.first is None else str(troubles.first))
-        if self._caretaker is not None:
-            self._count(self._caretaker)
+        """Run once; in the thread."""
+        errors = FirstError()
+        with errors.deferred():
+            self._gauge.measure()  # first: the rest may take long, or fail
+        with errors.deferred():
+            if self._lock.acquire():
+                self._retention = self._retention or self._open_retention()
+                self._retention.look()
+        self._note(None if errors.first is None else str(errors.first))
+        if self._retention is not None:
+            files = self._retention.on_disk
+            self.faults = self._retention.faults
+            self.n_files = {k: sum(file.kind is k for file in files) for k in WaveformKind}
+            self.n_bytes = {k: sum(f.n_bytes for f in files if f.kind is k) for k in WaveformKind}
 
-    def _count(self, caretaker: Caretaker) -> None:
-        files: Sequence[WaveformFile] = caretaker.on_disk
-        self.faults = caretaker.faults
-        self.n_files = {k: sum(file.kind is k for file in files) for k in WaveformKind}
-        self.n_bytes = {k: sum(f.n_bytes for f in files if f.kind is k) for k in WaveformKind}
-
-    def _tell(self, trouble: str | None) -> None:
+    def _note(self, trouble: str | None) -> None:
         if trouble is not None and trouble != self.trouble:
-            log.error("recordings are not looked after", reason=trouble)
-        if trouble is None:
-            self._trouble_from_s = None
-        elif self._trouble_from_s is None:
-            self._trouble_from_s = self._clock.monotonic_s()
+            log.error("recordings are not maintained", reason=trouble)
+        if self.trouble is None:
+            self._failing_since_s = self._clock.monotonic_s()
         self.trouble = trouble

@@ -1,4 +1,4 @@
-"""Finished recordings: listed, described, opened, and a stretch of time out of one."""
+"""Library of finished recordings, and a time window of one recording."""
 
 import json
 import re
@@ -16,32 +16,32 @@ from acquisition.recordings.source import all_of
 from acquisition.recordings.summary import RecordingSummary, summary_of
 from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
-from service.recordings.folders import ALARM, FILES, KIND, finished, n_bytes_of, unit_of
+from service.recordings.folders import ALARM, CONTINUOUS, FILES, finished, n_bytes_of, unit_of
 from service.runtime.files import Sink, zipped
 from service.store.waveform_port import WaveformKind
 
-NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,119}")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,119}")
 
-MOMENT = re.compile(r"\d{8}T\d{6}\.\d{3}Z")
-CONTINUOUS = re.compile(rf"{MOMENT.pattern}-{KIND}")
+_TIME = re.compile(r"\d{8}T\d{6}\.\d{3}Z")
+_CONTINUOUS_NAME = re.compile(rf"{_TIME.pattern}-{CONTINUOUS}")
 
 MAX_ALARM_BYTES = 1_000_000
 
 
 @dataclass(frozen=True)
-class Kept:
-    """A recording on the shelf.
+class RecordingEntry:
+    """A recording of the library.
 
     Parameters
     ----------
     manifest
-        None if it cannot be read.
+        Manifest; None if it cannot be read.
     fault
-        Why not.
+        Why the recording is not served; None if it is.
     alarms
-        What it was made for, as its file says it.
+        Alarms that the recording was made for, as its file lists them.
     n_bytes
-        Of all its files.
+        Size of all its files.
     """
 
     name: str
@@ -52,44 +52,44 @@ class Kept:
     n_bytes: int
 
 
-class Shelf:
-    """Recordings below some folders; all methods read the disk, so call them in a thread.
+class RecordingLibrary:
+    """Finished recordings in some folders. All methods read the disk and belong in a thread.
 
     Parameters
     ----------
     roots
-        Need not be there yet.
+        Folders, which need not exist yet.
     faults
-        Recordings that are known to be damaged, by name, and why: nothing of them is handed out.
+        Faults of damaged recordings, by name; these are not opened.
     """
 
     def __init__(self, roots: Sequence[Path], faults: Mapping[str, str] | None = None) -> None:
         self._roots, self._faults = roots, faults or {}
 
     def newest(
-        self, most: int, unit: str | None = None, kind: WaveformKind | None = None
-    ) -> list[Kept]:
-        """The newest recordings, newest first; of one unit, or of all."""
+        self, limit: int, unit: str | None = None, kind: WaveformKind | None = None
+    ) -> list[RecordingEntry]:
+        """Return the newest recordings of one unit or of all, newest first."""
         folders = [
             folder
             for folder in self._folders()
             if unit in (None, unit_of(folder.name)) and kind in (None, kind_of(folder.name))
         ]
         by_age = sorted(folders, key=_age, reverse=True)
-        return [self._kept(folder) for folder in by_age[:most]]
+        return [self._entry(folder) for folder in by_age[:limit]]
 
-    def one(self, name: str) -> Kept | None:
-        """A recording by its name; None if there is none."""
+    def one(self, name: str) -> RecordingEntry | None:
+        """Return the recording of a name; None if it does not exist."""
         folder = self._folder(name)
-        return None if folder is None else self._kept(folder)
+        return None if folder is None else self._entry(folder)
 
     def opened(self, name: str) -> Recording:
-        """A recording that has been checked from end to end.
+        """Open a recording after a check of all its files.
 
         Raises
         ------
         ConfigError
-            If it is damaged, or not there.
+            If it is damaged or does not exist.
         """
         folder = self._folder(name)
         if folder is None:
@@ -99,22 +99,14 @@ class Shelf:
         return open_recording(folder)
 
     def summary(self, name: str) -> RecordingSummary:
-        """What happened in a recording, after it has been checked from end to end.
-
-        Raises
-        ------
-        ConfigError
-            If it is damaged, or not there.
-        """
+        """Return the summary of a recording; raises as `opened` does."""
         return summary_of(self.opened(name))
 
     def zip_pieces(self, name: str) -> Generator[bytes, None, None]:
-        """Its files as one ZIP file, piece by piece, after it has been checked from end to end.
+        """Yield the files of a recording as one ZIP file; raises as `opened` does.
 
         Raises
         ------
-        ConfigError
-            If it is damaged, or not there.
         OSError
             If a file cannot be read.
         """
@@ -123,20 +115,14 @@ class Shelf:
         return zipped({f"{name}/{file}": folder / file for file in there})
 
     def csv_pieces(self, name: str) -> Generator[bytes, None, None]:
-        """Its samples as CSV, units in the headings, piece by piece.
-
-        Raises
-        ------
-        ConfigError
-            If it is damaged, or not there.
-        """
+        """Yield the samples as CSV with units in the headings; raises as `opened` does."""
         recording, sink = self.opened(name), Sink()
         for _ in write_rows(recording, ExportFormat.CSV, sink):
             yield from sink.taken()
 
     def _folder(self, name: str) -> Path | None:
-        """By looking through what is there, so that no name leads out of the folder."""
-        if NAME.fullmatch(name) is None:
+        """Return a folder that is in the list, so that no name leads out of the roots."""
+        if _NAME.fullmatch(name) is None:
             return None
         return next((folder for folder in self._folders() if folder.name == name), None)
 
@@ -144,33 +130,33 @@ class Shelf:
         for root in self._roots:
             yield from (root / name for name in finished(root))
 
-    def _kept(self, folder: Path) -> Kept:
+    def _entry(self, folder: Path) -> RecordingEntry:
         try:
             manifest, fault = read_manifest(folder), self._faults.get(folder.name)
         except ConfigError as error:
             manifest, fault = None, str(error).replace(str(folder), folder.name)
         kind = kind_of(folder.name)
         alarms = _alarms(folder / ALARM)
-        return Kept(folder.name, kind, manifest, fault, alarms, n_bytes_of(folder))
+        return RecordingEntry(folder.name, kind, manifest, fault, alarms, n_bytes_of(folder))
 
 
 def kind_of(name: str) -> WaveformKind:
-    """What a recording was made for, by its name."""
-    return WaveformKind.CONTINUOUS if CONTINUOUS.search(name) else WaveformKind.CAPTURE
+    """Return the kind of a recording by its name."""
+    return WaveformKind.CONTINUOUS if _CONTINUOUS_NAME.search(name) else WaveformKind.CAPTURE
 
 
 def _age(folder: Path) -> tuple[str, str]:
-    """By what the name says, which costs nothing where there are many thousands."""
-    found = MOMENT.search(folder.name)
+    """Return the time in the name: it needs no access to the disk for thousands of recordings."""
+    found = _TIME.search(folder.name)
     return found[0] if found else "", folder.name
 
 
 def _alarms(path: Path) -> list[Mapping[str, Any]]:
-    """What a recording was made for; nothing where that cannot be read."""
+    """Return the alarms of a recording; empty if they cannot be read."""
     try:
         with path.open("rb") as file:
             document = json.loads(file.read(MAX_ALARM_BYTES))
-        if document.get("checksum") not in (None, checksum_of(document)):  # older ones have none
+        if document.get("checksum") not in (None, checksum_of(document)):  # absent in older files
             return []
         return [
             {key: each[key] for key in ("alarm", "occurrence", "change", "level", "time")}
@@ -182,16 +168,16 @@ def _alarms(path: Path) -> list[Mapping[str, Any]]:
 
 @dataclass(frozen=True)
 class RecordingWindow:
-    """Blocks of a recording within a stretch of time.
+    """Blocks of a recording within a time window.
 
     Parameters
     ----------
     start_ns, stop_ns
-        Of the whole recording: its first sample, and the first one after its last.
+        Start and end of the whole recording.
     blocks
-        Those with samples in the stretch, as far as they are of one epoch; empty in a hole.
+        Blocks of the window with the epoch of the first; empty in a gap.
     n_other
-        Blocks of the stretch that are left out: the device began to count anew before them.
+        Number of blocks of later epochs in the window, which are left out.
     """
 
     start_ns: int
@@ -201,17 +187,12 @@ class RecordingWindow:
 
 
 def window_of(recording: Recording, start_s: float, seconds: float) -> RecordingWindow:
-    """Read what lies within a stretch of time.
-
-    Parameters
-    ----------
-    start_s
-        From the first sample of the recording.
+    """Read a time window, which starts ``start_s`` after the first sample of the recording.
 
     Raises
     ------
     ConfigError
-        If it cannot be read any more.
+        If the recording can no longer be read.
     """
     rate_hz = recording.manifest.rate_hz
     spans = [(h.start_ns, h.start_ns + ns_from_s(h.n_samples / rate_hz)) for h in recording.heads()]
@@ -220,14 +201,10 @@ def window_of(recording: Recording, start_s: float, seconds: float) -> Recording
     from_ns = spans[0][0] + ns_from_s(start_s)
     to_ns = from_ns + ns_from_s(seconds)
     wanted = [n for n, (begin, end) in enumerate(spans) if end > from_ns and begin < to_ns]
-    blocks = _read(recording, wanted)
+    blocks: list[SampleBlock] = []
+    if wanted:
+        calibration = all_of(recording.manifest).calibration
+        raws = recording.raw_blocks(wanted[0], wanted[-1] + 1)
+        blocks = [sample_block([raw], calibration) for raw in raws]
     same = [block for block in blocks if block.epoch == blocks[0].epoch]
     return RecordingWindow(spans[0][0], spans[-1][1], same, len(blocks) - len(same))
-
-
-def _read(recording: Recording, wanted: Sequence[int]) -> list[SampleBlock]:
-    calibration = all_of(recording.manifest).calibration
-    if not wanted:
-        return []
-    raws = recording.raw_blocks(wanted[0], wanted[-1] + 1)
-    return [sample_block([raw], calibration) for raw in raws]

@@ -1,43 +1,45 @@
-"""Metrics of continuous recording, and of all recordings that are kept."""
+"""Metrics of continuous recording and of stored recordings."""
 
 from collections.abc import Iterator
 
 from prometheus_client.metrics_core import Metric
 
-from service.recordings.continuous_recorder import Tape
-from service.recordings.keeper import WaveformKeeper
+from service.recordings.continuous_recorder import ContinuousRecorder
+from service.recordings.keeper import RecordingIndexer
 from service.runtime.metrics import counter, gauge
 
 
-def recording_metrics(tape: Tape | None, recordings: WaveformKeeper | None) -> Iterator[Metric]:
-    """What is recorded, what is not and why, and what is found of recordings."""
-    if tape is not None:
+def recording_metrics(
+    recorder: ContinuousRecorder | None, recordings: RecordingIndexer | None
+) -> Iterator[Metric]:
+    """Yield the families of recorded and dropped samples, and of stored recordings."""
+    if recorder is not None:
         yield counter(
             "recording_samples",
-            "Samples of each channel that continuous recordings have brought to the disk.",
+            "Samples per channel that continuous recording has synced to the disk.",
             (),
-            [((), tape.n_written)],
+            [((), recorder.n_written)],
         )
         yield counter(
             "recording_shed_samples",
-            "Samples of each channel that are not in them, by reason.",
+            "Samples per channel missing from continuous recordings, by reason.",
             ("reason",),
-            [((reason.value,), n) for reason, n in sorted(tape.n_shed.items())],
+            [((reason.value,), n) for reason, n in sorted(recorder.n_dropped.items())],
         )
     if recordings is None:
         return
     found = recordings.found
     for name, meaning, number in (
-        ("recordings_adopted", "Recordings that were entered into the index.", found.n_adopted),
-        ("recordings_checked", "Recordings that were read once more.", found.n_checked),
+        ("recordings_adopted", "Recordings added to the index.", found.n_adopted),
+        ("recordings_checked", "Recordings that were read again.", found.n_checked),
         ("recordings_damaged", "Recordings that were found damaged.", found.n_damaged),
         ("recordings_missing", "Recordings that were found missing.", found.n_missing),
     ):
         yield counter(name, meaning, (), [((), number)])
     removed = [((kind,), n) for kind, n in sorted(found.n_removed.items())]
-    yield counter("recordings_removed", "Recordings that had to make room.", ("kind",), removed)
+    yield counter("recordings_removed", "Recordings removed to free space.", ("kind",), removed)
     for name, meaning, numbers in (
         ("recordings_files", "Recordings on the disk.", recordings.n_files),
-        ("recordings_bytes", "What they take.", recordings.n_bytes),
+        ("recordings_bytes", "Size of the recordings on the disk.", recordings.n_bytes),
     ):
         yield gauge(name, meaning, ("kind",), [((k.value,), n) for k, n in numbers.items()])

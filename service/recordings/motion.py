@@ -1,4 +1,4 @@
-"""The path of a shaft in its bearing, from blocks or from a recording."""
+"""Motion of a shaft in its bearing, from newest samples or from a recording."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,23 +15,23 @@ from core.machine.unit import Bearing, Unit
 from core.quality import Reading, Reason, missing
 from core.spectra.orbit import Ellipse, ellipse_of, marks_of, order_phasors, trace_of
 from core.units import hz_from_rpm, ns_from_s, rpm_from_hz, s_from_ns
-from service.live.samples import ShaftStretch, stretch_of
+from service.live.samples import SampleWindow, sample_window
 from service.recordings.library import RecordingWindow, window_of
 
 MIN_MARKS = 3
-"""From which on the mark says how fast the shaft turns."""
+"""Minimum number of key-phase marks that a speed is computed from."""
 
 
 @dataclass(frozen=True, eq=False)
 class Order1:
-    """The part of the motion at running speed.
+    """Motion at running speed.
 
     Parameters
     ----------
     x_um, y_um
-        (n_samples,), NaN where too few samples lie around.
+        (n_samples,); NaN where too few neighbouring samples exist.
     ellipse
-        In the middle of the stretch.
+        Orbit in the middle of the window.
     """
 
     frequency_hz: float
@@ -49,16 +49,16 @@ class ShaftMotion:
     x_um, y_um
         (n_samples,) along the bearing's axes, mean removed; NaN where a sample is missing.
     centre_um
-        Mean position in the clearance circle; none where it is not known.
+        Mean position in the clearance circle; None if unknown.
     speed_rpm
-        From the marks, or the slow channel; none where neither says it.
+        Speed from the marks, else from the slow channel; None if unknown.
     order1
-        None without a speed, or with too few samples.
+        Motion at running speed; None without a speed, or with too few samples.
     marks
-        Where the key-phase mark passes, in samples from the first; None without a key-phase.
+        Passages of the key-phase mark, in samples from the first; None without a key-phase.
     """
 
-    stretch: ShaftStretch
+    window: SampleWindow
     x_um: FloatArray
     y_um: FloatArray
     centre_um: tuple[float, float] | None
@@ -68,7 +68,7 @@ class ShaftMotion:
 
 
 def channels_for(unit: Unit, bearing: Bearing) -> list[str]:
-    """Waveform channels that the motion is made of, as far as the unit has them."""
+    """Return the waveform channels of the unit that the motion is computed from."""
     wanted = (
         *(bearing.shaft_x, bearing.shaft_y, bearing.opposite_x, bearing.opposite_y),
         unit.key_phase,
@@ -76,27 +76,27 @@ def channels_for(unit: Unit, bearing: Bearing) -> list[str]:
     return [id_ for id_ in wanted if id_ is not None]
 
 
-def motion_of(stretch: ShaftStretch, unit: Unit, bearing: Bearing) -> ShaftMotion:
-    """The motion in a stretch that holds the bearing's shaft channels."""
+def motion_of(window: SampleWindow, unit: Unit, bearing: Bearing) -> ShaftMotion:
+    """Return the motion in a window that contains the shaft channels of the bearing."""
     channels = {channel.id: channel for channel in unit.channels}
     x_um, y_um = (
-        _displacement(stretch, channels[id_]) for id_ in (bearing.shaft_x, bearing.shaft_y)
+        _displacement(window, channels[id_]) for id_ in (bearing.shaft_x, bearing.shaft_y)
     )
-    marks = _marks(stretch, channels, unit.key_phase)
-    speed_rpm = _speed(stretch, unit, marks)
+    marks = _marks(window, channels, unit.key_phase)
+    speed_rpm = _speed(window, unit, marks)
     return ShaftMotion(
-        stretch=stretch,
+        window=window,
         x_um=x_um,
         y_um=y_um,
-        centre_um=_centre(stretch, channels, bearing),
+        centre_um=_centre(window, channels, bearing),
         speed_rpm=speed_rpm,
-        order1=_order1(stretch, x_um, y_um, speed_rpm),
+        order1=_order1(window, x_um, y_um, speed_rpm),
         marks=marks,
     )
 
 
-def _displacement(stretch: ShaftStretch, channel: Channel) -> FloatArray:
-    samples = channel.direction * stretch.samples[channel.id]
+def _displacement(window: SampleWindow, channel: Channel) -> FloatArray:
+    samples = channel.direction * window.samples[channel.id]
     return samples - _mean(samples) if np.isfinite(samples).any() else samples
 
 
@@ -105,44 +105,44 @@ def _mean(samples: FloatArray) -> float:
 
 
 def _marks(
-    stretch: ShaftStretch, channels: dict[str, Channel], key_phase: str | None
+    window: SampleWindow, channels: dict[str, Channel], key_phase: str | None
 ) -> FloatArray | None:
-    pulses = stretch.of(key_phase)
+    pulses = window.of(key_phase)
     if pulses is None or key_phase is None:
         return None
     return marks_of(channels[key_phase].direction * pulses)
 
 
-def _speed(stretch: ShaftStretch, unit: Unit, marks: FloatArray | None) -> float | None:
+def _speed(window: SampleWindow, unit: Unit, marks: FloatArray | None) -> float | None:
     if marks is not None and marks.size >= MIN_MARKS:
-        return rpm_from_hz(stretch.rate_hz / float(np.median(np.diff(marks))))
-    return stretch.mean_of(unit.speed_channel).value
+        return rpm_from_hz(window.rate_hz / float(np.median(np.diff(marks))))
+    return window.mean_of(unit.speed_channel).value
 
 
 def _order1(
-    stretch: ShaftStretch, x_um: FloatArray, y_um: FloatArray, speed_rpm: float | None
+    window: SampleWindow, x_um: FloatArray, y_um: FloatArray, speed_rpm: float | None
 ) -> Order1 | None:
     frequency_hz = hz_from_rpm(speed_rpm or 0.0)
-    if not 0.0 < frequency_hz < stretch.rate_hz / 2.0:
+    if not 0.0 < frequency_hz < window.rate_hz / 2.0:
         return None
-    x, y = (order_phasors(each, stretch.rate_hz, frequency_hz) for each in (x_um, y_um))
+    x, y = (order_phasors(each, window.rate_hz, frequency_hz) for each in (x_um, y_um))
     known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     if not known.size:
         return None
     middle = known[np.argmin(np.abs(known - x.size // 2))]
     return Order1(
         frequency_hz=frequency_hz,
-        x_um=trace_of(x, stretch.rate_hz, frequency_hz),
-        y_um=trace_of(y, stretch.rate_hz, frequency_hz),
+        x_um=trace_of(x, window.rate_hz, frequency_hz),
+        y_um=trace_of(y, window.rate_hz, frequency_hz),
         ellipse=ellipse_of(complex(x[middle]), complex(y[middle])),
     )
 
 
 def _centre(
-    stretch: ShaftStretch, channels: dict[str, Channel], bearing: Bearing
+    window: SampleWindow, channels: dict[str, Channel], bearing: Bearing
 ) -> tuple[float, float] | None:
     near, far = (
-        [_gap(stretch, channels.get(id_ or ""), slow) for id_, slow in pairs]
+        [_gap(window, channels.get(id_ or ""), slow) for id_, slow in pairs]
         for pairs in (
             ((bearing.shaft_x, bearing.gap_x), (bearing.shaft_y, bearing.gap_y)),
             (
@@ -157,12 +157,12 @@ def _centre(
     return None if x_um is None or y_um is None else (x_um, y_um)
 
 
-def _gap(stretch: ShaftStretch, channel: Channel | None, slow_channel: str | None) -> Reading:
-    """Mean gap in µm, from the slow channel or from a DC-coupled probe."""
+def _gap(window: SampleWindow, channel: Channel | None, slow_channel: str | None) -> Reading:
+    """Return the mean gap in µm, from the slow channel or from a DC-coupled probe."""
     if slow_channel is not None:
-        gap_mm = stretch.mean_of(slow_channel)
+        gap_mm = window.mean_of(slow_channel)
         return gap_mm if gap_mm.value is None else Reading(1e3 * gap_mm.value, gap_mm.quality)
-    samples = None if channel is None else stretch.of(channel.id)
+    samples = None if channel is None else window.of(channel.id)
     if channel is None or samples is None or channel.measurand is not Measurand.GAP_UM:
         return missing(Reason.NOT_MEASURED)
     if not np.isfinite(samples).any():
@@ -171,19 +171,19 @@ def _gap(stretch: ShaftStretch, channel: Channel | None, slow_channel: str | Non
 
 
 class NoMotionError(Exception):
-    """A recording does not hold what is asked of it; the message says what it lacks."""
+    """A recording lacks a channel or samples; the message states which."""
 
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """A motion with its place in a recording.
+    """Motion at a time of a recording.
 
     Parameters
     ----------
     offset_s
-        From the first sample of the recording to the first of the motion.
+        Start of the motion, from the first sample of the recording.
     total_s
-        Length of the recording, holes included.
+        Duration of the recording including gaps.
     """
 
     motion: ShaftMotion
@@ -194,27 +194,28 @@ class RecordedMotion:
 def recorded_motion(
     recording: Recording, unit: Unit, bearing: Bearing, start_s: float, seconds: float
 ) -> RecordedMotion:
-    """Read the motion in a stretch of a recording, with the calibration of then.
+    """Read the motion in a time window of a recording, with its calibration.
 
     Raises
     ------
     NoMotionError
-        If the bearing's shaft channels are not in it, or no samples at that time.
+        If it lacks a shaft channel of the bearing, or samples in the window.
     ConfigError
-        If it cannot be read any more.
+        If it can no longer be read.
     """
     rows = _rows(recording.manifest, unit, bearing)
     window = window_of(recording, start_s, seconds)
     if not window.blocks:
         total_s = s_from_ns(window.stop_ns - window.start_ns)
         raise NoMotionError(
-            f"it has no samples from {start_s:g} s on for {seconds:g} s; it is {total_s:g} s long"
+            f"it has no samples from {start_s:g} s to {start_s + seconds:g} s;"
+            f" it is {total_s:g} s long"
         )
     first_index, n_samples = _indices(window, start_s, seconds)
-    stretch = stretch_of(window.blocks, rows, first_index, n_samples)
+    samples = sample_window(window.blocks, rows, first_index, n_samples)
     return RecordedMotion(
-        motion=motion_of(stretch, unit, bearing),
-        offset_s=s_from_ns(stretch.start_ns - window.start_ns),
+        motion=motion_of(samples, unit, bearing),
+        offset_s=s_from_ns(samples.start_ns - window.start_ns),
         total_s=s_from_ns(window.stop_ns - window.start_ns),
     )
 
@@ -233,7 +234,7 @@ def _rows(manifest: Manifest, unit: Unit, bearing: Bearing) -> Mapping[str, int]
 
 
 def _indices(window: RecordingWindow, start_s: float, seconds: float) -> tuple[int, int]:
-    """First index and number of the samples asked for, as far as there are any."""
+    """Return first index and number of the requested samples that exist."""
     first, last = window.blocks[0], window.blocks[-1]
     from_ns = window.start_ns + ns_from_s(start_s)
     skipped = max(0, round(s_from_ns(from_ns - first.start_ns) * first.rate_hz))

@@ -1,4 +1,4 @@
-"""How long recordings stay: age, room, order of removal."""
+"""Retention of recordings: age, space, order of removal, and the check of what is stored."""
 
 import errno
 import os
@@ -13,65 +13,64 @@ import structlog
 from acquisition.clock import Clock
 from core.units import DAY_NS, NS_PER_S, ns_from_s
 from service.recordings.folders import (
+    begin_removal,
     being_removed,
-    empty,
+    delete_files,
     finish_removal,
     finished,
     is_recording,
-    put_out_of_sight,
     set_aside,
 )
-from service.recordings.index import Index, Unread, again, inspected
-from service.runtime.disk import Measure, SpaceLimits
+from service.recordings.index import Index, RetryList, inspected, reinspected
+from service.runtime.disk import S_PER_DAY, Measure, SpaceLimits
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
 
-BELIEVED_NS = 86_400 * NS_PER_S
-"""How much has to be recorded by a clock before anything is old by it."""
+TRUSTED_NS = DAY_NS
+"""Length of recordings after which the clock that they were made by is trusted."""
 
-LONGEST_NS = 3600 * NS_PER_S
-"""No recording is longer by the settings: what its stamps say beyond that is a clock that was
-set."""
+MAX_LENGTH_NS = 3600 * NS_PER_S
+"""Maximum length of a recording by the settings; a longer one shows a clock that was set."""
 
 
-class NotOldFrom:
-    """Knows for each unit which of its recordings are too old.
+class AgeLimit:
+    """Age limit of continuous recordings, by the clock of each unit.
+
+    A clock that was set forward must not make recordings old, so the newest time counts that a
+    day of recordings is not older than.
 
     Parameters
     ----------
     files
         All continuous recordings.
     keep_ns
-        For how long they are kept.
+        Maximum age.
     """
 
     def __init__(self, files: Iterable[WaveformFile], now_ns: int, keep_ns: int) -> None:
         by_unit: defaultdict[str, list[WaveformFile]] = defaultdict(list)
         for file in files:
             by_unit[file.unit].append(file)
-        believed = {unit: _believed_ns(of_unit) for unit, of_unit in by_unit.items()}
         self._since_ns = {
-            unit: min(now_ns, moment) - keep_ns
-            for unit, moment in believed.items()
-            if moment is not None
+            unit: min(now_ns, trusted_ns) - keep_ns
+            for unit, of_unit in by_unit.items()
+            if (trusted_ns := _trusted_ns(of_unit)) is not None
         }
-        # whose unit cannot be read was found by the same clock as all others
-        self._since_of_others_ns = max(self._since_ns.values(), default=None)
+        # a recording whose unit is unreadable was found by the same clock as the others
+        self._newest_ns = max(self._since_ns.values(), default=None)
 
     def is_old(self, file: WaveformFile) -> bool:
-        """Whether it has been kept for long enough."""
-        since_ns = self._since_ns.get(file.unit)
-        if not file.unit:
-            since_ns = self._since_of_others_ns
+        """Return whether a recording exceeds the limit."""
+        since_ns = self._since_ns.get(file.unit) if file.unit else self._newest_ns
         return since_ns is not None and _time_ns(file) < since_ns
 
 
-def _believed_ns(files: Iterable[WaveformFile]) -> int | None:
-    """The newest time that a day of recordings is newer than; None if there are not so many."""
+def _trusted_ns(files: Iterable[WaveformFile]) -> int | None:
+    """Return the newest time that a day of recordings is not older than; None without a day."""
     n_recorded_ns = 0
     for file in sorted(files, key=_time_ns, reverse=True):
-        n_recorded_ns += min(max(file.stop_ns - file.start_ns, 0), LONGEST_NS)
-        if n_recorded_ns >= BELIEVED_NS:
+        n_recorded_ns += min(max(file.stop_ns - file.start_ns, 0), MAX_LENGTH_NS)
+        if n_recorded_ns >= TRUSTED_NS:
             return _time_ns(file)
     return None
 
@@ -80,104 +79,73 @@ def _time_ns(file: WaveformFile) -> int:
     return max(file.stop_ns, file.changed_ns)
 
 
-S_PER_DAY = 86_400.0
-
-
 @dataclass(frozen=True)
 class RoomLimits:
-    """How much recordings may take.
-
-    Parameters
-    ----------
-    continuous_bytes, capture_bytes
-        Of all of a kind together.
-    continuous_days
-        Continuous recordings go that are older than this; see `service.recordings.keeping.ages`.
-    """
+    """Maximum size of all recordings of each kind, and maximum age of continuous ones."""
 
     continuous_bytes: int = 100_000_000_000
     capture_bytes: int = 10_000_000_000
     continuous_days: float = 30.0
 
 
-@dataclass(frozen=True)
-class Need:
-    """How much room has to be made on the disk.
-
-    Parameters
-    ----------
-    soft_bytes
-        By continuous recordings.
-    hard_bytes
-        By captures as well, if they are not part of any evidence.
-    """
-
-    soft_bytes: int = 0
-    hard_bytes: int = 0
-
-
-Bound = Callable[[], frozenset[str]]
-"""Names of captures that evidence of an alarm refers to; asked only when captures have to go."""
+InUse = Callable[[], frozenset[str]]
+"""Returns the names of captures that evidence of an alarm refers to."""
 
 Remove = Callable[[WaveformFile, str], bool]
-"""Removes a recording and says why; whether it is gone. The next one goes in place of one that
-is not."""
+"""Removes a recording for a reason; returns whether it is gone. If not, the next one follows."""
 
 
 def make_room(
     files: Iterable[WaveformFile],
     limits: RoomLimits,
     now_ns: int,
-    need: Need,
-    bound: Bound,
+    short_bytes: Mapping[WaveformKind, int],
+    in_use: InUse,
     remove: Remove,
 ) -> None:
-    """Have removed what has to go, in this order.
+    """Remove recordings beyond the limits, continuous recordings first.
+
+    Parameters
+    ----------
+    short_bytes
+        Space to free for continuous recordings, and the part of it that captures also free,
+        unless evidence refers to them.
 
     Raises
     ------
     OSError
-        If it cannot be found out what evidence refers to; continuous recordings have gone then.
+        If captures in use cannot be determined; then only continuous recordings were removed.
     """
-    by_age = sorted(files, key=lambda file: (_stop_ns(file), file.name))
+    by_age = sorted(files, key=lambda file: (file.stop_ns or file.changed_ns, file.name))
     continuous = [file for file in by_age if file.kind is WaveformKind.CONTINUOUS]
     captures = [file for file in by_age if file.kind is WaveformKind.CAPTURE]
-    n_freed = _continuous(continuous, limits, now_ns, need.soft_bytes, remove)
-    over = sum(file.n_bytes for file in captures) - limits.capture_bytes
-    short = need.hard_bytes - n_freed
-    if over > 0 or short > 0:
-        _captures(captures, over, short, bound(), remove)
-
-
-def _continuous(
-    by_age: Sequence[WaveformFile], limits: RoomLimits, now_ns: int, short: int, remove: Remove
-) -> int:
-    """Remove continuous ones; how many bytes became free."""
-    over = sum(file.n_bytes for file in by_age) - limits.continuous_bytes
-    not_old = NotOldFrom(by_age, now_ns, ns_from_s(limits.continuous_days * S_PER_DAY))
+    over = sum(file.n_bytes for file in continuous) - limits.continuous_bytes
+    age_limit = AgeLimit(continuous, now_ns, ns_from_s(limits.continuous_days * S_PER_DAY))
     n_freed = 0
-    for file in by_age:
+    for file in continuous:
         if over > n_freed:
-            why = "all together are over max_gb"
-        elif short > n_freed:
+            why = "continuous recordings exceed max_gb"
+        elif short_bytes[WaveformKind.CONTINUOUS] > n_freed:
             why = "the disk is nearly full"
-        elif not_old.is_old(file):
+        elif age_limit.is_old(file):
             why = "it is older than max_days"
         else:
             continue
         n_freed += file.n_bytes if remove(file, why) else 0
-    return n_freed
+    over = sum(file.n_bytes for file in captures) - limits.capture_bytes
+    short = short_bytes[WaveformKind.CAPTURE] - n_freed
+    if over > 0 or short > 0:
+        _remove_captures(captures, over, short, in_use(), remove)
 
 
-def _captures(
-    by_age: Sequence[WaveformFile], over: int, short: int, bound: frozenset[str], remove: Remove
+def _remove_captures(
+    by_age: Sequence[WaveformFile], over: int, short: int, in_use: frozenset[str], remove: Remove
 ) -> None:
-    """The newest stays in any case; what evidence refers to goes last, and never for the disk."""
-    older = by_age[:-1]
-    for file in sorted(older, key=lambda file: file.name in bound):
+    """Remove captures but the newest; those in use last, and only because of their own limit."""
+    for file in sorted(by_age[:-1], key=lambda file: file.name in in_use):
         if over > 0:
-            why = "all captures together are over max_gb"
-        elif short > 0 and file.name not in bound:
+            why = "captures exceed max_gb"
+        elif short > 0 and file.name not in in_use:
             why = "the disk is nearly full"
         else:
             return
@@ -185,47 +153,28 @@ def _captures(
             over, short = over - file.n_bytes, short - file.n_bytes
 
 
-def _stop_ns(file: WaveformFile) -> int:
-    """When it ended, or when it was found if that cannot be read."""
-    return file.stop_ns or file.changed_ns
-
-
-class Troubles:
-    """Remembers the first thing that went wrong while the rest was done all the same.
-
-    Attributes
-    ----------
-    first
-        What went wrong first; None as long as nothing did.
-    """
+class FirstError:
+    """First error of several independent steps."""
 
     def __init__(self) -> None:
         self.first: OSError | StoreError | None = None
 
     @contextmanager
-    def borne(self) -> Iterator[None]:
-        """Let a disk or the store refuse in here."""
+    def deferred(self) -> Iterator[None]:
+        """Catch an error of the disk or the store in the body."""
         try:
             yield
         except (OSError, StoreError) as error:
             self.first = self.first or error
 
-    def tell(self) -> None:
-        """Raise what went wrong first, if anything did.
-
-        Raises
-        ------
-        OSError
-            If it was a disk.
-        StoreError
-            If it was the index.
-        """
+    def raise_first(self) -> None:
+        """Raise the first error, if there was one."""
         if self.first is not None:
             raise self.first
 
 
-class Gauge:
-    """Measures the disks that recordings are on.
+class SpaceGauge:
+    """Measurement of the free space for recordings.
 
     Parameters
     ----------
@@ -235,9 +184,9 @@ class Gauge:
     Attributes
     ----------
     is_full
-        Whether so little room is left on the disk that nothing more is to be recorded.
-    need
-        What is short on each disk; nothing is removed for the sake of another one.
+        Whether too little space is left for continuous recording.
+    short_bytes
+        Space to free on the disk of each kind of recordings.
     """
 
     def __init__(
@@ -245,52 +194,48 @@ class Gauge:
     ) -> None:
         self._roots, self._space, self._measure = roots, space, measure
         self.is_full = False
-        self.need = Need()
+        self.short_bytes = dict.fromkeys(WaveformKind, 0)
 
     def measure(self) -> None:
-        """Measure all of them; one that does not say is short of nothing.
+        """Measure the disks; nothing is freed on a disk that cannot be measured.
 
         Raises
         ------
         OSError
-            If a disk does not say.
+            If a disk cannot be measured.
         """
-        short = dict.fromkeys(WaveformKind, 0)
-        troubles = Troubles()
+        short, errors = dict.fromkeys(WaveformKind, 0), FirstError()
         for kind, root in self._roots.items():
-            with troubles.borne():
-                short[kind] = self._short(kind, root)
-        self.need = Need(short[WaveformKind.CONTINUOUS], short[WaveformKind.CAPTURE])
-        troubles.tell()
-
-    def _short(self, kind: WaveformKind, root: Path) -> int:
-        space = self._measure(root)
-        limits = self._space.of(space.total_bytes)
-        danger = limits.danger_below or 0.0
-        least = danger
-        if kind is WaveformKind.CONTINUOUS:
-            self.is_full = space.free_share < danger
-            # more than the alarm needs, so that recordings never raise it
-            least = (limits.alert_below or 0.0) + limits.deadband
-        return max(round(least * space.total_bytes) - space.free_bytes, 0)
+            with errors.deferred():
+                space = self._measure(root)
+                limits = self._space.of(space.total_bytes)
+                wanted = limits.danger_below or 0.0
+                if kind is WaveformKind.CONTINUOUS:
+                    self.is_full = space.free_share < wanted
+                    # more than the alarm requires, so that recordings never raise it
+                    wanted = (limits.alert_below or 0.0) + limits.deadband
+                short[kind] = max(round(wanted * space.total_bytes) - space.free_bytes, 0)
+        self.short_bytes = short
+        errors.raise_first()
 
 
 log = structlog.get_logger()
 
 MAX_LOOK_S = 2.0
-"""Longest that new recordings are read in one look; the others come next time."""
+"""Maximum time for new recordings in one run; the next run continues."""
 
 CHECK_SHARE = 0.02
-"""Share of the time that goes into reading recordings once more."""
+"""Share of time for reading recordings again."""
 
 CHECK_EVERY_NS = DAY_NS
+
 REMEMBERED_NS = 90 * DAY_NS
-"""How long entries stay of what is gone."""
+"""Time for which the index keeps entries of recordings that are gone."""
 
 
 @dataclass
-class Findings:
-    """What was found and done since the start."""
+class RetentionCounts:
+    """Number of recordings by what happened to them since the start."""
 
     n_adopted: int = 0
     n_damaged: int = 0
@@ -301,47 +246,39 @@ class Findings:
 
 
 @dataclass(frozen=True)
-class Custody:
-    """What a caretaker looks after, and by which rules.
-
-    Parameters
-    ----------
-    roots
-        Folder of each kind of recordings.
-    bound
-        Captures that evidence refers to.
-    """
+class RetentionRules:
+    """Folders of recordings, by kind, and the rules of their retention."""
 
     roots: Mapping[WaveformKind, Path]
     room: RoomLimits
-    gauge: Gauge
-    bound: Bound
+    gauge: SpaceGauge
+    in_use: InUse
 
 
-class Caretaker:
-    """Brings index and folders together; the folders are what counts.
+class RecordingRetention:
+    """Keeps the index equal to the folders, which prevail, and removes recordings by the rules.
 
-    Whatever fails, the rest is done: above all room is made while nothing can be written any more.
+    Each step runs even if others fail: space is made while nothing can be written.
     """
 
-    def __init__(self, custody: Custody, index: Index, clock: Clock) -> None:
-        self._custody, self._index, self._clock = custody, index, clock
+    def __init__(self, rules: RetentionRules, index: Index, clock: Clock) -> None:
+        self._rules, self._index, self._clock = rules, index, clock
         self._check_from_s = self._forgot_s = -1.0
-        self._unread = Unread(clock)
-        self.found = Findings()
+        self._retry = RetryList(clock)
+        self.found = RetentionCounts()
 
     @property
     def on_disk(self) -> Sequence[WaveformFile]:
-        """Recordings that are there, damaged or not."""
+        """Recordings on the disk, including damaged ones."""
         return self._index.on_disk
 
     @property
     def faults(self) -> Mapping[str, str]:
-        """Why each damaged recording is none to be served, by name."""
+        """Fault of each damaged recording, by name."""
         return self._index.faults
 
     def look(self) -> None:
-        """Look once.
+        """Run all steps once.
 
         Raises
         ------
@@ -350,52 +287,52 @@ class Caretaker:
         StoreError
             If the index cannot be written.
         """
-        until_s = self._clock.monotonic_s() + MAX_LOOK_S
-        troubles = Troubles()
-        for kind, root in self._custody.roots.items():
-            with troubles.borne():
-                self._go_on_removing(kind, root, troubles)
-            with troubles.borne():
+        until_s, errors = self._clock.monotonic_s() + MAX_LOOK_S, FirstError()
+        for kind, root in self._rules.roots.items():
+            with errors.deferred():
+                self._resume_removals(kind, root, errors)
+            with errors.deferred():
                 self._survey(kind, root, until_s)
-        with troubles.borne():
-            self._make_room(troubles)
-        with troubles.borne():
-            self._finish_removals(troubles)
-        with troubles.borne():
-            self._check_one()
-        with troubles.borne():
-            self._forget()
-        with troubles.borne():
-            self._unread.tell()
-        troubles.tell()
+        with errors.deferred():
+            self._make_room(errors)
+        with errors.deferred():
+            self._finish_removals(errors)
+        for step in (self._check_one, self._forget, self._retry.raise_first):
+            with errors.deferred():
+                step()
+        errors.raise_first()
 
-    def _go_on_removing(self, kind: WaveformKind, root: Path, troubles: Troubles) -> None:
+    def _resume_removals(self, kind: WaveformKind, root: Path, errors: FirstError) -> None:
         for name in being_removed(root):
             known = self._index.get(kind, name)
             if known is not None and not (root / name).exists():
                 self._note_removed(known, "its removal was interrupted")
-            with troubles.borne():
-                empty(root / name)
+            with errors.deferred():
+                delete_files(root / name)
 
     def _survey(self, kind: WaveformKind, root: Path, until_s: float) -> None:
         known, there = self._index.names(kind), set(finished(root))
         if known and not root.is_dir():
             raise OSError(f"{root}: the folder of {len(known)} recordings is not there")
-        self._unread.keep(kind, there)
-        lost = [file for name in known - there if (file := self._index.get(kind, name))]
-        if lost:
-            now_ns = self._clock.now_ns()
-            self._index.mark(lost, WaveformState.MISSING, "it is not in its folder", now_ns)
-            self.found.n_missing += len(lost)
-            log.error("recordings are missing", names=[file.name for file in lost[:10]])
+        self._retry.keep(kind, there)
+        missing = [file for name in known - there if (file := self._index.get(kind, name))]
+        if missing:
+            state, now_ns = WaveformState.MISSING, self._clock.now_ns()
+            reason = "it is not in its folder"
+            self._index.put(
+                replace(file, state=state, reason=reason, changed_ns=now_ns) for file in missing
+            )
+            self.found.n_missing += len(missing)
+            log.error("recordings are missing", names=[file.name for file in missing[:10]])
         for name in sorted(there - known):
             if self._clock.monotonic_s() > until_s:
                 return
-            if self._unread.is_due(kind, name):
-                with self._unread.noted(kind, name):
+            if self._retry.is_due(kind, name):
+                with self._retry.noted(kind, name):
                     self._adopt(kind, root / name)
 
     def _adopt(self, kind: WaveformKind, folder: Path) -> None:
+        """Add a new recording to the index."""
         if not is_recording(folder):
             return
         file = inspected(folder, self._index.place, kind, self._clock.now_ns())
@@ -403,82 +340,82 @@ class Caretaker:
             file = replace(file, name=set_aside(folder).name)
         self._index.put([file])
         if file.state is WaveformState.DAMAGED:
-            self._tell_damaged(file)
+            self._note_damaged(file)
         else:
             self.found.n_adopted += 1
 
-    def _make_room(self, troubles: Troubles) -> None:
-        rules = self._custody
-        with troubles.borne():
+    def _make_room(self, errors: FirstError) -> None:
+        rules = self._rules
+        with errors.deferred():
             rules.gauge.measure()
 
         def remove(file: WaveformFile, reason: str) -> bool:
             folder = rules.roots[file.kind] / file.name
-            with troubles.borne():
-                put_out_of_sight(folder)
+            with errors.deferred():
+                begin_removal(folder)
                 self._note_removed(file, reason)
-                empty(folder)
+                delete_files(folder)
                 return True
             return False
 
-        need, now_ns = rules.gauge.need, self._clock.now_ns()
-        make_room(self._index.on_disk, rules.room, now_ns, need, rules.bound, remove)
+        short_bytes, now_ns = rules.gauge.short_bytes, self._clock.now_ns()
+        make_room(self._index.on_disk, rules.room, now_ns, short_bytes, rules.in_use, remove)
 
     def _note_removed(self, file: WaveformFile, reason: str) -> None:
         self.found.n_removed[file.kind.value] += 1
-        log.info("a recording is removed", name=file.name, reason=reason)
+        log.info("recording removed", name=file.name, reason=reason)
         self._index.remove(file, reason, self._clock.now_ns())
 
-    def _finish_removals(self, troubles: Troubles) -> None:
-        """Remove the folders of what the index knows to be gone.
+    def _finish_removals(self, errors: FirstError) -> None:
+        """Remove the folders of removed recordings.
 
-        As long as it cannot be told, an empty folder says so to the next start.
+        Until the store has recorded the removal, the empty folder shows it to the next start.
         """
-        self._index.settle()
-        for root in self._custody.roots.values():
-            with troubles.borne():
+        self._index.store_removals()
+        for root in self._rules.roots.values():
+            with errors.deferred():
                 for name in being_removed(root):
-                    with troubles.borne():
+                    with errors.deferred():
                         left = finish_removal(root / name)
                         if left is not None:
-                            words = "a removed recording leaves a folder with files of others"
+                            words = "the folder of a removed recording holds other files"
                             log.warning(words, folder=left.name)
 
     def _check_one(self) -> None:
-        """Read what was not read for the longest time, in a small share of all time."""
+        """Read the recording whose check is the longest ago, in a small share of the time."""
         start_s = self._clock.monotonic_s()
-        due = (f for f in self._index.whole if self._unread.is_due(f.kind, f.name))
+        due = (f for f in self._index.whole if self._retry.is_due(f.kind, f.name))
         file = min(due, key=lambda file: file.checked_ns, default=None)
         if file is None or start_s < self._check_from_s:
             return
         if self._clock.now_ns() - file.checked_ns < CHECK_EVERY_NS:
             return
-        with self._unread.noted(file.kind, file.name):
+        with self._retry.noted(file.kind, file.name):
             self.check(file)
-        took_s = self._clock.monotonic_s() - start_s
-        self._check_from_s = start_s + took_s / CHECK_SHARE
+        taken_s = self._clock.monotonic_s() - start_s
+        self._check_from_s = start_s + taken_s / CHECK_SHARE
 
     def check(self, file: WaveformFile) -> WaveformFile:
-        """Read all of a recording once more, and note what it is found to be.
+        """Read all of a recording again; return its new entry.
 
         Raises
         ------
         OSError
-            If the disk refuses, or all of them are away: that says nothing of the recording.
+            If the disk refuses, or the folder is absent; the recording may be whole.
         StoreError
-            If it cannot be noted.
+            If the index cannot be written.
         """
-        folder = self._custody.roots[file.kind] / file.name
+        folder = self._rules.roots[file.kind] / file.name
         if not folder.is_dir():
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(folder))
-        found = again(file, folder, self._clock.now_ns())
+        found = reinspected(file, folder, self._clock.now_ns())
         self.found.n_checked += 1
         self._index.put([found])
         if found.state is WaveformState.DAMAGED:
-            self._tell_damaged(found)
+            self._note_damaged(found)
         return found
 
-    def _tell_damaged(self, file: WaveformFile) -> None:
+    def _note_damaged(self, file: WaveformFile) -> None:
         self.found.n_damaged += 1
         log.error("a recording is damaged", name=file.name, reason=file.reason)
 

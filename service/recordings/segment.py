@@ -1,8 +1,9 @@
-"""A recording on its way to the disk: written part by part, readable after a crash."""
+"""Recordings on their way to the disk: captures of alarms, and segments in synced parts."""
 
+import asyncio
 import json
-import os
 from collections.abc import Callable, Container, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -11,8 +12,9 @@ from typing import Any
 
 import structlog
 
+from acquisition.clock import Clock
 from acquisition.errors import ConfigError
-from acquisition.recordings.manifest import BLOCKS, MANIFEST, SAMPLES, RecordedUnit, checksum_of
+from acquisition.recordings.manifest import RecordedUnit, checksum_of
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.writer import INCOMPLETE, RecordingWriter
 from core.alarms.alarm import AlarmEvent
@@ -20,50 +22,33 @@ from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 from service.recordings.folders import (
     ALARM,
+    CONTINUOUS,
     PARTS,
-    aside,
-    capture_folder,
     damaged_folder,
-    joined_folder,
-    part_folder,
+    incomplete_folder,
+    new_folder,
     parts_folder,
-    stretch_folder,
+    remove_recording,
     unit_of,
 )
+from service.runtime.files import sync_folder, write_synced
 from service.runtime.times import rfc3339
 
-
-@dataclass(frozen=True)
-class TapeSettings:
-    """How a continuous recording is cut.
-
-    Parameters
-    ----------
-    stretch_s
-        Length of a finished recording.
-    part_s
-        What is written and synced at once: a kill costs no more than this, and what waits.
-    """
-
-    stretch_s: float = 600.0
-    part_s: float = 30.0
-
-
 MakeWriter = Callable[[Path, str], RecordingWriter]
-"""Opens a recording of the unit: folder and who made it."""
+"""Opens a recording of a unit, given its folder and the program that makes it."""
 
 
 class CaptureError(Exception):
-    """A capture cannot be written; the message says which and why."""
+    """A capture cannot be written; the message states which and why."""
 
 
 class CaptureFile:
-    """A recording with the alarms it was made for; complete with its name, or not there at all.
+    """A recording with the alarms that it was made for; it exists whole or not at all.
 
     Attributes
     ----------
     finished
-        Where it is, once it is complete.
+        Its folder once it is complete.
     """
 
     def __init__(self, root: Path, event: AlarmEvent, make_writer: MakeWriter) -> None:
@@ -79,7 +64,7 @@ class CaptureFile:
         Raises
         ------
         CaptureError
-            If that fails; then nothing of the capture is left, and it is closed.
+            If that fails; then the capture is removed and closed.
         """
         if self.is_closed:
             return
@@ -88,10 +73,10 @@ class CaptureFile:
             for block in blocks:
                 writer.write_block(block)
         except (OSError, ConfigError) as error:
-            raise self.given_up(str(error)) from error
+            raise self.abandon(str(error)) from error
 
     def finish(self, alarms: Sequence[AlarmEvent]) -> None:
-        """Bring it to the disk, with the alarms, and give it its name.
+        """Sync it to the disk with its alarms, and give it its final name.
 
         Raises
         ------
@@ -102,39 +87,37 @@ class CaptureFile:
         if writer is None or folder is None or self.is_closed:
             return
         try:
-            _write_alarms(aside(folder) / ALARM, alarms)
+            write_alarms(incomplete_folder(folder) / ALARM, alarms)
             writer.finish()
         except (OSError, ConfigError) as error:
-            raise self.given_up(str(error)) from error
+            raise self.abandon(str(error)) from error
         self.is_closed, self.finished = True, folder
 
-    def _open(self) -> RecordingWriter:
-        self._root.mkdir(parents=True, exist_ok=True)
-        self.folder = capture_folder(self._root, self._event)
-        made_by = f"padwatch {version('padwatch')}, alarm {self._event.identity.id}"
-        self._writer = self._make_writer(
-            self.folder, f"{made_by} occurrence {self._event.occurrence}"[:200]
-        )
-        return self._writer
-
-    def given_up(self, reason: str) -> CaptureError:
-        """Remove what there is of it, and say why."""
+    def abandon(self, reason: str) -> CaptureError:
+        """Close it and remove what was written; return the error to raise."""
         self.is_closed = True
         if self._writer is not None and self.folder is not None:
             with suppress(OSError):
-                (aside(self.folder) / ALARM).unlink(missing_ok=True)
+                (incomplete_folder(self.folder) / ALARM).unlink(missing_ok=True)
             with suppress(ConfigError):
                 self._writer.abandon()
         return CaptureError(f"samples around alarm {self._event.identity.id} are lost: {reason}")
 
+    def _open(self) -> RecordingWriter:
+        self._root.mkdir(parents=True, exist_ok=True)
+        identity = self._event.identity
+        self.folder = new_folder(self._root, identity.unit, self._event.time_ns, identity.kind)
+        made_by = f"padwatch {version('padwatch')}, alarm {identity.id}"
+        made_by = f"{made_by} occurrence {self._event.occurrence}"[:200]
+        self._writer = self._make_writer(self.folder, made_by)
+        return self._writer
 
-def _write_alarms(path: Path, alarms: Sequence[AlarmEvent]) -> None:
+
+def write_alarms(path: Path, alarms: Sequence[AlarmEvent]) -> None:
+    """Write alarms with a checksum, as JSON that is synced to the disk."""
     document: dict[str, object] = {"alarms": [_alarm(event) for event in alarms]}
     text = json.dumps(document | {"checksum": checksum_of(document)}, indent=1) + "\n"
-    with path.open("w", encoding="utf-8") as file:
-        file.write(text)
-        file.flush()
-        os.fsync(file.fileno())
+    write_synced(path, text.encode())
 
 
 def _alarm(event: AlarmEvent) -> dict[str, Any]:
@@ -151,19 +134,36 @@ def _alarm(event: AlarmEvent) -> dict[str, Any]:
     }
 
 
+@dataclass(frozen=True)
+class SegmentSettings:
+    """Lengths of the pieces of a continuous recording.
+
+    Parameters
+    ----------
+    segment_s
+        Length of a finished recording.
+    part_s
+        Length of a part that is synced to the disk; a kill costs at most the open part and what
+        is queued.
+    """
+
+    segment_s: float = 600.0
+    part_s: float = 30.0
+
+
 MAX_PARTS = 10_000
 
 
-class Stretch:
-    """The stretch of a unit that is being written; lives in the thread that writes.
+class Segment:
+    """A segment of continuous samples that is being written, in one thread.
 
-    Each part is a finished recording, synced and renamed into place; the last one is in memory or
-    aside. :func:`service.recordings.continuous.joining.join` makes one recording of them.
+    Each part is a finished recording, synced and renamed into place. The newest part is in memory
+    or incomplete. `join` makes one recording of all parts.
 
     Parameters
     ----------
     first
-        Its first block; its time says where the stretch ends.
+        Its first block, whose time determines the end of the segment.
 
     Raises
     ------
@@ -172,24 +172,23 @@ class Stretch:
     """
 
     def __init__(
-        self, root: Path, unit: RecordedUnit, first: SampleBlock, settings: TapeSettings
+        self, root: Path, unit: RecordedUnit, first: SampleBlock, settings: SegmentSettings
     ) -> None:
         self._unit, self._settings = unit, settings
         self._is_decided = False
-        self._length_ns = ns_from_s(settings.stretch_s)
+        self._length_ns = ns_from_s(settings.segment_s)
         self._number = first.start_ns // self._length_ns
-        # should the device's time stand still
-        self._max_samples = 2 * round(settings.stretch_s * unit.rate_hz)
+        # a limit in case the time of the device stands still
+        self._max_samples = 2 * round(settings.segment_s * unit.rate_hz)
         self._n_samples = self._n_parts = 0
         self._writer: RecordingWriter | None = None
         self._opened_s = 0.0
-        self.folder = stretch_folder(root, unit.unit, first.start_ns)
-        parts = parts_folder(self.folder)
-        parts.mkdir()
-        _sync(root)
+        self.folder = new_folder(root, unit.unit, first.start_ns, CONTINUOUS)
+        parts_folder(self.folder).mkdir()
+        sync_folder(root)
 
-    def goes_on_to(self, block: SampleBlock) -> bool:
-        """Whether a block belongs to it: all stretches end at the same moments."""
+    def covers(self, block: SampleBlock) -> bool:
+        """Return whether a block belongs to it; all segments end at multiples of their length."""
         return (
             block.start_ns // self._length_ns == self._number
             and self._n_samples < self._max_samples
@@ -202,7 +201,7 @@ class Stretch:
         return 0 if self._writer is None else self._writer.n_samples
 
     def write(self, block: SampleBlock, now_s: float) -> None:
-        """Append a block to the part that is being written.
+        """Append a block to the open part.
 
         Raises
         ------
@@ -210,24 +209,29 @@ class Stretch:
             If it does not fit, or the disk refuses.
         """
         if self._writer is None:
-            self._writer, self._opened_s = self._open(), now_s
+            made_by = f"padwatch {version('padwatch')}, continuous"
+            folder = parts_folder(self.folder) / f"{self._n_parts:05d}"
+            self._writer = RecordingWriter(
+                folder, self._unit, made_by, first_decides=not self._is_decided
+            )
+            self._opened_s = now_s
         self._writer.write_block(block)
         self._n_samples += block.n_samples
 
     def is_due(self, now_s: float) -> bool:
-        """Whether the part has become long enough, or old enough."""
+        """Return whether the open part is long enough or old enough."""
         if self._writer is None:
             return False
         long_enough = self._writer.n_samples >= self._settings.part_s * self._unit.rate_hz
         return long_enough or now_s - self._opened_s >= self._settings.part_s
 
     def finish_part(self) -> int:
-        """Bring the part to the disk; return how many samples of each channel could not be.
+        """Sync the open part to the disk; return its number of samples per channel.
 
         Raises
         ------
         ConfigError
-            If the disk refuses; then the part is given up.
+            If the disk refuses; then the part is abandoned.
         """
         writer, self._writer = self._writer, None
         if writer is None or writer.n_samples == 0:
@@ -243,39 +247,24 @@ class Stretch:
         self._n_parts += 1
         return writer.n_samples
 
-    def _open(self) -> RecordingWriter:
-        made_by = f"padwatch {version('padwatch')}, continuous"
-        folder = part_folder(self.folder, self._n_parts)
-        return RecordingWriter(folder, self._unit, made_by, first_decides=not self._is_decided)
-
-
-def _sync(folder: Path) -> None:
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
 
 log = structlog.get_logger()
 
-FILES = (MANIFEST, BLOCKS, SAMPLES)
-
 
 def join(folder: Path) -> bool:
-    """Make one recording of the parts of a stretch; return whether there is one then.
+    """Make one recording of the parts of a segment; return whether it exists.
 
-    Whatever happens in between, it can be done again. A part that cannot be read is set aside.
+    The function may be repeated after an interruption. An unreadable part is set aside.
 
     Raises
     ------
     ConfigError, OSError
-        If the disk refuses; the parts are all there still.
+        If the disk refuses; then all parts still exist.
     """
     parts = parts_folder(folder)
-    _remove_aside(folder)
+    remove_recording(incomplete_folder(folder))
     if not folder.exists():
-        found = list(_readable(parts))
+        found = list(_readable(folder, parts))
         if found:
             _write(folder, found)
     _remove_parts(parts)
@@ -283,38 +272,24 @@ def join(folder: Path) -> bool:
 
 
 def unjoined(root: Path, units: Container[str | None]) -> list[Path]:
-    """Stretches of units that a crash has left in parts, oldest first of each.
+    """Return the segments of units that a crash left in parts, oldest first per unit.
 
-    Other processes may be writing those of other units.
+    Segments of other units are left out: another process may be writing them.
     """
     found = sorted(path for path in root.glob(f"*{PARTS}") if unit_of(path.name) in units)
-    return [joined_folder(path) for path in found if path.is_dir()]
+    return [path.with_name(path.name.removesuffix(PARTS)) for path in found if path.is_dir()]
 
 
-def clear_unfinished(root: Path, units: Container[str | None]) -> None:
-    """Remove what was being joined when the service was killed; its parts are still there.
-
-    Raises
-    ------
-    OSError
-        If the disk refuses.
-    """
-    for path in sorted(root.glob(f"*{INCOMPLETE}")):
-        if unit_of(path.name) in units:
-            _remove_folder(path)
-
-
-def _readable(parts: Path) -> Iterator[Recording]:
+def _readable(folder: Path, parts: Path) -> Iterator[Recording]:
     for part in sorted(parts.iterdir()):
         if part.name.endswith(INCOMPLETE):
             continue
         try:
             yield open_recording(part)
         except ConfigError as error:
-            aside = damaged_folder(parts, part)
-            part.rename(aside)
+            aside = part.rename(damaged_folder(folder, part))
             log.error(
-                "a part of a continuous recording is set aside",
+                "an unreadable part of a continuous recording is set aside",
                 folder=aside.name,
                 reason=str(error),
             )
@@ -329,20 +304,40 @@ def _write(folder: Path, parts: Sequence[Recording]) -> None:
                 writer.write(raw)
 
 
-def _remove_aside(folder: Path) -> None:
-    _remove_folder(folder.with_name(folder.name + INCOMPLETE))
-
-
 def _remove_parts(parts: Path) -> None:
     for part in sorted(parts.iterdir()):
-        _remove_folder(part)
+        remove_recording(part)
     parts.rmdir()
 
 
-def _remove_folder(folder: Path) -> None:
-    """Remove a recording, manifest first: half of one is none."""
-    if not folder.is_dir():
-        return
-    for name in FILES:
-        (folder / name).unlink(missing_ok=True)
-    folder.rmdir()
+class WriterThread:
+    """Base of the recorders: one thread for all writes, and a log entry when they fail or recover.
+
+    Parameters
+    ----------
+    what
+        Subject of the log messages.
+
+    Attributes
+    ----------
+    error
+        Why the last write failed; None after a success.
+    """
+
+    def __init__(self, name: str, what: str, clock: Clock) -> None:
+        self._clock, self._what = clock, what
+        self._thread = ThreadPoolExecutor(1, thread_name_prefix=name)
+        self._busy_since_s: float | None = None
+        self.error: str | None = None
+
+    def _note(self, error: str | None) -> None:
+        if error is not None and error != self.error:
+            log.error(f"{self._what} are not recorded", reason=error)
+        if error is None and self.error is not None:
+            log.info(f"{self._what} are recorded again")
+        self.error = error
+
+    async def _in_thread(self, do: Callable[..., None], *arguments: object) -> None:
+        self._busy_since_s = self._clock.monotonic_s()
+        await asyncio.get_running_loop().run_in_executor(self._thread, do, *arguments)
+        self._busy_since_s = None

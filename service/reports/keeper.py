@@ -13,7 +13,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import ANNOUNCED, AlarmEvent, AlarmNews
-from service.live.alarm_board import EvidenceStatus
+from service.live.alarm_list import EvidenceStatus
 from service.recordings.around_alarms import Captures, Outcome
 from service.reports.capture_link import link, link_all, note_lost
 from service.reports.folders import clear_leftovers, note_beginning, place_of

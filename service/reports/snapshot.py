@@ -9,7 +9,7 @@ from core.change.film_judge import FilmNews
 from core.change.settings import FilmRules
 from core.monitor.assessment import Assessment
 from service.live.live_view import LiveView, UnitStatus
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.settings.units import UnitSettings
 
 
@@ -60,7 +60,7 @@ class Camera:
     """Takes snapshots on the event loop; works in no time, since it only takes references."""
 
     def __init__(
-        self, units: Mapping[str, UnitSettings], live: LiveView, films: FilmKeeper
+        self, units: Mapping[str, UnitSettings], live: LiveView, films: FilmMonitor
     ) -> None:
         self._units, self._live, self._films = units, live, films
 

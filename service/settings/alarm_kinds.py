@@ -78,9 +78,11 @@ SERVICE_KINDS = kind_table(
     AlarmKind("stream_away", "Stream does not answer", None, STREAM, "steady", "stream_trouble"),
     AlarmKind(ANALYSIS_GONE, "No process analyses this unit", None, UNIT, "at_once"),
 )
-"""Kinds of alarms about the service. `rule` is a field of `ServiceRules`, `reading` one of
-`ServiceHealth`: a value that is compared with limits, or the text of a fault that raises the
-alarm."""
+"""The service's own kinds. `rule` is a field of `ServiceRules`, `reading` a key of
+`ServiceHealth.readings`: a value that is compared with limits, or the text of a fault."""
+
+DANGER_KINDS = frozenset(("stored_data_damaged", "stream_away"))
+"""Kinds whose fault is a danger; the fault of any other kind is an alert."""
 
 ALARM_KINDS: Mapping[str, AlarmKind] = MappingProxyType({**units.ALARM_KINDS, **SERVICE_KINDS})
 

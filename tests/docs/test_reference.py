@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from rigs.command_line import padwatch
 
+from service.settings.alarm_kinds import ALARM_KINDS
 from service.settings.loading import plant_file_schema
 from service.settings.sources.mapping import ImportMapping
 
@@ -17,6 +18,13 @@ def filled_page(name: str) -> str:
     from padwatch_reference import filled
 
     return filled((REFERENCE / name).read_text(encoding="utf-8"))
+
+
+def test_the_page_about_alarms_lists_every_kind() -> None:
+    page = filled_page("../how-to/alarms.md")
+    table = page.partition("| Alarm | Subject |")[2].partition("\n\n")[0]
+    cells = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
+    assert set(re.findall(r"`(\w+)`", " ".join(cells))) == set(ALARM_KINDS)
 
 
 def chapter(page: str, model: str) -> str:

@@ -14,7 +14,7 @@ from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import AnalysisSettings
 from core.monitor.monitor import UnitMonitor
 from core.quality import Reading, Reason, missing, uncertain
-from service.measuring.references_in_force import (
+from service.measuring.references import (
     LOOK_EVERY_S,
     ReferenceRefusedError,
     ReferencesInForce,
@@ -89,7 +89,7 @@ async def test_a_reference_set_while_the_service_runs_is_taken_over_at_the_next_
 
     assert stepped_clock.monotonic_s() % LOOK_EVERY_S == 0.0
     assert LOOK_EVERY_S <= 5.0
-    assert [line["event"] for line in logged] == ["reference taken over"] * 3
+    assert [line["event"] for line in logged] == ["reference in force"] * 3
     assert logged[0]["gap_reference_um"] == (1990.0, 2003.1)
 
 
@@ -205,7 +205,7 @@ def test_the_newest_mean_gaps_become_the_reference_and_doubtful_ones_are_named()
     ("found", "said"),
     [
         (None, "no stored result yet"),
-        (newest(23.0), r"of 2025-12-31T23:37:00\.000Z, 23 min ago; it may be at most 10 min old"),
+        (newest(23.0), r"from 2025-12-31T23:37:00\.000Z, 23 min ago; the maximum age is 10 min"),
         (newest(10.1), "10 min ago"),
         (newest(-23.0), "23 min ahead of this computer's clock"),
         (newest(gap_y_um=missing(Reason.SENSOR_FAILURE)), "gap_y_um .* no value: sensor_failure"),

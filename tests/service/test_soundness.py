@@ -12,9 +12,9 @@ import pytest
 from core.limits import AlarmLevel
 from core.monitor.assessment import Assessment
 from service.live.live_view import LiveView
-from service.measuring.counters import soundness_metrics
+from service.measuring.integrity import LOOK_EVERY_S, IntegrityMonitor
+from service.measuring.metrics import soundness_metrics
 from service.measuring.service_alarms import ServiceAlarms, ServiceHealth
-from service.measuring.soundness import LOOK_EVERY_S, Soundness
 from service.store.audit_port import AuditQuery
 from service.store.port import StoreError, TrendQuery
 from service.store.sqlite import SqliteStore
@@ -33,13 +33,13 @@ def path(tmp_path: Path, assessment: Build) -> Path:
     return made
 
 
-def told_to_prometheus(soundness: Soundness) -> dict[str, float]:
+def told_to_prometheus(soundness: IntegrityMonitor) -> dict[str, float]:
     return {s.name: s.value for metric in soundness_metrics(soundness) for s in metric.samples}
 
 
 async def test_of_what_is_sound_nothing_is_said(path: Path, stepped_clock: Any) -> None:
     with closing(SqliteStore(path)) as store:
-        soundness = Soundness(store, stepped_clock, LiveView([], stepped_clock, 30.0))
+        soundness = IntegrityMonitor(store, stepped_clock, LiveView([], stepped_clock, 30.0))
         await soundness.look()
 
         assert soundness.trouble is None
@@ -60,7 +60,7 @@ async def test_a_database_that_was_rolled_back_is_told_as_long_as_the_service_ru
         store.append([assessment(T0 + 9, speed_rpm=9.0)], [])
     shutil.copyfile(old, path)
     with closing(SqliteStore(path)) as store:
-        soundness = Soundness(store, stepped_clock, LiveView([], stepped_clock, 30.0))
+        soundness = IntegrityMonitor(store, stepped_clock, LiveView([], stepped_clock, 30.0))
         for _ in range(3):
             await soundness.look()
 
@@ -78,7 +78,7 @@ async def test_a_file_that_is_gone_is_told_and_nothing_is_written_until_it_is_ba
     live = LiveView([], stepped_clock, 30.0)
     with closing(SqliteStore(path)) as store:
         store.append([assessment(T0 + 8, speed_rpm=8.0)], [])
-        soundness = Soundness(store, stepped_clock, live)
+        soundness = IntegrityMonitor(store, stepped_clock, live)
         path.rename(tmp_path / "aside")
         if word == "replaced":
             path.touch()
@@ -117,13 +117,13 @@ async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_
     with closing(sqlite3.connect(path)) as other, other:
         other.execute("UPDATE assessment SET coverage = 0.5")
     with closing(SqliteStore(path)) as store:
-        soundness = Soundness(store, stepped_clock, LiveView([], stepped_clock, 30.0))
+        soundness = IntegrityMonitor(store, stepped_clock, LiveView([], stepped_clock, 30.0))
         for _ in range(3):
             assert list(store.trend(EVERYTHING).time_ns) == []
             await soundness.look()
         told = store.audit.entries(AuditQuery(action="store.row_damaged"))
 
-        assert soundness.trouble == "3 stored rows are damaged, and left out"
+        assert soundness.trouble == "3 stored rows are damaged and left out"
         assert told_to_prometheus(soundness)["padwatch_store_damaged_rows"] == 3.0
         assert sorted(entry.object for entry in told) == [
             f"assessment: series 1, time_ns {T0 + n}" for n in range(3)
@@ -131,8 +131,8 @@ async def test_rows_that_are_met_damaged_are_told_once_each(path: Path, stepped_
 
 
 def test_damage_is_an_alarm_of_danger_until_the_service_no_longer_knows_of_it() -> None:
-    trouble: list[str | None] = ["3 stored rows are damaged, and left out"]
-    alarms = ServiceAlarms((), None, lambda: ServiceHealth(stored_trouble=trouble[0]))
+    trouble: list[str | None] = ["3 stored rows are damaged and left out"]
+    alarms = ServiceAlarms((), None, lambda: ServiceHealth({"stored_trouble": trouble[0]}))
     (raised,) = (e for news in alarms.tick(T0) for e in news.events)
     trouble[0] = None
     (returned,) = (e for news in alarms.tick(T0 + 10**9) for e in news.events)
@@ -140,6 +140,6 @@ def test_damage_is_an_alarm_of_danger_until_the_service_no_longer_knows_of_it() 
     assert raised.identity.kind == "stored_data_damaged"
     assert (raised.level, str(raised.reason)) == (
         AlarmLevel.DANGER,
-        "3 stored rows are damaged, and left out",
+        "3 stored rows are damaged and left out",
     )
     assert returned.change.value == "returned"

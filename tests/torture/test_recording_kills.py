@@ -11,7 +11,8 @@ from harness.recordings_ledger import Recorded, promised, recorded
 from harness.service_rig import ServiceRig, until
 from harness.summary import Torture, planted
 
-from service.recordings.segment import clear_unfinished, join, unjoined
+from service.recordings.folders import remove_incomplete
+from service.recordings.segment import join, unjoined
 
 N_CYCLES, N_FEW, N_PLANTED = 50, 2, 4
 SYNC_S = 1.0
@@ -40,7 +41,7 @@ def killed(
             rig.kill()
     for folder in unjoined(root, plant.units):  # what there was no time for at the end
         join(folder)
-    clear_unfinished(root, plant.units)
+    remove_incomplete(root, plant.units)
     found = recorded(root, plant, 1, daq.offered())
     if found.n_samples < n_promised:
         found.wrong.append(f"lost: {n_promised} were promised, {found.n_samples} are there")

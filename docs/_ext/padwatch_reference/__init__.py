@@ -2,9 +2,11 @@
 
 A page of `docs/reference` holds a heading, a word to the reader and a line such as
 ``<!-- made when built: configuration -->``; that line is replaced as the page is read. Nothing of
-it is kept in the repository, so that nothing of it can be out of date.
+it is kept in the repository, so that nothing of it can be out of date. The table of alarms is
+written by hand; kinds that it lacks are added from the program's table of alarm kinds.
 """
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -12,6 +14,7 @@ from sphinx.application import Sphinx
 
 from padwatch_reference.commands import commands_markdown
 from padwatch_reference.configuration import import_markdown, plant_markdown
+from service.settings.alarm_kinds import ALARM_KINDS
 
 MADE: Mapping[str, Callable[[], str]] = {
     "configuration": plant_markdown,
@@ -20,13 +23,27 @@ MADE: Mapping[str, Callable[[], str]] = {
 }
 
 
+FURTHER_ALARMS = "<!-- made when built: further alarms -->"
+"""Place at the end of a table of alarm kinds."""
+
+
+def further_alarms(page: str) -> str:
+    """Return table rows for the alarm kinds that a page does not describe."""
+    described = set(re.findall(r"`(\w+)`", page))
+    return "\n".join(
+        f"| `{kind.name}` | {kind.subject} | {kind.label}. {kind.advice} | on |"
+        for kind in ALARM_KINDS.values()
+        if kind.name not in described
+    )
+
+
 def filled(page: str) -> str:
     """Fill a page's places with what they stand for."""
     for name, make in MADE.items():
         place = f"<!-- made when built: {name} -->"
         if place in page:
             page = page.replace(place, make())
-    return page
+    return page.replace(FURTHER_ALARMS, further_alarms(page))
 
 
 def _fill(_app: Sphinx, _name: str, source: list[str]) -> None:

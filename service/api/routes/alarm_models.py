@@ -19,7 +19,7 @@ from service.api.values import (
     cell_of,
     condition_model,
 )
-from service.live.alarm_board import AlarmBoard
+from service.live.alarm_list import AlarmList
 from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import AlarmKindName, value_unit
 from service.settings.storage import Origin
@@ -282,7 +282,7 @@ class AlarmEventsModel(ApiModel):
 
 
 def alarm_list_model(
-    engine: AlarmBoard, films: FilmBoard, origin: Origin, now_ns: int
+    engine: AlarmList, films: FilmBoard, origin: Origin, now_ns: int
 ) -> AlarmListModel:
     """Return the alarm list."""
     alarms = engine.alarms
@@ -297,12 +297,12 @@ def alarm_list_model(
     )
 
 
-def alarm_count_model(engine: AlarmBoard) -> AlarmCountModel:
+def alarm_count_model(engine: AlarmList) -> AlarmCountModel:
     """Numbers of alarms."""
     return AlarmCountModel(**vars(engine.count()))
 
 
-def alarm_model(engine: AlarmBoard, films: FilmBoard, alarm: Alarm) -> AlarmModel:
+def alarm_model(engine: AlarmList, films: FilmBoard, alarm: Alarm) -> AlarmModel:
     """Return the model of an alarm."""
     identity, condition = alarm.identity, alarm.condition
     is_judged = engine.is_judged(alarm)

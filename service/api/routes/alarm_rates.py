@@ -23,7 +23,7 @@ from service.api.routes.alarm_models import (
     alarm_model,
 )
 from service.api.values import ApiModel, Time
-from service.live.alarm_board import AlarmBoard
+from service.live.alarm_list import AlarmList
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
 from service.store.port import AlarmQuery, Store
@@ -157,7 +157,7 @@ def counted(store: Store, wanted: AlarmQuery, units: Sequence[str], rule: Chatte
 
 
 def alarm_rates_model(
-    engine: AlarmBoard, films: FilmBoard, found: Counted, shown: Collection[str], now_ns: int
+    engine: AlarmList, films: FilmBoard, found: Counted, shown: Collection[str], now_ns: int
 ) -> AlarmRatesModel:
     """Return figures, and the stale alarms of the shown units."""
     stale = [a for a in stale_alarms(engine.alarms, now_ns) if a.identity.unit in shown]

@@ -17,7 +17,7 @@ from service.api.context import Context, LiveLook, UnitId
 from service.api.problems import ProblemError, described_problems, problem_responses
 from service.api.values import ApiModel, QualityModel, Time, listed, quality_model
 from service.live.live_view import HELD_S
-from service.live.samples import Stretch, newest_stretch
+from service.live.samples import SampleWindow, newest_blocks, sample_window
 from service.runtime.times import rfc3339
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
 from service.settings.channels import ChannelSettings, SlowChannelSettings
@@ -301,26 +301,25 @@ def _uses(settings: UnitSettings) -> dict[str, list[str]]:
 
 
 def waveform_model(
-    settings: UnitSettings, channels: Sequence[str], stretch: Stretch, age_s: float
+    settings: UnitSettings, channels: Sequence[str], window: SampleWindow, age_s: float
 ) -> WaveformModel:
     """Return the model of samples."""
     units = {each.id: UNITS[each.measurand] for each in settings.channel}
-    found = zip(channels, stretch.samples, stretch.quality, strict=True)
     return WaveformModel(
         unit=settings.id,
-        time=rfc3339(stretch.start_ns),
+        time=rfc3339(window.start_ns),
         age_s=age_s,
-        epoch=stretch.epoch,
-        first_index=stretch.first_index,
-        rate_hz=stretch.rate_hz,
-        n_samples=stretch.samples.shape[1],
+        epoch=window.epoch,
+        first_index=window.first_index,
+        rate_hz=window.rate_hz,
+        n_samples=window.samples[channels[0]].size,
         channels={
             id_: ChannelSamplesModel(
                 unit=units[id_],
-                quality=quality_model(quality),
-                sample=listed(row),
+                quality=quality_model(window.quality[id_]),
+                sample=listed(window.samples[id_]),
             )
-            for id_, row, quality in found
+            for id_ in channels
         },
     )
 
@@ -378,10 +377,14 @@ def channel_router(context: Context) -> APIRouter:
         if not blocks or age_s is None:
             raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")
         n_samples = _n_samples(seconds, blocks[-1].rate_hz, len(chosen))
-        rows = [rows_of(settings, each)[0] for each in chosen]
-        return await rendered(
-            lambda: waveform_model(settings, chosen, newest_stretch(blocks, rows, n_samples), age_s)
-        )
+        rows = {each: rows_of(settings, each)[0] for each in chosen}
+
+        def model() -> WaveformModel:
+            held, first, n_held = newest_blocks(blocks, n_samples)
+            window = sample_window(held, rows, first, n_held, held[-1])
+            return waveform_model(settings, chosen, window, age_s)
+
+        return await rendered(model)
 
     return router
 

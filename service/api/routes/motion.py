@@ -26,8 +26,8 @@ from service.api.routes.recordings import (
 )
 from service.api.values import ApiModel, Time, listed
 from service.live.live_view import HELD_S
-from service.live.samples import newest_of, stretch_of
-from service.recordings.library import Kept
+from service.live.samples import newest_blocks, sample_window
+from service.recordings.library import RecordingEntry
 from service.recordings.motion import (
     NoMotionError,
     Order1,
@@ -178,18 +178,18 @@ def motion_model(
     unit: str, bearing: Bearing, motion: ShaftMotion, origin: MotionOrigin
 ) -> MotionModel:
     """Return the model of a motion and its origin."""
-    stretch, marks = motion.stretch, motion.marks
+    window, marks = motion.window, motion.marks
     return MotionModel(
         unit=unit,
         bearing=bearing.id,
         recording=origin.recording,
-        start=rfc3339(stretch.start_ns),
+        start=rfc3339(window.start_ns),
         offset_s=origin.offset_s,
         total_s=origin.total_s,
         age_s=origin.age_s,
-        epoch=stretch.epoch,
-        first_index=stretch.first_index,
-        rate_hz=stretch.rate_hz,
+        epoch=window.epoch,
+        first_index=window.first_index,
+        rate_hz=window.rate_hz,
         n_samples=motion.x_um.size,
         shaft_x_um=_rounded(motion.x_um),
         shaft_y_um=_rounded(motion.y_um),
@@ -373,8 +373,9 @@ def _newest(
     machine = machine_of(settings)
     ids = [channel.id for channel in machine.channels]
     rows = {id_: ids.index(id_) for id_ in channels_for(machine, bearing)}
-    held, first_index, n_samples = newest_of(blocks, seconds)
-    found = motion_of(stretch_of(held, rows, first_index, n_samples), machine, bearing)
+    n_wanted = max(1, round(seconds * blocks[-1].rate_hz))
+    held, first_index, n_samples = newest_blocks(blocks, n_wanted)
+    found = motion_of(sample_window(held, rows, first_index, n_samples), machine, bearing)
     return motion_model(settings.id, bearing, found, origin)
 
 
@@ -389,7 +390,7 @@ def _recorded(
     return motion_model(unit, bearing, found.motion, origin)
 
 
-def _unit_of(context: Context, kept: Kept) -> str:
+def _unit_of(context: Context, kept: RecordingEntry) -> str:
     if kept.manifest is None:
         raise damaged_recording(kept.name, ConfigError(kept.fault or "no manifest"))
     if kept.manifest.unit not in context.units:

@@ -16,7 +16,7 @@ from service.api.downloads import TooManyDownloadsError
 from service.api.problems import ProblemError, described_problems
 from service.api.routes.channels import UNITS, ChannelUnit
 from service.api.values import ApiModel, Time
-from service.recordings.library import Kept, Shelf
+from service.recordings.library import RecordingEntry, RecordingLibrary
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
 from service.store.waveform_port import WaveformKind
@@ -177,7 +177,7 @@ class RecordingInfoModel(ApiModel):
     """Files, except the manifest and the alarms."""
 
 
-def recording_model(kept: Kept) -> RecordingModel:
+def recording_model(kept: RecordingEntry) -> RecordingModel:
     """Return the entry of a recording in the list."""
     manifest = kept.manifest
     return RecordingModel(
@@ -195,7 +195,7 @@ def recording_model(kept: Kept) -> RecordingModel:
     )
 
 
-def recording_info(shelf: Shelf, kept: Kept) -> RecordingInfoModel:
+def recording_info(shelf: RecordingLibrary, kept: RecordingEntry) -> RecordingInfoModel:
     """Return the description of a recording.
 
     Raises
@@ -352,12 +352,12 @@ async def _download(
     return StreamingResponse(pieces, media_type=media_type, headers=headers)
 
 
-def shelf_of(context: Context) -> Shelf:
+def shelf_of(context: Context) -> RecordingLibrary:
     """Return the library of recordings; raise a problem of status 404 without one."""
     if context.recordings is None:
         words = "no recordings are kept here; see the process that analyses the unit"
         raise ProblemError(404, "No recordings", words)
-    return Shelf(context.recordings, context.faults())
+    return RecordingLibrary(context.recordings, context.faults())
 
 
 def unknown_recording(recording: str) -> ProblemError:

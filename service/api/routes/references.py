@@ -19,7 +19,7 @@ from service.api.values import (
     PlaceName,
     Time,
 )
-from service.measuring.references_in_force import VectorRefusedError, measured_vectors
+from service.measuring.references import VectorRefusedError, measured_vectors
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
 from service.store.gap_reference import GapReference

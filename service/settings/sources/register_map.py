@@ -146,7 +146,7 @@ class RegisterMapSettings(Settings):
         return self
 
     def register_map(self) -> RegisterMap:
-        """Return the map as a value of the adapters. Raises `MisfitError` if no device can have it."""
+        """Return the map of the adapters. Raises `MisfitError` if no device can have it."""
         default = MapDefaults(self.base, self.function, self.byte_order)
         register = 4 if self.function == 4 else 3
         for n, block in enumerate(self.together):

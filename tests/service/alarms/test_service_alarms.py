@@ -2,7 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,7 +35,9 @@ class Watched:
         self.alarms = ServiceAlarms(["U1"], ServiceRules(), lambda: self.health, leads=leads)
 
     def after(self, seconds: float, **health: Any) -> list[str]:
-        self.health = ServiceHealth(**health)
+        own = {field.name for field in fields(ServiceHealth)}
+        readings = {name: health.pop(name) for name in health.keys() - own}
+        self.health = ServiceHealth(readings, **health)
         self.host.step(round(seconds * SECOND))
         news = self.alarms.tick(self.host.ns)
         return [f"{e.identity.id} {e.change}" for told in news for e in told.events]
@@ -173,7 +175,7 @@ def stored(
         recorder = Recorder(uncertain, live, host, ParkedRows(path.with_name(FILE)))
 
         def look() -> ServiceHealth:
-            return ServiceHealth(live.store_error, recorder.behind_s)
+            return ServiceHealth(store_error=live.store_error, store_behind_s=recorder.behind_s)
 
         service = ServiceAlarms([], ServiceRules(), look)
         engine = AlarmEngine({}, recorder.put, host, service=service)

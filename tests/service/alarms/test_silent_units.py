@@ -13,7 +13,7 @@ from service.cluster.silent_units import SILENT_AFTER_S, SilentUnits
 from service.live.live_view import LiveView
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.recorder import ParkedRows, Recorder
-from service.measuring.service_alarms import identity_of
+from service.measuring.reported_alarms import identity_of
 from service.store.sharing import UnitReport
 from service.store.sqlite import SqliteStore
 

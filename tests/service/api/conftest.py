@@ -36,10 +36,10 @@ from service.app.storage import (
 )
 from service.live.live_view import LinkState, LiveView
 from service.measuring.alarm_engine import AlarmEngine, alarm_engine
-from service.measuring.commands import InProcess
-from service.measuring.films import FilmKeeper, film_keeper
+from service.measuring.commands import LocalCommands
+from service.measuring.films import FilmMonitor, film_monitor
 from service.measuring.recorder import FILE, ParkedRows, Recorder
-from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.references import ReferencesInForce
 from service.measuring.simulated_sources import simulated_feed
 from service.notifications.sender import Deliveries
 from service.recordings.segment import CaptureFile
@@ -79,7 +79,7 @@ class Service:
     alarms: AlarmEngine
     recorder: Recorder
     evidence: EvidenceKeeper
-    films: FilmKeeper
+    films: FilmMonitor
     loops: dict[str, str | None]
     context: Context
     desk: EvidenceDesk
@@ -153,7 +153,7 @@ async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
     alarms = await alarm_engine(plant, origin, store, recorder.put, clock)
     captures = captures_of(plant, Origin.REPLAY, clock)
     machines = {unit: monitor.unit for unit, monitor in monitors.items()}
-    films = await film_keeper(plant, machines, store.films, clock)
+    films = await film_monitor(plant, machines, store.films, clock)
     service = plant.service.model_copy(update={"data_folder": str(folder)})
     own = plant.model_copy(update={"service": service})
     evidence = evidence_of(own, origin, live, films, store, captures, clock)
@@ -169,7 +169,7 @@ async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
         references=references,
         alarms=alarms,
         films=films,
-        operators=InProcess(alarms, films, recorder),
+        operators=LocalCommands(alarms, films, recorder),
         captures=captures,
         deliveries=Deliveries([], store.outbox, clock),
         max_shelf_s=7200.0,

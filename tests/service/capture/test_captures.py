@@ -150,7 +150,7 @@ async def test_another_alarm_prolongs_the_capture_at_both_ends_instead_of_beginn
     film = raised(12.0, "stiffness_x")
     told: list[Outcome] = []
     async with running(root, settings) as rig:
-        rig.captures.tell(told.append)
+        rig.captures.set_listener(told.append)
         rig.send(0, 52, {49: raised(10.0)})
         if pause:  # a part of it is on the disk already
             await rig.until(lambda: any(root.glob("*.incomplete")))

@@ -33,7 +33,7 @@ async def test_a_service_that_stops_finishes_the_capture_with_what_there_is(root
 async def test_a_disk_that_refuses_is_told_and_the_next_capture_is_written(root: Path) -> None:
     async with running(root) as rig:
         told: list[Outcome] = []
-        rig.captures.tell(told.append)
+        rig.captures.set_listener(told.append)
         rig.refuse = OSError(28, "No space left on device")
         rig.send(0, 100, {49: raised(10.0)})
         await rig.until(lambda: rig.captures.error is not None and rig.captures.n_running == 0)

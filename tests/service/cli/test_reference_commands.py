@@ -63,7 +63,7 @@ def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path:
         (
             ("--measured",),
             {"x_um": None, "y_um": None},
-            "there is no stored result yet whose gaps could be taken",
+            "there is no stored result yet",
         ),
         (("--measured",), {}, "padwatch reference set: give gaps or --measured, not both"),
     ],

@@ -11,10 +11,10 @@ from rigs.capturing import Rig, block
 from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.manifest import RecordedUnit
-from service.recordings.continuous_recorder import Shed, Tape
-from service.recordings.segment import TapeSettings
+from service.recordings.continuous_recorder import ContinuousRecorder, DropReason
+from service.recordings.segment import SegmentSettings
 
-SETTINGS = TapeSettings(stretch_s=10.0, part_s=2.0)
+SETTINGS = SegmentSettings(segment_s=10.0, part_s=2.0)
 
 
 def recorded_unit(unit: str) -> RecordedUnit:
@@ -30,9 +30,9 @@ class TapeRig(Rig):
 
     def __init__(self, root: Path, units: tuple[str, ...]) -> None:
         self.root, self.clock = root, StandingClock()
-        self.reason: Shed | None = None
+        self.reason: DropReason | None = None
         recorded = {unit: recorded_unit(unit) for unit in units}
-        self.tape = Tape(root, recorded, SETTINGS, self.clock, lambda: self.reason)
+        self.tape = ContinuousRecorder(root, recorded, SETTINGS, self.clock, lambda: self.reason)
 
     def send(self, start: int, stop: int, unit: str = "U1", **how: float) -> None:
         for number in range(start, stop):

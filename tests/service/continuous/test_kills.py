@@ -12,10 +12,11 @@ from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.summary import summary_of
 from core.samples.blocks import SampleBlock
-from service.recordings.continuous_recorder import UnitTape, last_end
-from service.recordings.segment import TapeSettings, clear_unfinished, join, unjoined
+from service.recordings.continuous_recorder import UnitRecorder, last_end
+from service.recordings.folders import remove_incomplete
+from service.recordings.segment import SegmentSettings, join, unjoined
 
-SETTINGS = TapeSettings(stretch_s=4.0, part_s=2.0)
+SETTINGS = SegmentSettings(segment_s=4.0, part_s=2.0)
 N_BLOCKS = 30
 DEEDS = ("mkdir", "rename", "unlink", "rmdir")
 
@@ -48,14 +49,14 @@ def killed_at(deed: int, patch: pytest.MonkeyPatch) -> Iterator[list[str]]:
 
 def recover(root: Path) -> None:
     left = unjoined(root, ("U1",))
-    clear_unfinished(root, ("U1",))
+    remove_incomplete(root, ("U1",))
     for folder in left:
         join(folder)
 
 
 def record(root: Path, unit: RecordedUnit, blocks: list[SampleBlock], synced: list[int]) -> None:
     """Record as the service does, and note up to where samples were on the disk."""
-    tape = UnitTape(root, unit, SETTINGS, last_end(root, unit.unit))
+    tape = UnitRecorder(root, unit, SETTINGS, last_end(root, unit.unit))
     for each in blocks:
         tape.write(each, 0.0)
         synced[0] = max(synced[0], tape.n_written)
@@ -108,7 +109,7 @@ def test_a_kill_during_recovery_changes_nothing(
     blocks = [block(n) for n in range(15)]
 
     def crashed(root: Path) -> None:
-        tape = UnitTape(root, unit, SETTINGS)
+        tape = UnitRecorder(root, unit, SETTINGS)
         for each in blocks:
             tape.write(each, 0.0)
 

@@ -14,7 +14,7 @@ from service.app.service_health import Pressure
 from service.measuring.acquirer import Bus
 from service.recordings import continuous_recorder as tape
 from service.recordings import continuous_recorder as unit_tape
-from service.recordings.continuous_recorder import Shed, last_end
+from service.recordings.continuous_recorder import DropReason, last_end
 
 
 async def test_every_sample_is_in_recordings_that_end_at_full_multiples_of_their_length(
@@ -30,7 +30,7 @@ async def test_every_sample_is_in_recordings_that_end_at_full_multiples_of_their
     assert first.folder.name == "U1-20260101T000004.000Z-continuous"
     assert first.manifest.sample_type == "int16"
     assert rig.tape.n_written == 1000
-    assert not rig.tape.n_shed.total()
+    assert not rig.tape.n_dropped.total()
 
 
 async def test_what_a_part_holds_is_on_the_disk_before_the_recording_is_complete(
@@ -61,9 +61,9 @@ async def test_two_units_are_recorded_side_by_side_also_if_their_names_begin_ali
     assert (last_end(root, "pump"), last_end(root, "pump-b")) == ((1, 200), (1, 2000))
 
 
-@pytest.mark.parametrize("reason", [Shed.ANALYSIS_BEHIND, Shed.DISK_FULL])
+@pytest.mark.parametrize("reason", [DropReason.ANALYSIS_BEHIND, DropReason.DISK_FULL])
 async def test_what_gives_way_to_the_analysis_is_a_hole_with_number_and_reason(
-    running: Any, root: Path, reason: Shed
+    running: Any, root: Path, reason: DropReason
 ) -> None:
     async with running(root) as rig:
         rig.send(0, 10)
@@ -78,7 +78,7 @@ async def test_what_gives_way_to_the_analysis_is_a_hole_with_number_and_reason(
 
     assert samples(recording) == numbers(0, 10) + numbers(17, 30)
     assert summary_of(recording).rejected == {reason.value: 70}
-    assert rig.tape.n_shed == {reason: 70, Shed.DISK_REFUSED: 0}
+    assert rig.tape.n_dropped == {reason: 70, DropReason.DISK_REFUSED: 0}
 
 
 async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(
@@ -99,13 +99,13 @@ async def test_a_disk_that_does_not_keep_up_costs_samples_and_never_memory(
 async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
     running: Any, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    class RefusedStretch:
+    class RefusedSegment:
         def __init__(self, *_: object) -> None:
             raise OSError(28, "No space left on device")
 
     async with running(root) as rig:
         with monkeypatch.context() as patch:
-            patch.setattr(unit_tape, "Stretch", RefusedStretch)
+            patch.setattr(unit_tape, "Segment", RefusedSegment)
             rig.send(0, 10)
             await rig.until(lambda: rig.tape.error is not None)
         assert "No space left on device" in rig.tape.trouble
@@ -115,7 +115,7 @@ async def test_a_disk_that_refuses_is_told_and_recording_goes_on_after_it(
 
     assert samples(recording) == numbers(10, 20)
     assert summary_of(recording).rejected == {"disk_refused": 100}
-    assert rig.tape.n_shed[Shed.DISK_REFUSED] == 100
+    assert rig.tape.n_dropped[DropReason.DISK_REFUSED] == 100
 
 
 @pytest.mark.parametrize(
@@ -228,13 +228,13 @@ async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_mo
     plant.clock.s = pressure.BEHIND_S
     assert plant.pressure.look() is None
     plant.clock.s += 0.1
-    assert plant.pressure.look() is Shed.ANALYSIS_BEHIND
+    assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND
 
     await anext(plant.bus.blocks())
     plant.bus.done()
     await plant.bus.publish(block(1))
     plant.clock.s += 0.5 * pressure.BEHIND_S
-    assert plant.pressure.look() is Shed.ANALYSIS_BEHIND  # not well enough yet
+    assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND  # not well enough yet
     await anext(plant.bus.blocks())
     plant.bus.done()
     assert plant.pressure.look() is None
@@ -243,7 +243,7 @@ async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_mo
 async def test_a_queue_that_fills_does_as_well(plant: Plant) -> None:
     for number in range(26):
         await plant.bus.publish(block(number))
-    assert plant.pressure.look() is Shed.ANALYSIS_BEHIND
+    assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND
 
 
 async def test_questions_are_given_up_before_samples_are(plant: Plant) -> None:
@@ -252,9 +252,9 @@ async def test_questions_are_given_up_before_samples_are(plant: Plant) -> None:
     plant.clock.s = 10 * pressure.BEHIND_S
     assert plant.pressure.look() is None
     plant.refuses_questions = True
-    assert plant.pressure.look() is Shed.ANALYSIS_BEHIND
+    assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND
 
 
 def test_a_disk_that_is_nearly_full_takes_no_more_recordings(plant: Plant) -> None:
     plant.is_full = True
-    assert plant.pressure.look() is Shed.DISK_FULL
+    assert plant.pressure.look() is DropReason.DISK_FULL

@@ -15,7 +15,7 @@ from core.monitor.assessment import Assessment
 from core.quality import Reading
 from service.app.storage import captures_of, evidence_folders, evidence_of
 from service.live.live_view import LinkState, LiveView
-from service.measuring.films import FilmKeeper, film_keeper
+from service.measuring.films import FilmMonitor, film_monitor
 from service.reports.archive import EvidenceArchive
 from service.reports.capture_link import CapturePart, linked
 from service.settings.core_values import machine_of
@@ -49,7 +49,7 @@ class Rig:
     until = staticmethod(until)
 
     def __init__(
-        self, plant: PlantFile, clock: Any, films: FilmKeeper, store: SqliteStore, live: LiveView
+        self, plant: PlantFile, clock: Any, films: FilmMonitor, store: SqliteStore, live: LiveView
     ) -> None:
         self.plant, self.clock, self.store, self.live, self.films = plant, clock, store, live, films
         self.folders = evidence_folders(plant)
@@ -118,7 +118,7 @@ async def rig_of(
         for bearing in ("UJB", "LJB"):
             live.set_assessment(assessment(bearing=bearing, order1_shaft_x_um_pk=Reading(160.0)))
         machines = {unit.id: machine_of(unit) for unit in of.unit}
-        films = await film_keeper(of, machines, store.films, stepped_clock)
+        films = await film_monitor(of, machines, store.films, stepped_clock)
         return Rig(of, stepped_clock, films, store, live)
 
     yield build

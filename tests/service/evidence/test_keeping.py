@@ -14,7 +14,7 @@ from core.alarms.alarm import AlarmEvent
 from core.quality import Reading
 from service.recordings.around_alarms import Outcome
 from service.recordings.folders import ALARM
-from service.recordings.segment import _write_alarms
+from service.recordings.segment import write_alarms
 from service.reports import keeper as module
 from service.reports.archive import DamagedEvidenceError
 from service.reports.document import Evidence
@@ -40,7 +40,7 @@ def recorded(folder: Path, event: AlarmEvent) -> Path:
     """What a finished capture leaves, as far as links go."""
     folder.mkdir(parents=True)
     (folder / MANIFEST).write_text("{}")
-    _write_alarms(folder / ALARM, [event])
+    write_alarms(folder / ALARM, [event])
     return folder
 
 

@@ -24,7 +24,7 @@ from service.live.commands import (
     Renew,
     Thaw,
 )
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.settings.films import FilmAlarmSettings
 from service.store.film_port import BaselineStep, FilmHistory, FilmQuery
 from service.store.sqlite import SqliteStore
@@ -41,17 +41,17 @@ class Plant:
     def __init__(self, store: SqliteStore, film_news: Tell, clock: Any) -> None:
         self.store, self.film_news, self.clock = store, film_news, clock
 
-    async def start(self, **settings: Any) -> FilmKeeper:
+    async def start(self, **settings: Any) -> FilmMonitor:
         """A keeper as after a start."""
         given = FilmAlarmSettings(**settings)
         rules = {"U1": rules_of(given)}
-        keeper = FilmKeeper({"U1": unit()}, rules, given, self.store.films, self.clock)
+        keeper = FilmMonitor({"U1": unit()}, rules, given, self.store.films, self.clock)
         await keeper.start()
         return keeper
 
     async def live(
         self,
-        keeper: FilmKeeper,
+        keeper: FilmMonitor,
         history: StiffnessHistory,
         days: tuple[int, int],
         every: int = 1,
@@ -94,7 +94,7 @@ def rules_of(settings: FilmAlarmSettings) -> FilmRules:
     return FilmRules({"UJB": Estimator.DYNAMIC}, CellGrid(), operating, limits, 600 * 10**9)
 
 
-def in_force(keeper: FilmKeeper) -> int | None:
+def in_force(keeper: FilmMonitor) -> int | None:
     baseline = keeper.baseline("U1", "UJB")
     return baseline.origin.version if baseline else None
 
@@ -173,7 +173,7 @@ async def test_engineers_decide_where_it_is_left_to_them(plant: Plant, film_life
 
     await keeper.act(UJB, Accept(2), "Ada", "compared with last year")
     assert in_force(keeper) == 2
-    with pytest.raises(BaselineRefusedError, match="version 2 is in force already"):
+    with pytest.raises(BaselineRefusedError, match="version 2 is already in force"):
         await keeper.act(UJB, Accept(2), "Ada", "again")
     with pytest.raises(BaselineRefusedError, match="no version 7"):
         await keeper.act(UJB, Accept(7), "Ada", "a guess")
@@ -201,7 +201,7 @@ async def test_what_is_frozen_is_learned_no_further_until_it_is_thawed(
     await keeper.act(UJB, Freeze(), "Ada", "enough")
     await plant.live(keeper, history, (22, 35))
     assert len(plant.versions) == 1
-    with pytest.raises(BaselineRefusedError, match="frozen already"):
+    with pytest.raises(BaselineRefusedError, match="already frozen"):
         await keeper.act(UJB, Freeze(), "Ada", "again")
     await keeper.act(UJB, Thaw(), "Ada", "winter is missing")
     await plant.live(keeper, history, (35, 37))
@@ -217,7 +217,7 @@ async def test_an_overhaul_begins_everything_again(plant: Plant, film_life: Film
 
     await keeper.act(UJB, Renew(plant.clock.now_ns()), "Ada", "new pads")
     assert in_force(keeper) is None
-    with pytest.raises(BaselineRefusedError, match="before the last machine event"):
+    with pytest.raises(BaselineRefusedError, match="older than the last machine event"):
         await keeper.act(UJB, Accept(1), "Ada", "the old one")
     event_ns = plant.clock.now_ns()
     await plant.live(keeper, history, (25, 50))

@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.clock import Clock
 from core.samples.blocks import SampleBlock
-from service.measuring.counters import MAX_REASONS, bounded
+from service.measuring.metrics import MAX_REASONS, bounded
 from service.measuring.timings import Timings
 from service.runtime.heartbeats import Pulse
 from service.runtime.metrics import Durations

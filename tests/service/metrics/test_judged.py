@@ -13,7 +13,7 @@ from core.change.film_judge import FilmFinding, FilmNews
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.counters import alarm_metrics, film_metrics
+from service.measuring.metrics import alarm_metrics, film_metrics
 from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import Receiver, ReceiverView, SenderStatus
 from service.store.outbox import Backlog

@@ -10,7 +10,7 @@ from core.arrays import FloatArray
 from core.machine.channel import Channel, Measurand
 from core.machine.unit import Bearing, Unit
 from core.quality import Reading
-from service.live.samples import ShaftStretch
+from service.live.samples import SampleWindow
 from service.recordings.motion import ShaftMotion, motion_of
 
 RATE_HZ, TURN_HZ, N = 600.0, 1.5, 6000
@@ -45,7 +45,7 @@ def machine(**changes: object) -> Unit:
     return Unit(**{**settings, **changes})  # type: ignore[arg-type]
 
 
-def stretch(slow: Mapping[str, Reading] | None = None, **changes: FloatArray) -> ShaftStretch:
+def stretch(slow: Mapping[str, Reading] | None = None, **changes: FloatArray) -> SampleWindow:
     """A circle of 50 µm from x to y about a centre; all gaps have grown; pulses fall."""
     x = CENTRE_X_UM + 50.0 * np.cos(2.0 * math.pi * TURNS)
     y = CENTRE_Y_UM + 50.0 * np.sin(2.0 * math.pi * TURNS)
@@ -56,10 +56,10 @@ def stretch(slow: Mapping[str, Reading] | None = None, **changes: FloatArray) ->
         "far_y": 1950.0 + GROWTH_UM + y,
         "mark": np.where((TURNS + 0.3) % 1.0 < 0.02, -5.0, 0.0),
     }
-    return ShaftStretch(1, 0, 0, RATE_HZ, {**samples, **changes}, slow or {"speed": Reading(91.0)})
+    return SampleWindow(1, 0, 0, RATE_HZ, {**samples, **changes}, slow or {"speed": Reading(91.0)})
 
 
-def motion(given: ShaftStretch, **changes: object) -> ShaftMotion:
+def motion(given: SampleWindow, **changes: object) -> ShaftMotion:
     unit = machine(**changes)
     return motion_of(given, unit, unit.bearings[0])
 
@@ -99,6 +99,6 @@ def test_a_moment_too_short_for_a_turn_is_motion_without_its_part_at_running_spe
 ) -> None:
     whole = stretch()
     short = {id_: each[:n_samples] for id_, each in whole.samples.items()}
-    found = motion(ShaftStretch(1, 0, 0, RATE_HZ, short, whole.slow))
+    found = motion(SampleWindow(1, 0, 0, RATE_HZ, short, whole.slow))
     assert found.x_um.size == n_samples
     assert found.order1 is None

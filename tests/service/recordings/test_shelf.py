@@ -7,7 +7,7 @@ import pytest
 from rigs.capturing import block, recorded_unit
 
 from acquisition.recordings.writer import RecordingWriter
-from service.recordings.library import Shelf
+from service.recordings.library import RecordingLibrary
 from service.store.waveform_port import WaveformKind
 
 FIRST = "U1-20260101T000000.000Z-continuous"
@@ -25,13 +25,13 @@ def make(folder: Path) -> None:
 
 
 @pytest.fixture
-def shelf(tmp_path: Path) -> Shelf:
+def shelf(tmp_path: Path) -> RecordingLibrary:
     captures, recordings = tmp_path / "captures", tmp_path / "recordings"
     make(captures / CAPTURE)
     for name in (FIRST, SECOND, OTHER, LONGER):
         make(recordings / name)
     (recordings / "U1-20260101T002000.000Z-continuous.parts").mkdir()
-    return Shelf((captures, recordings))
+    return RecordingLibrary((captures, recordings))
 
 
 @pytest.mark.parametrize(
@@ -45,14 +45,14 @@ def shelf(tmp_path: Path) -> Shelf:
     ],
 )
 def test_whole_recordings_are_listed_newest_first_by_unit_and_kind(
-    shelf: Shelf, asked: tuple[Any, ...], names: list[str]
+    shelf: RecordingLibrary, asked: tuple[Any, ...], names: list[str]
 ) -> None:
     found = shelf.newest(*asked)
     assert [kept.name for kept in found] == names
     assert {kept.kind for kept in found} >= set(asked[2:])
 
 
-def test_one_of_either_kind_is_opened_by_its_name(shelf: Shelf) -> None:
+def test_one_of_either_kind_is_opened_by_its_name(shelf: RecordingLibrary) -> None:
     assert shelf.opened(CAPTURE).manifest.unit == "U1"
     assert shelf.opened(OTHER).manifest.unit == "U2"
     assert shelf.one("../captures") is None

@@ -15,7 +15,7 @@ from core.samples.gaps import SampleAccount
 from service.cluster.replica_state import SILENT_AFTER_S, ReplicaLive
 from service.live.live_view import LinkState, LiveView, UnitStatus
 from service.live.unit_state import UnitSigns, read_signs, written_signs
-from service.measuring.describing import bearing_state, unit_signs
+from service.measuring.snapshots import bearing_state, unit_signs
 from service.settings.loading import load_plant_file
 
 STALE_AFTER_S = 30.0

@@ -26,7 +26,7 @@ from core.samples.gaps import Reach
 from service.live.live_view import LiveView
 from service.measuring.alarm_engine import AlarmEngine
 from service.measuring.analyser import Runner
-from service.measuring.films import FilmKeeper
+from service.measuring.films import FilmMonitor
 from service.measuring.recorder import FILE, ParkedRows, Recorder
 from service.measuring.sources import WatchedUnit
 from service.recordings.around_alarms import Captures, CaptureSettings
@@ -159,7 +159,7 @@ class Plant:
         )
         self.capture_folder = path.parent / "captures"
         units = {name: unit_named(name) for name in ("U1", "U2")}
-        self.films = FilmKeeper(
+        self.films = FilmMonitor(
             units,
             dict.fromkeys(units, "not here"),
             FilmAlarmSettings(),

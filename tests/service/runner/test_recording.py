@@ -26,9 +26,9 @@ from core.samples.gaps import Gap
 from service.api.context import Context
 from service.app.web import application
 from service.measuring import recorder as recording
-from service.measuring.commands import InProcess
+from service.measuring.commands import LocalCommands
 from service.measuring.recorder import FILE, Findings, NotStoredError, ParkedRows, Recorder
-from service.measuring.references_in_force import ReferencesInForce
+from service.measuring.references import ReferencesInForce
 from service.notifications.sender import Deliveries
 from service.store.port import TrendQuery, UnitGap
 
@@ -100,7 +100,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
             *("Plant", {}, plant.live, plant.store, plant.clock, 9.0, references),
             alarms=plant.alarms,
             films=plant.films,
-            operators=InProcess(plant.alarms, plant.films, plant.recorder),
+            operators=LocalCommands(plant.alarms, plant.films, plant.recorder),
             captures=plant.captures,
             deliveries=Deliveries([], plant.store.outbox, plant.clock),
         )
@@ -131,7 +131,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
     ("finds_again", "said"),
     [
         (False, ("error", "results are lost")),
-        (True, ("warning", "results were not stored; they are found again at the next start")),
+        (True, ("warning", "results were not stored; the next start repeats them")),
     ],
 )
 async def test_only_results_that_nobody_finds_again_are_said_to_be_lost(
@@ -279,7 +279,7 @@ async def test_who_waits_for_the_disk_is_told_what_will_never_be_there(
     await asyncio.sleep(0)
     plant.recorder.put(Findings(alarms=[news_of("sy")]))
     written = asyncio.create_task(plant.recorder.stored())
-    with pytest.raises(NotStoredError, match="too much"):
+    with pytest.raises(NotStoredError, match="queue to the store is full"):
         await given_up
     await plant.recorder.flush()
     await written

@@ -11,7 +11,7 @@ from rigs.assessments import assessment
 from rigs.store_fixtures import Execute, at
 
 from service.live.live_view import LiveView
-from service.measuring.soundness import Soundness
+from service.measuring.integrity import IntegrityMonitor
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats
 from service.runtime.periodic import LOOK_S
 from service.store.access.identities import Role, Session
@@ -123,7 +123,7 @@ async def test_what_it_finds_is_told_in_the_audit_trail_and_makes_the_alarm(
 ) -> None:
     execute(f"DELETE FROM assessment WHERE time_ns = {at(3)}")  # noqa: S608
     with closing(SqliteStore(path)) as store:
-        soundness = Soundness(store, stepped_clock, LiveView([], stepped_clock, 30.0))
+        soundness = IntegrityMonitor(store, stepped_clock, LiveView([], stepped_clock, 30.0))
         loop = Scrubbing(store.integrity, stepped_clock)
         while not await loop.look():
             pass
@@ -131,7 +131,7 @@ async def test_what_it_finds_is_told_in_the_audit_trail_and_makes_the_alarm(
         (told,) = store.audit.entries(AuditQuery(action="store.row_damaged"))
 
     assert soundness.trouble is not None
-    assert told.reason == "the row is gone"
+    assert told.reason == "the row is missing"
 
 
 async def test_a_disk_that_stands_still_makes_the_loop_rest_but_not_fall_silent(

@@ -14,8 +14,8 @@ from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
 from core.machine.channel import Measurand
 from service.recordings.index import Index
-from service.recordings.keeper import WatchKeeping, WaveformKeeper
-from service.recordings.retention import Caretaker, Custody, Gauge, RoomLimits
+from service.recordings.keeper import RecordingIndexer, RecordingLock
+from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
 from service.runtime.disk import DiskSpace, SpaceLimits
 from service.store.sqlite import SqliteStore
 from service.store.waveform_port import WaveformFile, WaveformKind
@@ -63,15 +63,17 @@ class Rig:
         self.space = DiskSpace(1, 10**12, 10**12)
         self.hire()
 
-    def hire(self) -> Caretaker:
+    def hire(self) -> RecordingRetention:
         """Begin anew, as after a restart."""
-        self.gauge = Gauge(self.roots, SpaceLimits(0.1, 0.05, 0, 0), self.measured)
-        custody = Custody(self.roots, self.room, self.gauge, lambda: self.bound)
-        self.caretaker = Caretaker(custody, Index(self.store.waveforms, "here"), self.clock)
+        self.gauge = SpaceGauge(self.roots, SpaceLimits(0.1, 0.05, 0, 0), self.measured)
+        custody = RetentionRules(self.roots, self.room, self.gauge, lambda: self.bound)
+        self.caretaker = RecordingRetention(
+            custody, Index(self.store.waveforms, "here"), self.clock
+        )
         return self.caretaker
 
-    def keeper(self, hire: Callable[[], Caretaker] | None = None) -> WaveformKeeper:
-        return WaveformKeeper(self.gauge, hire or self.hire, self.clock, WatchKeeping(self.root))
+    def keeper(self, hire: Callable[[], RecordingRetention] | None = None) -> RecordingIndexer:
+        return RecordingIndexer(self.gauge, hire or self.hire, self.clock, RecordingLock(self.root))
 
     def measured(self, _: Path) -> DiskSpace:
         return self.space

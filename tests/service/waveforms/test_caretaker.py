@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from service.recordings.folders import place_of, put_out_of_sight
-from service.recordings.index import again
+from service.recordings.folders import begin_removal, place_of
+from service.recordings.index import reinspected
 from service.store.waveform_port import WaveformKind, WaveformState
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
@@ -114,12 +114,12 @@ def test_what_is_read_once_more_takes_a_small_share_of_the_time(
 ) -> None:
     def slow(*how: Any) -> Any:
         rig.clock.s += 4.0
-        return again(*how)
+        return reinspected(*how)
 
     for hour in range(3):
         rig.make(hour)
     rig.caretaker.look()
-    monkeypatch.setattr("service.recordings.retention.again", slow)
+    monkeypatch.setattr("service.recordings.retention.reinspected", slow)
     rig.clock.s = DAY_S + 1.0
     for _ in range(100):
         rig.caretaker.look()
@@ -131,7 +131,7 @@ def test_what_is_read_once_more_takes_a_small_share_of_the_time(
 def test_a_removal_that_a_kill_has_interrupted_is_finished(rig: Any) -> None:
     folder, other = rig.make(0), rig.make(1)
     rig.caretaker.look()
-    put_out_of_sight(folder)
+    begin_removal(folder)
     rig.hire()
     rig.caretaker.look()
 

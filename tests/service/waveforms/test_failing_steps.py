@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from service.app.service_health import health_of
-from service.recordings.library import Shelf
+from service.recordings.library import RecordingLibrary
 from service.runtime.disk import DiskSpace
 from service.store.port import StoreError
 from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
@@ -105,7 +105,7 @@ def test_files_of_others_in_a_removed_folder_stay_and_stop_nothing(rig: Any) -> 
     rig.caretaker.look()
     assert rig.names() == [left.name]
     assert rig.files() == []
-    assert Shelf((rig.roots[CONTINUOUS],)).newest(10) == []
+    assert RecordingLibrary((rig.roots[CONTINUOUS],)).newest(10) == []
 
 
 def test_a_folder_that_is_away_stops_nothing_in_another(rig: Any, tmp_path: Path) -> None:
@@ -213,13 +213,16 @@ def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> 
     assert rig.names() == [folder.name]  # nothing is lost
     rig.clock.s += 55.0
     keeper.look()
-    assert look().recording_error is None
+    assert look().readings["recording_error"] is None
     rig.clock.s += 5.0
-    assert look().recording_error == "recordings are not looked after: database or disk is full"
+    assert (
+        look().readings["recording_error"]
+        == "recordings are not maintained: database or disk is full"
+    )
     index.is_away = False
     keeper.look()
 
-    assert look().recording_error is None
+    assert look().readings["recording_error"] is None
     keeper.close()
 
 

@@ -11,8 +11,8 @@ from harness.corruption import CHANGES, corrupted
 from acquisition.errors import ConfigError
 from acquisition.recordings.reader import open_recording
 from service.recordings import index as inspection
-from service.recordings.index import AGAIN_S, Found, RecordingCheck
-from service.recordings.library import Shelf
+from service.recordings.index import RETRY_S, RecordingCheck, RecordingState
+from service.recordings.library import RecordingLibrary
 from service.store.waveform_port import WaveformKind, WaveformState
 
 CONTINUOUS = WaveformKind.CONTINUOUS
@@ -49,7 +49,7 @@ def test_a_passing_error_makes_nothing_damaged(
     assert checked[other.name] > checked[folder.name]  # it holds up no other
     assert not rig.caretaker.faults
     del refusal[folder.name]
-    rig.clock.s += AGAIN_S
+    rig.clock.s += RETRY_S
     rig.caretaker.look()
 
     assert [file.state for file in rig.files()] == [WaveformState.PRESENT] * 2
@@ -64,7 +64,7 @@ def test_a_passing_error_renames_nothing_that_is_new(rig: Any, refusal: dict[str
     assert rig.names() == [folder.name, other.name]
     assert [file.name for file in rig.files()] == [other.name]
     refusal.clear()
-    rig.clock.s += AGAIN_S
+    rig.clock.s += RETRY_S
     rig.caretaker.look()
 
     assert [file.name for file in rig.files()] == [folder.name, other.name]
@@ -76,11 +76,11 @@ def test_the_check_of_all_names_what_cannot_be_read_and_goes_on(
     folder, other = rig.make(0), rig.make(1)
     rig.caretaker.look()
     refusal[folder.name] = OSError(errno.EIO, "Input/output error")
-    one, two = RecordingCheck(rig.roots, rig.files(), rig.clock.now_ns()).verdicts()
+    one, two = RecordingCheck(rig.roots, rig.files(), rig.clock.now_ns()).results()
 
-    assert (one.name, one.found) == (folder.name, Found.DAMAGED)
+    assert (one.name, one.found) == (folder.name, RecordingState.DAMAGED)
     assert one.reason == "it cannot be read: Input/output error"
-    assert (two.name, two.found) == (other.name, Found.SOUND)
+    assert (two.name, two.found) == (other.name, RecordingState.SOUND)
 
 
 def test_memory_that_is_short_makes_nothing_damaged(
@@ -98,7 +98,9 @@ def test_memory_that_is_short_makes_nothing_damaged(
 
 def test_nothing_of_a_recording_that_is_known_to_be_damaged_is_handed_out(rig: Any) -> None:
     folder = rig.make(0)
-    shelf = Shelf((rig.roots[WaveformKind.CONTINUOUS],), {folder.name: "a bit has flipped"})
+    shelf = RecordingLibrary(
+        (rig.roots[WaveformKind.CONTINUOUS],), {folder.name: "a bit has flipped"}
+    )
 
     for read in (shelf.opened, shelf.summary, shelf.zip_pieces):
         with pytest.raises(ConfigError, match="a bit has flipped"):

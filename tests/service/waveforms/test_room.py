@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
-from service.recordings.retention import NotOldFrom
+from service.recordings.retention import AgeLimit
 from service.runtime.disk import DiskSpace
 from service.store.waveform_port import WaveformFile, WaveformKind
 
@@ -102,7 +102,7 @@ def day_of(stop_ns: int, unit: str = "U1") -> list[WaveformFile]:
 
 def old(files: list[WaveformFile], now_ns: int = NOW_NS) -> list[WaveformFile]:
     """Those that are older than two days."""
-    not_old = NotOldFrom(files, now_ns, 2 * DAY_NS)
+    not_old = AgeLimit(files, now_ns, 2 * DAY_NS)
     return [file for file in files if not_old.is_old(file)]
 
 

@@ -17,13 +17,10 @@ from service.app.simulated_daq import fifo_device, modbus_server, polled_device,
 from service.cli.offline.probing import link_settings_of
 from service.measuring.simulated_sources import simulated_feed
 from service.measuring.sources import (
-    at_poll_rate,
-    fifo_source,
+    modbus_source,
+    monitor_for,
     polled_settings,
-    polled_source,
     retry_s,
-    vector_monitor,
-    vector_source,
 )
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.loading import load_plant_file
@@ -87,10 +84,10 @@ async def test_a_rack_agrees_with_the_waveforms(settings, unit, stepped_clock) -
     device.produce(12)
     found = {}
     async with served(device) as endpoint:
-        source = vector_source(
+        source = modbus_source(
             plan.model_copy(update=endpoint), unit, calibration_of(settings), stepped_clock
         )
-        monitor = vector_monitor(plan, unit, AnalysisSettings())
+        monitor = monitor_for(plan, unit, AnalysisSettings())
         async with source.connect() as stream:
             while not found:
                 found = {a.bearing: a.readings for a in monitor.ingest(await anext(stream))}
@@ -110,8 +107,8 @@ async def test_queues_bring_the_very_counts(settings, unit, stepped_clock) -> No
     feed = simulated_feed(settings, stepped_clock)
     blocks: list[SampleBlock] = []
     async with served(fifo_device(plan, unit, feed, on_demand=True)) as endpoint:
-        source = fifo_source(
-            plan.model_copy(update=endpoint), calibration_of(settings), stepped_clock
+        source = modbus_source(
+            plan.model_copy(update=endpoint), unit, calibration_of(settings), stepped_clock
         )
         async with source.connect() as stream:
             while not blocks or blocks[-1].stop_index < 600:
@@ -131,11 +128,12 @@ async def test_polled_registers_show_the_newest_sample(settings, unit, stepped_c
     feed = simulated_feed(settings, clock)
     device = polled_device(plan, unit, calibration, feed, on_demand=True)
     async with served(device) as endpoint:
-        source = polled_source(plan.model_copy(update=endpoint), unit, calibration, clock)
+        source = modbus_source(plan.model_copy(update=endpoint), unit, calibration, clock)
         async with source.connect() as stream:
             block = await anext(stream)
 
-    assert block.rate_hz == at_poll_rate(plan, unit).rate_hz == 100.0
+    monitor = monitor_for(plan, unit, AnalysisSettings())
+    assert block.rate_hz == monitor.unit.rate_hz == 100.0
     assert block.n_samples == settings.block_samples
     probe = block.samples[[c.id for c in unit.channels].index("ujb_shaft_x")]
     assert 1000.0 < probe.mean() < 3000.0

@@ -90,19 +90,19 @@ def test_a_unit_with_fixed_films_has_no_past(stepped_clock: Any) -> None:
 
 def test_a_unit_that_cannot_have_this_life_is_refused(tmp_path: Path, stepped_clock: Any) -> None:
     odd = plant_with(LIFE.replace("life_seed = 2", "life_seed = 3"), tmp_path).unit[0]
-    with pytest.raises(ConfigError, match=r"rated_speed_rpm = 92\.3, but its life is of 90\.9"):
+    with pytest.raises(ConfigError, match=r"rated_speed_rpm = 92\.3, but its life requires 90\.9"):
         simulated_feed(odd, stepped_clock)
     living = plant_with(LIFE, tmp_path).unit[0]
     narrow = living.bearing[0].model_copy(update={"clearance_um": 200.0})
     unit = living.model_copy(update={"bearing": (narrow, *living.bearing[1:])})
-    with pytest.raises(ConfigError, match="UJB clearance_um = 200, but its life is of 500"):
+    with pytest.raises(ConfigError, match="UJB clearance_um = 200, but its life requires 500"):
         simulated_history(unit, stepped_clock.now_ns())
 
 
 def test_a_life_is_no_fixed_scenario(tmp_path: Path) -> None:
     simulation = plant_with(LIFE, tmp_path).unit[0].simulation
     assert simulation is not None
-    with pytest.raises(LookupError, match="no fixed scenario"):
+    with pytest.raises(LookupError, match="no constant scenario"):
         scenario_of(simulation)
 
 

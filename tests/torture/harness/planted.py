@@ -27,7 +27,7 @@ from service.measuring.recorder import Findings, Recorder
 from service.recordings import continuous_recorder as tape
 from service.recordings import continuous_recorder as unit_tape
 from service.recordings import segment as joining
-from service.recordings.segment import Stretch
+from service.recordings.segment import Segment
 from service.store import sql_store
 
 SLOW_S = 1.5
@@ -128,26 +128,26 @@ def letter_forgotten() -> None:
 
 def promised_before_it_is_synced() -> None:
     """Count samples as recorded as soon as they are in memory."""
-    write = Stretch.write
+    write = Segment.write
 
-    def counted(self: Stretch, block: SampleBlock, now_s: float) -> None:
+    def counted(self: Segment, block: SampleBlock, now_s: float) -> None:
         write(self, block, now_s)
         TAPES[-1].n_written += block.n_samples
 
-    def never_again(self: Stretch) -> int:
+    def never_again(self: Segment) -> int:
         finish(self)
         return 0
 
-    finish = Stretch.finish_part
-    Stretch.write = counted  # type: ignore[method-assign]
-    Stretch.finish_part = never_again  # type: ignore[method-assign]
-    made = unit_tape.UnitTape.__init__
+    finish = Segment.finish_part
+    Segment.write = counted  # type: ignore[method-assign]
+    Segment.finish_part = never_again  # type: ignore[method-assign]
+    made = unit_tape.UnitRecorder.__init__
 
     def noted(self: Any, *how: Any, **more: Any) -> None:
         made(self, *how, **more)
         TAPES.append(self)
 
-    unit_tape.UnitTape.__init__ = noted  # type: ignore[method-assign]
+    unit_tape.UnitRecorder.__init__ = noted  # type: ignore[method-assign]
 
 
 def parts_thrown_away_at_start() -> None:
@@ -179,15 +179,15 @@ def part_joined_twice() -> None:
 
 def sample_altered() -> None:
     """Write one sample otherwise than it came."""
-    write = Stretch.write
+    write = Segment.write
 
-    def altered(self: Stretch, block: SampleBlock, now_s: float) -> None:
+    def altered(self: Segment, block: SampleBlock, now_s: float) -> None:
         counts = block.counts.copy()
         counts[3, 0] = counts[3, 1]
         counts[4, 0] = counts[4, 1]
         write(self, replace(block, counts=counts), now_s)
 
-    Stretch.write = altered  # type: ignore[method-assign]
+    Segment.write = altered  # type: ignore[method-assign]
 
 
 def wrong_wall_clock() -> None:
@@ -202,7 +202,7 @@ def wrong_wall_clock() -> None:
     SystemClock.now_ns = lambda self: time.time_ns() + wrong_ns[0]  # type: ignore[method-assign]  # noqa: ARG005
 
 
-TAPES: list[unit_tape.UnitTape] = []
+TAPES: list[unit_tape.UnitRecorder] = []
 
 if __name__ == "__main__":
     globals()[os.environ["PLANTED"]]()

@@ -158,9 +158,9 @@ async def single_process(plant_file: Path, sent: Sequence[Sent]) -> Path:
     try:
         for unit, message in sent:
             if isinstance(message, LinkNews):
-                analysis.analyser.hear(message)
+                analysis.analyser.note_link(message)
             else:
-                analysis.analyser.hear(LinkNews(unit, LinkState.CONNECTED))
+                analysis.analyser.note_link(LinkNews(unit, LinkState.CONNECTED))
                 await analysis.analyser.take(message, time.monotonic())
                 await analysis.recorder.flush()
     finally:

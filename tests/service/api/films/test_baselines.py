@@ -129,7 +129,7 @@ async def test_what_does_not_fit_is_refused_and_changes_nothing(learned: Any) ->
     unwatched = await learned.refused(BASELINES.replace("U1", "U2") + "/freeze", 409, ANNA)
     assert "rated_power_mw" in unwatched["detail"]
     for path, body, status, words in (
-        ("1/accept", ANNA, 409, "in force already"),
+        ("1/accept", ANNA, 409, "already in force"),
         ("9/accept", ANNA, 404, "unit 'U1' bearing 'UJB' has no baseline 9"),
         ("thaw", ANNA, 409, "not frozen"),
         ("renew", {**ANNA, "event_time": "2999-01-01T00:00:00Z"}, 409, "future"),

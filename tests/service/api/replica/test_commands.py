@@ -10,7 +10,7 @@ from harness.waiting import at_work
 
 from core.alarms.operation import Comment
 from service.cluster.reported_commands import WAIT_S, CommandClient
-from service.live.commands import OnAlarm, read, written
+from service.live.commands import AlarmCommand, decoded, encoded
 from service.store.port import AlarmQuery
 from service.store.sharing import Answer, Command, CommandState
 
@@ -45,7 +45,7 @@ async def post(pair: Any, action: str, **body: object) -> httpx2.Response:
 def ask_for_a_comment(pair: Any) -> Command:
     """Ask as a replica does, without waiting for an answer."""
     asking = CommandClient(pair.service.store, pair.replica.alarms, pair.service.clock)
-    command = asking._command("U1", OnAlarm(LINK, Comment("anna", "seen")), "anna")
+    command = asking._command("U1", AlarmCommand(LINK, Comment("anna", "seen")), "anna")
     pair.service.store.commands.ask(command)
     return command
 
@@ -189,6 +189,6 @@ async def _never() -> None:
 
 
 def test_every_command_is_read_as_it_was_written() -> None:
-    task = OnAlarm(LINK, Comment("anna", "é\n\"'"))
+    task = AlarmCommand(LINK, Comment("anna", "é\n\"'"))
 
-    assert read(*written(task)) == task
+    assert decoded(*encoded(task)) == task

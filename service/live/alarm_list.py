@@ -1,4 +1,4 @@
-"""The alarm list, as everything that shows it sees it."""
+"""List of alarms as API, metrics and reports read it, and its counts."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,20 +13,20 @@ HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 @dataclass(frozen=True)
 class AlarmCount:
-    """How many alarms are on the list.
+    """Number of alarms on the list.
 
     Parameters
     ----------
     n_active
         Active and not hidden.
     n_danger
-        Of these, at the level of danger.
+        Active and not hidden, at danger level.
     n_unacknowledged
-        Active or returned, not hidden, and nobody has seen their newest occurrence.
+        Active or returned, not hidden, with an unacknowledged newest occurrence.
     n_hidden
         Shelved, suppressed or out of service.
     n_unjudged
-        Not active, not hidden, and what they watch cannot be judged now.
+        Neither active nor hidden, without a current condition.
     """
 
     n_active: int
@@ -37,7 +37,7 @@ class AlarmCount:
 
 
 def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> AlarmCount:
-    """Count alarms, whatever their state."""
+    """Count alarms of any state."""
     shown = [alarm for alarm in alarms if alarm.state not in HIDDEN]
     return AlarmCount(
         n_active=sum(alarm.level is not None for alarm in shown),
@@ -48,50 +48,44 @@ def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> Ala
     )
 
 
-class AlarmBoard(Protocol):
-    """All alarms as they are; see :class:`service.measuring.alarms.engine.AlarmEngine`."""
+class AlarmList(Protocol):
+    """All alarms, from `AlarmEngine` in this process or from the reports of others."""
 
     @property
     def revision(self) -> int:
-        """Another number as soon as anything is known otherwise of any alarm."""
+        """Number that changes with every change of an alarm."""
         ...
 
     @property
     def chatter_rule(self) -> ChatterRule:
-        """What counts as chattering."""
+        """Definition of chattering alarms."""
         ...
 
     @property
     def alarms(self) -> Sequence[Alarm]:
-        """All alarms, whatever their state."""
+        """All alarms of any state."""
         ...
 
     def alarm(self, id_: str) -> Alarm:
-        """Look an alarm up. Raises `LookupError` if there is none."""
+        """Return an alarm. Raises `LookupError` if it does not exist."""
         ...
 
     def is_judged(self, alarm: Alarm) -> bool:
-        """Whether what an alarm watches is known now."""
+        """Return whether the condition of an alarm is known now."""
         ...
 
     def is_chattering(self, alarm: Alarm) -> bool:
-        """Whether an alarm has come and gone too often until a short while ago."""
+        """Return whether an alarm was raised too often recently."""
         ...
 
     def count(self) -> AlarmCount:
-        """How many alarms are on the list."""
+        """Return the number of alarms."""
         ...
 
 
 @dataclass(frozen=True)
 class EvidenceStatus:
-    """Bundles of evidence since the start.
-
-    Parameters
-    ----------
-    error
-        Why none is written just now; None if nothing hinders.
-    """
+    """Number of evidence bundles since the start, and why none is written now, if so."""
 
     error: str | None
     n_waiting: int

@@ -1,41 +1,32 @@
-"""From the live objects of a process that analyses to what it writes down of a unit."""
+"""State of units for publication, from the live objects of the analysing process."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from core.alarms.alarm import Alarm
 from core.monitor.assessment import Assessment
 from service.live.live_view import LiveView, UnitStatus
 from service.live.unit_state import BearingState, FilmState, UnitSigns, UnitState
 from service.measuring.alarm_engine import AlarmEngine
-from service.measuring.films import FilmKeeper
-from service.measuring.service_alarms import told_by
+from service.measuring.films import FilmMonitor
+from service.measuring.service_alarms import reporting_unit
 from service.settings.units import UnitSettings
 
 
 def bearing_state(assessment: Assessment) -> BearingState:
-    """A result without its arrays."""
-    return BearingState(
-        time_ns=assessment.time_ns,
-        window=assessment.window,
-        speed_source=assessment.speed_source,
-        quality=assessment.quality,
-        readings=assessment.readings,
-        budgets=assessment.budgets,
-        estimators=assessment.estimators,
-        runout=assessment.runout,
-        clipped_share=assessment.clipped_share,
-        evidence=assessment.evidence,
-        condition=assessment.condition,
-    )
+    """Return a result without its arrays."""
+    names = [each.name for each in fields(BearingState)]
+    return BearingState(**{name: getattr(assessment, name) for name in names})
 
 
 def unit_state(
-    settings: UnitSettings, live: LiveView, alarms: AlarmEngine, films: FilmKeeper
+    settings: UnitSettings, live: LiveView, alarms: AlarmEngine, films: FilmMonitor
 ) -> UnitState:
-    """What is known of a unit now."""
+    """Return the state of a unit."""
     unit, bearings = settings.id, [bearing.id for bearing in settings.bearing]
-    own = alarm_state([alarm for alarm in alarms.alarms if told_by(alarm.identity) == unit], alarms)
+    own = alarm_state(
+        [alarm for alarm in alarms.alarms if reporting_unit(alarm.identity) == unit], alarms
+    )
     found = {bearing: live.assessment(unit, bearing) for bearing in bearings}
     seen = {bearing: films.newest(unit, bearing) for bearing in bearings}
     in_force = {bearing: films.baseline(unit, bearing) for bearing in bearings}
@@ -48,7 +39,7 @@ def unit_state(
 
 
 def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
-    """What is known of alarms now, and of nothing else."""
+    """Return a state with alarms only."""
     return UnitState(
         bearings={},
         alarms=tuple(own),
@@ -60,12 +51,12 @@ def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
 
 
 def plant_signs(live: LiveView) -> UnitSigns:
-    """How the process itself does."""
+    """Return the signs of the process itself."""
     return UnitSigns(UnitStatus(), None, {}, live.n_unstored, live.store_error)
 
 
 def unit_signs(settings: UnitSettings, live: LiveView) -> UnitSigns:
-    """How samples of a unit arrive, and how old everything is."""
+    """Return link state and ages of a unit."""
     unit = settings.id
     ages_s = {bearing.id: live.current(unit, bearing.id).age_s for bearing in settings.bearing}
     return UnitSigns(

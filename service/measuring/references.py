@@ -1,4 +1,4 @@
-"""References of the shaft centre and of 1×: set, in force, taken from newest readings."""
+"""References of the shaft centre and of 1×: in force, given, or from newest readings."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -16,6 +16,7 @@ from core.quality import Level, Reading, Reason
 from core.stiffness.order_line import AMPLITUDES
 from core.units import s_from_ns
 from service.runtime.heartbeats import UNHEARD, Pulse
+from service.runtime.periodic import TroubleLog
 from service.runtime.times import rfc3339
 from service.store.gap_reference import GapReference, MicrometrePair
 from service.store.port import Store, StoredReadings, StoreError
@@ -29,14 +30,14 @@ Key = tuple[str, str]
 
 
 def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:
-    """Whether the gap is also measured across the shaft, in x and in y."""
+    """Return whether x and y have an opposite probe."""
     return bearing.opposite_x is not None, bearing.opposite_y is not None
 
 
 def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
-    """The bearing with a stored reference instead of the one in the plant file.
+    """Return a bearing with a stored reference in place of that of the plant file.
 
-    A reference without gaps of the opposite probes leaves those of the plant file as they are.
+    Without gaps of the opposite probes, those of the plant file remain.
     """
     opposite = reference.opposite_reference_um
     if opposite is None or not any(opposite_axes(bearing)):
@@ -48,26 +49,26 @@ def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
     )
 
 
-class Adopter(Protocol):
-    """Whatever takes a new description of its unit: a monitor, as a rule."""
+class HasUnit(Protocol):
+    """A monitor, or the description of a unit that another process monitors."""
 
     unit: Unit
 
     def replace_description(self, unit: Unit) -> None:
-        """Take a new description of the same unit."""
+        """Replace the description of the unit."""
         ...
 
 
 class ReferencesInForce:
-    """Hands the newest stored references to the monitors, at the start and ever after.
+    """References in force: the newest stored ones, else those of the plant file.
 
     Parameters
     ----------
     monitors
-        By unit; as built from the plant file, whose references hold where none is stored.
+        Monitors by unit, built from the plant file; they receive new references.
     """
 
-    def __init__(self, monitors: Mapping[str, Adopter], store: Store, clock: Clock) -> None:
+    def __init__(self, monitors: Mapping[str, HasUnit], store: Store, clock: Clock) -> None:
         self._monitors, self._store, self._clock = monitors, store, clock
         self._bearings: dict[Key, Bearing] = {
             (unit, bearing.id): bearing
@@ -76,37 +77,33 @@ class ReferencesInForce:
         }
         self._in_force: dict[Key, GapReference] = {}
         self._unknown: set[Key] = set()
-        self._store_error: str | None = None
+        self._trouble = TroubleLog("references cannot be read", "references can be read again")
 
     def of(self, unit: str, bearing: str) -> GapReference | None:
-        """The stored reference that a bearing is watched with; None for that of the plant file."""
+        """Return the stored reference of a bearing; None if that of the plant file is in force."""
         return self._in_force.get((unit, bearing))
 
     def bearing(self, unit: str, bearing: str) -> Bearing:
-        """The bearing as it is watched now."""
+        """Return a bearing with the reference in force."""
         described = self._bearings[unit, bearing]
         reference = self.of(unit, bearing)
         return described if reference is None else with_reference(described, reference)
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Look for new references for ever."""
+        """Read stored references periodically, until cancelled."""
         while True:
             pulse.beat(LOOK_EVERY_S)
             await self._clock.sleep(LOOK_EVERY_S)
             await self.look()
 
     async def look(self) -> None:
-        """Take over what has been set since the last look; keep what there is if that fails."""
+        """Read stored references once; after an error, those in force remain."""
         try:
             found = await asyncio.to_thread(self._store.references)
         except StoreError as error:
-            if self._store_error is None:
-                log.error("references cannot be read", reason=str(error))
-            self._store_error = str(error)
+            self._trouble.note(str(error))
             return
-        if self._store_error is not None:
-            log.info("references can be read again")
-        self._store_error = None
+        self._trouble.note(None)
         self._take(found)
 
     def _take(self, found: Iterable[GapReference]) -> None:
@@ -117,7 +114,7 @@ class ReferencesInForce:
             monitor.replace_description(self._described(monitor.unit))
         for (unit, bearing), reference in news.items():
             log.info(
-                "reference taken over",
+                "reference in force",
                 unit=unit,
                 bearing=bearing,
                 gap_reference_um=reference.gap_reference_um,
@@ -130,9 +127,7 @@ class ReferencesInForce:
             return self._in_force.get(key) != reference
         if key not in self._unknown:
             self._unknown.add(key)
-            log.warning(
-                "reference of a bearing that is not there is ignored", unit=key[0], bearing=key[1]
-            )
+            log.warning("reference of an unknown bearing is ignored", unit=key[0], bearing=key[1])
         return False
 
     def _described(self, unit: Unit) -> Unit:
@@ -140,31 +135,33 @@ class ReferencesInForce:
 
 
 MAX_AGE_S = 600.0
-"""Older gaps say little of where the shaft is now."""
+"""Maximum age of gaps that are taken as the present ones."""
 
 NEAR_GAPS = ("gap_x_um", "gap_y_um")
 OPPOSITE_GAPS = ("opposite_gap_x_um", "opposite_gap_y_um")
 
 GivenPair = tuple[float | None, float | None]
 Gaps = tuple[MicrometrePair, MicrometrePair | None]
-"""Of the probes on the positive axes, and of those across the shaft if there are any."""
+"""Gaps of the probes on the positive axes, and of the opposite probes if there are any."""
 
 
 class ReferenceRefusedError(Exception):
-    """No reference can be made of this; the message says why."""
+    """Gaps cannot be used as a reference; the message states why."""
 
 
 def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
-    """Gaps in µm as they were given, complete for the probes that the bearing has.
+    """Return given gaps in µm, checked against the probes of the bearing.
 
     Raises
     ------
     ReferenceRefusedError
-        If some are missing, or given for probes that are not there.
+        If a gap is missing, or given for a probe that the bearing does not have.
     """
     x, y = near
     if x is None or y is None:
-        raise ReferenceRefusedError("give the gaps of both axes, x and y, or let them be measured")
+        raise ReferenceRefusedError(
+            "give the gaps of both axes, x and y, or neither to use the newest result"
+        )
     for axis, gap_um, is_there in zip("xy", opposite, opposite_axes(bearing), strict=True):
         if gap_um is None and is_there:
             raise ReferenceRefusedError(
@@ -176,15 +173,15 @@ def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
 
 
 def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) -> Gaps:
-    """Mean gaps in µm of the newest stored result.
+    """Return the mean gaps in µm of the newest stored result.
 
     Raises
     ------
     ReferenceRefusedError
-        If there is none, it is not of the last ten minutes, or its gaps are not usable.
+        If there is none, it is older than ten minutes, or its gaps are not usable.
     """
     if newest is None:
-        raise ReferenceRefusedError("there is no stored result yet whose gaps could be taken")
+        raise ReferenceRefusedError("there is no stored result yet")
     _check_age(newest.time_ns, now_ns)
     near = (_usable(newest, NEAR_GAPS[0]), _usable(newest, NEAR_GAPS[1]))
     x, y = (
@@ -195,7 +192,7 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
 
 
 def doubts(newest: StoredReadings) -> list[str]:
-    """What should be known of gaps that are usable but not good, in words."""
+    """Return a warning for each gap that is usable but uncertain."""
     gaps = {name: newest.readings.get(name) for name in (*NEAR_GAPS, *OPPOSITE_GAPS)}
     return [
         f"{name} is uncertain: {reading.quality.reason}"
@@ -205,7 +202,7 @@ def doubts(newest: StoredReadings) -> list[str]:
 
 
 def _across(bearing: Bearing, near: MicrometrePair, found: GivenPair) -> MicrometrePair | None:
-    """Gaps of the opposite probes; an axis without one keeps a number that nobody looks at."""
+    """Return the gaps of the opposite probes; that of an axis without one is not used."""
     if not any(opposite_axes(bearing)):
         return None
     unused = bearing.opposite_reference_um or near
@@ -218,8 +215,8 @@ def _check_age(time_ns: int, now_ns: int) -> None:
     if abs(age_s) > MAX_AGE_S:
         side = "ago" if age_s > 0.0 else "ahead of this computer's clock"
         raise ReferenceRefusedError(
-            f"the newest stored result is of {rfc3339(time_ns)}, {abs(age_s) / 60:.0f} min {side};"
-            f" it may be at most {MAX_AGE_S / 60:.0f} min old"
+            f"the newest result is from {rfc3339(time_ns)}, {abs(age_s) / 60:.0f} min {side};"
+            f" the maximum age is {MAX_AGE_S / 60:.0f} min"
         )
 
 
@@ -235,23 +232,23 @@ def _usable(newest: StoredReadings, name: str) -> float:
 
 
 NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMENTS)
-"""Doubts with which an amplitude is no reference."""
+"""Reasons for which an amplitude cannot be a reference."""
 
 
 class VectorRefusedError(Exception):
-    """No reference can be made of this; the message says why."""
+    """1× vectors cannot be used as a reference; the message states why."""
 
 
 def measured_vectors(assessment: Assessment | None) -> VectorReference:
-    """The 1× vectors of a current result, in the operating state that it was found in.
+    """Return the 1× vectors of a current result with its operating state.
 
     Raises
     ------
     VectorRefusedError
-        If there is no result, an amplitude has no number, or the machine did not run steadily.
+        If there is no result, an amplitude has no value, or the machine did not run steadily.
     """
     if assessment is None:
-        raise VectorRefusedError("there is no current result whose vectors could be taken")
+        raise VectorRefusedError("there is no current result")
     condition = assessment.condition
     return VectorReference(
         unit=assessment.unit,

@@ -1,4 +1,4 @@
-"""`Soundness`: tells, while the service runs, that stored data are not what was stored."""
+"""Monitor of the integrity of stored data while the service runs."""
 
 import asyncio
 
@@ -14,80 +14,80 @@ from service.store.seals import Place
 log = structlog.get_logger()
 
 LOOK_EVERY_S = 3.0
-"""A database file that was removed or replaced is noticed so soon."""
+"""Time until a removed or replaced database file is noticed."""
 
-MAX_TOLD = 100
-"""Damaged rows that get an entry of the audit trail each, from one start to the next."""
+MAX_REPORTED = 100
+"""Maximum number of damaged rows that are entered in the audit trail after a start."""
 
 
-class Soundness:
-    """Looks at what the store knows of itself; goes on with it as it is, and tells.
+class IntegrityMonitor:
+    """Reports damaged rows, an older copy of the database, and a missing database file.
 
     Parameters
     ----------
     live
-        Is told that nothing can be stored while the database's file is not the one that is open.
+        Receives a store error while the database file is missing or replaced.
 
     Attributes
     ----------
     rolled_back
-        What was wrong with the database since the start; None if it was what was here last.
+        How the database differs from the one of the last run; None if it does not.
     """
 
     def __init__(self, store: Store, clock: Clock, live: LiveView) -> None:
         self._store, self._clock, self._live = store, clock, live
-        self._told: set[Place] = set()
+        self._reported: set[Place] = set()
         self._no_file: str | None = None
         self.rolled_back: str | None = None
 
     @property
     def n_damaged(self) -> int:
-        """Rows that were found damaged since the start; they are left out of all answers."""
+        """Damaged rows found since the start; they are left out of all answers."""
         return self._store.integrity.n_damaged
 
     @property
     def mark_error(self) -> str | None:
-        """Why the high-water mark could not be written last; None if it could."""
+        """Why the commit counter could not be written; None if it was."""
         return self._store.integrity.mark_error
 
     @property
     def trouble(self) -> str | None:
-        """What there is to say in a line; None if nothing is known to be wrong."""
+        """All faults in one line; None if there are none."""
         mark, n_damaged = self.mark_error, self.n_damaged
-        said = [
+        faults = [
             self._no_file,
             self.rolled_back,
-            mark and f"the high-water mark cannot be written: {mark}",
+            mark and f"the commit counter cannot be written: {mark}",
         ]
         if n_damaged:
-            said.append(f"{n_damaged} stored rows are damaged, and left out")
-        return "; ".join(words for words in said if words) or None
+            faults.append(f"{n_damaged} stored rows are damaged and left out")
+        return "; ".join(each for each in faults if each) or None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Look for ever."""
+        """Check periodically, until cancelled."""
         while True:
             await self.look()
             pulse.beat(LOOK_EVERY_S)
             await self._clock.sleep(LOOK_EVERY_S)
 
     async def look(self) -> None:
-        """Take over what was found since the last look."""
+        """Check once."""
         if not await self._has_file():
             return
         try:
             await asyncio.to_thread(self._look)
         except StoreError as error:
-            log.error("what is wrong with stored data cannot be told", reason=str(error))
+            log.error("the integrity of stored data cannot be checked", reason=str(error))
 
     async def _has_file(self) -> bool:
-        """Whether the database's file is the one that is open."""
+        """Return whether the database file is the one that is open."""
         before = self._no_file
         try:
             await asyncio.to_thread(self._store.integrity.require_file)
         except StoreError as error:
             self._no_file = self._live.store_error = str(error)
             if before is None:
-                log.error("the database file is gone", reason=self._no_file)
+                log.error("the database file is missing", reason=self._no_file)
             return False
         self._no_file = None
         if before is not None:
@@ -100,12 +100,12 @@ class Soundness:
         found = self._store.integrity.adopt(self._clock.now_ns())
         if found:
             self.rolled_back = "; ".join(finding.detail for finding in found)
-            log.error("the database is not what was here last", reason=self.rolled_back)
-        news = [place for place in self._store.integrity.damaged if place not in self._told]
-        news = news[: max(0, MAX_TOLD - len(self._told))]
+            log.error("the database is not the one of the last run", reason=self.rolled_back)
+        news = [place for place in self._store.integrity.damaged if place not in self._reported]
+        news = news[: max(0, MAX_REPORTED - len(self._reported))]
         if news:
             self._store.audit.record([self._deed(place) for place in news])
-            self._told.update(news)
+            self._reported.update(news)
             log.error("stored rows are damaged", n_rows=len(news), first=str(news[0]))
 
     def _deed(self, place: Place) -> Deed:
@@ -114,7 +114,7 @@ class Soundness:
             actor="padwatch",
             action="store.row_damaged",
             object=f"{place.table}: {place.key}",
-            reason="the row is gone"
+            reason="the row is missing"
             if place.is_missing
-            else "the row does not fit its seal and is left out",
+            else "the row does not match its checksum and is left out",
         )

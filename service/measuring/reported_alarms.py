@@ -1,0 +1,95 @@
+"""Alarms whose conditions are reported from outside the monitors."""
+
+from collections.abc import Iterable, Sequence
+
+from core.alarms.alarm import PLANT, Alarm, AlarmIdentity, AlarmNews
+from core.alarms.board import AlarmBoard
+from core.alarms.kinds import Watch
+from core.alarms.rules import rule_of
+from core.limits import WITHIN, AlarmLevel, Judgement
+from service.settings.alarm_kinds import ANALYSIS_GONE, MESSAGES_REFUSED, STREAM
+
+
+class ReportedAlarms(AlarmBoard):
+    """Alarms whose conditions are reported from outside and judged at the next tick."""
+
+    def __init__(self, watches: Iterable[Watch]) -> None:
+        self._watches = {watch.id: watch for watch in watches}
+        super().__init__(self._watches.values())
+        self._found: dict[str, Judgement] = {}
+        self._once: set[str] = set()
+
+    def report(self, id_: str, condition: Judgement) -> None:
+        """Set the condition of an alarm until the next report."""
+        self._found[id_] = condition
+        self._once.discard(id_)
+
+    def report_event(self, id_: str, condition: Judgement) -> None:
+        """Set the condition of an alarm for one tick."""
+        self.report(id_, condition)
+        self._once.add(id_)
+
+    def tick(self, host_ns: int) -> list[AlarmNews]:
+        """Judge the reported conditions."""
+        for id_, condition in self._found.items():
+            self.update(self._watches[id_], condition, host_ns)
+        self._found |= dict.fromkeys(self._once, WITHIN)
+        self._once.clear()
+        return super().tick(host_ns)
+
+
+SHARED = "shared work"
+"""Name in place of a unit for reports and commands about shared alarms. No unit can have it."""
+
+
+def is_shared(alarm: Alarm) -> bool:
+    """Return whether an alarm belongs to the process that does the shared work."""
+    return alarm.identity.kind == ANALYSIS_GONE
+
+
+def gone_alarms(units: Iterable[str]) -> ReportedAlarms:
+    """Return the alarms about units without analysis."""
+    return ReportedAlarms(Watch(identity_of(unit), rule_of(0.0, 0.0), unit) for unit in units)
+
+
+def report_silence(
+    alarms: ReportedAlarms, silent: Sequence[str], alive: Sequence[str], after_s: float
+) -> None:
+    """Report which units are analysed, and which have been silent for too long."""
+    reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
+    gone = Judgement(AlarmLevel.DANGER, reason=reason)
+    for units, condition in ((silent, gone), (alive, WITHIN)):
+        for unit in units:
+            alarms.report(identity_of(unit).id, condition)
+
+
+def identity_of(unit: str) -> AlarmIdentity:
+    """Return the alarm about a unit without analysis."""
+    return AlarmIdentity(PLANT, unit, ANALYSIS_GONE)
+
+
+REFUSED_FOR_S = 600.0
+"""Duration of the alarm after the last refused message."""
+
+MAX_REASON = 200
+"""Maximum length of a reason; a refused message may contain anything."""
+
+
+def stream_alarms(units: Iterable[str]) -> ReportedAlarms:
+    """Return the alarms about refused messages of units."""
+    alarms = ReportedAlarms(
+        Watch(_refused(unit), rule_of(0.0, REFUSED_FOR_S), STREAM) for unit in units
+    )
+    for alarm in alarms.alarms:
+        alarms.report(alarm.identity.id, WITHIN)
+    return alarms
+
+
+def report_refused(alarms: ReportedAlarms, unit: str, reason: str) -> None:
+    """Report a refused message of a unit."""
+    words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
+    alarms.report_event(_refused(unit).id, Judgement(AlarmLevel.ALERT, reason=words))
+
+
+def _refused(unit: str) -> AlarmIdentity:
+    return AlarmIdentity(unit, STREAM, MESSAGES_REFUSED)
