@@ -15,7 +15,6 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from acquisition.clock import Clock
 from service.runtime.asker import ASKER
 from service.runtime.times import rfc3339
-from service.settings.storage import Origin
 
 _AGE = re.compile(rb'("(?:data_)?age_s":)[0-9][0-9.e+-]*')
 
@@ -237,41 +236,21 @@ def _is_whole_json(head: Message) -> bool:
     return head["status"] == 200 and is_json and "content-length" in headers
 
 
-ORIGIN_HEADER = "Padwatch-Origin"
+ORIGIN_HEADER, EDITION_HEADER = "Padwatch-Origin", "Padwatch-Edition"
 
 
-class OriginHeader:
-    """ASGI middleware that adds the header to all responses."""
+class FixedHeader:
+    """ASGI middleware that adds a header to all answers."""
 
-    def __init__(self, app: ASGIApp, origin: Origin) -> None:
-        self._app, self._origin = app, origin
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request and add the header to the answer."""
-
-        async def marked(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                MutableHeaders(scope=message)[ORIGIN_HEADER] = self._origin.value
-            await send(message)
-
-        await self._app(scope, receive, marked)
-
-
-EDITION_HEADER = "Padwatch-Edition"
-
-
-class EditionHeader:
-    """ASGI middleware that adds the header to all responses."""
-
-    def __init__(self, app: ASGIApp, edition: str) -> None:
-        self._app, self._edition = app, edition
+    def __init__(self, app: ASGIApp, name: str, value: str) -> None:
+        self._app, self._name, self._value = app, name, value
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request and add the header to the answer."""
 
         async def marked(message: Message) -> None:
             if message["type"] == "http.response.start":
-                MutableHeaders(scope=message)[EDITION_HEADER] = self._edition
+                MutableHeaders(scope=message)[self._name] = self._value
             await send(message)
 
         await self._app(scope, receive, marked)

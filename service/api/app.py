@@ -9,7 +9,7 @@ from typing import Any
 
 from fastapi import Depends, FastAPI, Request, Response
 
-from service.api.answers import OriginHeader, Revalidation, digest_of, tag_of
+from service.api.answers import ORIGIN_HEADER, FixedHeader, Revalidation, digest_of, tag_of
 from service.api.auth.accounts import account_router, key_router
 from service.api.auth.authenticator import AccessDesk
 from service.api.auth.declared import Declared, declared
@@ -25,7 +25,7 @@ from service.api.problems import (
     refuse_unknown_parameters,
 )
 from service.api.routes.alarm_rates import alarm_rate_router
-from service.api.routes.alarms import alarm_by_id_router, alarm_router, operation_router
+from service.api.routes.alarms import alarm_router, operation_router
 from service.api.routes.audit import audit_router
 from service.api.routes.baselines import baseline_action_router, baseline_router
 from service.api.routes.bearings import bearing_router
@@ -35,9 +35,9 @@ from service.api.routes.films import film_router
 from service.api.routes.motion import motion_router, recorded_motion_router
 from service.api.routes.notifications import delivery_router
 from service.api.routes.overview import overview_router
-from service.api.routes.plant import configuration_router, gap_router, plant_router, source_router
+from service.api.routes.plant import plant_router
 from service.api.routes.recordings import recording_router
-from service.api.routes.references import order1_reference_router, reference_router
+from service.api.routes.references import reference_router
 from service.api.routes.shaft_centre import centre_router
 from service.api.routes.spectra import spectra_router
 from service.api.routes.trends import trend_router
@@ -138,7 +138,7 @@ def create_app(context: Context) -> GuardedApi:
     app.add_middleware(Revalidation, clock=context.clock)
     desk = context.access or AccessDesk(context.store.access, context.clock)
     app.stand_behind(desk)
-    app.add_middleware(OriginHeader, origin=context.origin)
+    app.add_middleware(FixedHeader, name=ORIGIN_HEADER, value=context.origin.value)
     refusals = context.refusals or Refusals(context.store.audit, context.clock)
     app.add_middleware(AuditTrail, refusals=refusals, clock=context.clock)
     install_problem_handlers(app)
@@ -147,9 +147,6 @@ def create_app(context: Context) -> GuardedApi:
         overview_router(context),
         plant_router(context),
         channel_router(context),
-        source_router(context),
-        configuration_router(context),
-        gap_router(context),
         bearing_router(context),
         trend_router(context),
         spectra_router(context),
@@ -160,15 +157,13 @@ def create_app(context: Context) -> GuardedApi:
         film_history_router(context),
         baseline_router(context),
         baseline_action_router(context),
-        alarm_router(context),
         alarm_rate_router(context),
-        order1_reference_router(context),
+        alarm_router(context),
         operation_router(context),
         recording_router(context),
         recorded_motion_router(context),
         delivery_router(context),
         audit_router(context),
-        alarm_by_id_router(context),
         session_router(context, desk),
         account_router(desk.registry),
         key_router(context, desk.registry),

@@ -26,11 +26,14 @@ MAX_MISTAKES = 8
 SCHEMAS = "#/components/schemas/"
 
 WORDS = {
+    403: "Not allowed, or requested by a page of another site",
     404: "Unknown unit or bearing",
-    409: "No result yet",
+    409: "Does not fit the present state",
+    410: "Damaged on the disk",
     422: "A wrong parameter",
-    503: "The store cannot be read",
+    503: "The store cannot be used",
 }
+"""Descriptions of problems by status."""
 
 log = structlog.get_logger()
 
@@ -77,14 +80,18 @@ class ProblemError(Exception):
         self.errors = [Mistake(parameter=parameter, detail=detail)] if parameter else []
 
 
-def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """Return OpenAPI entries for the problems of an operation."""
-    return {status: _documented(WORDS[status]) for status in statuses}
+def problem_responses(
+    *statuses: int, own: Mapping[int, str] | None = None
+) -> dict[int | str, dict[str, Any]]:
+    """Return OpenAPI entries for the problems of an operation.
 
-
-def described_problems(words: Mapping[int, str]) -> dict[int | str, dict[str, Any]]:
-    """Return OpenAPI entries for problems with their own descriptions."""
-    return {status: _documented(said) for status, said in words.items()}
+    Parameters
+    ----------
+    own
+        Descriptions of further statuses that `WORDS` does not fit.
+    """
+    words = {status: WORDS[status] for status in statuses} | dict(own or {})
+    return {status: _documented(text) for status, text in words.items()}
 
 
 def any_other_problem() -> dict[int | str, dict[str, Any]]:

@@ -11,7 +11,7 @@ from fastapi import Depends
 from starlette.types import ASGIApp
 
 from acquisition.clock import Clock
-from service.api.answers import EditionHeader
+from service.api.answers import EDITION_HEADER, FixedHeader
 from service.api.app import GuardedApi, create_app
 from service.api.auth.authenticator import AccessDesk
 from service.api.context import Context
@@ -125,7 +125,7 @@ def application(context: Context, evidence: EvidenceDesk | None = None) -> Guard
         Service that hands out evidence of alarms; None if none is stored.
     """
     app = create_app(context)
-    app.add_middleware(EditionHeader, edition=edition())
+    app.add_middleware(FixedHeader, name=EDITION_HEADER, value=edition())
     guarded = [Depends(refuse_unknown_parameters)]
     app.include_router(evidence_router(context, evidence), dependencies=guarded)
     app.include_router(dashboard_router())

@@ -6,7 +6,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
-from fastapi import Depends, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute, iter_route_contexts
 from starlette.routing import BaseRoute, Route
@@ -45,6 +45,13 @@ def needs(permission: Permission, reach: Reach = Reach.PLANT) -> Any:
 
 OPEN: Any = Depends(Needs(None, Reach.NO_UNIT))
 """Declares an open route."""
+
+
+def subject_router(
+    path: str, tag: str, permission: Permission = Permission.READ, reach: Reach = Reach.PLANT
+) -> APIRouter:
+    """Return a router of the API for one subject; a route may declare another need."""
+    return APIRouter(prefix=f"/api/v1{path}", tags=[tag], dependencies=[needs(permission, reach)])
 
 
 class UndeclaredRouteError(Exception):

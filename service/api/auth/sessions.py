@@ -21,7 +21,7 @@ from service.api.auth.authenticator import (
 from service.api.auth.declared import OPEN, Reach, needs
 from service.api.auth.gate import caller_of, identity_of, must_wait, wrong_login
 from service.api.context import Context
-from service.api.problems import ProblemError, described_problems
+from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
 from service.store.access.audit_entries import Deed, acting, name_actor
 from service.store.access.identities import Identity, Means, Permission, Role
@@ -104,27 +104,24 @@ async def record(audit: AuditStore, clock: Clock, action: str, name: str) -> Non
     await asyncio.to_thread(audit.record, [deed])
 
 
-LOGIN_PROBLEMS = described_problems(
-    {
+LOGIN_PROBLEMS = problem_responses(
+    403,
+    422,
+    own={
         401: "The name or the password is wrong",
-        403: "Asked for by a page of another site",
-        422: "A wrong parameter",
         429: "Too many failed logins; Retry-After gives the wait",
-        503: "The store cannot be used, or too many log in at the same time",
-    }
+        503: "The store cannot be used, or too many concurrent logins",
+    },
 )
 
-PASSWORD_PROBLEMS = {
-    **LOGIN_PROBLEMS,
-    **described_problems({409: "The caller has no password"}),
-}
+PASSWORD_PROBLEMS = LOGIN_PROBLEMS | problem_responses(own={409: "The caller has no password"})
 
-SET_UP_PROBLEMS = described_problems(
-    {
+SET_UP_PROBLEMS = problem_responses(
+    503,
+    own={
         403: "The token is wrong or has been used, or there is an account already",
         422: "A wrong parameter, or a name or password that is not accepted",
-        503: "The store cannot be used",
-    }
+    },
 )
 
 

@@ -12,18 +12,17 @@ from core.machine.channel import Measurand
 from core.quality import Level, Quality, Reading, Reason, bad, missing, worst
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
-from service.api.auth.declared import needs
+from service.api.auth.declared import subject_router
 from service.api.context import Context, LiveLook, UnitId
-from service.api.problems import ProblemError, described_problems, problem_responses
-from service.api.values import ApiModel, QualityModel, Time, listed, quality_model
+from service.api.parameters import duration
+from service.api.problems import ProblemError, problem_responses
+from service.api.values import ApiModel, QualityModel, SampleRange, Time, listed
 from service.live.live_view import HELD_S
 from service.live.samples import Stretch, newest_stretch
-from service.runtime.times import rfc3339
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
 from service.settings.channels import ChannelSettings, SlowChannelSettings
 from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.units import UnitSettings
-from service.store.access.identities import Permission
 
 TransducerName = Literal[
     "proximity_probe", "displacement", "velocity", "accelerometer", "key_phase"
@@ -155,7 +154,7 @@ class ChannelSamplesModel(ApiModel):
     """One sample per index; null where it is missing or the channel was bad."""
 
 
-class WaveformModel(ApiModel):
+class WaveformModel(SampleRange):
     """Newest samples of some channels of a unit."""
 
     unit: str
@@ -166,15 +165,6 @@ class WaveformModel(ApiModel):
 
     age_s: float
     """Age of the newest sample, s; it grows while the link is lost."""
-
-    epoch: int
-    """Changes when the device restarts its count."""
-
-    first_index: int
-    """Index of the first sample."""
-
-    rate_hz: float
-    """Samples per second."""
 
     n_samples: int
     """Samples of each channel."""
@@ -205,10 +195,10 @@ def channels_model(live: LiveLook, settings: UnitSettings) -> ChannelsModel:
     shown = newest if why_not is None else None
     why = why_not or Reason.WAITING_FOR_DATA
     uses = _uses(settings)
-    return ChannelsModel(
+    return ChannelsModel.of(
         unit=settings.id,
         rate_hz=settings.sampling_hz,
-        time=None if newest is None else rfc3339(newest.stop_ns),
+        time=newest and newest.stop_ns,
         age_s=live.data_age_s(settings.id),
         waveform=[
             _waveform(settings, channel, uses.get(channel.id, []), shown, why)
@@ -237,23 +227,12 @@ def _waveform(
 ) -> WaveformChannelModel:
     rows = rows_of(settings, channel.id)
     quality = bad(why) if block is None else worst(block.channel_quality[row] for row in rows)
-    return WaveformChannelModel(
-        id=channel.id,
-        transducer=channel.transducer.value,
+    return WaveformChannelModel.of(
+        channel,
         unit=UNITS[channel.measurand],
-        sensitivity=channel.sensitivity,
-        sensitivity_unit=channel.sensitivity_unit,
-        full_scale_v=channel.full_scale_v,
-        ok_min_v=channel.ok_min_v,
-        ok_max_v=channel.ok_max_v,
-        unit_per_count=channel.unit_per_count,
-        ok_min=channel.ok_min,
-        ok_max=channel.ok_max,
-        gain_uncertainty=channel.gain_uncertainty,
         direction=channel.sign,
-        probe=channel.probe,
         used_by=used_by,
-        quality=quality_model(quality),
+        quality=quality,
         **_extent(settings, block, rows, quality),
     )
 
@@ -274,15 +253,7 @@ def _slow(
     channel: SlowChannelSettings, used_by: list[str], block: SampleBlock | None, why: Reason
 ) -> SlowChannelModel:
     reading = missing(why) if block is None else _reading(block, channel.id)
-    return SlowChannelModel(
-        id=channel.id,
-        unit=channel.unit,
-        minimum=channel.minimum,
-        maximum=channel.maximum,
-        used_by=used_by,
-        value=reading.value,
-        quality=quality_model(reading.quality),
-    )
+    return SlowChannelModel.of(channel, reading, used_by=used_by)
 
 
 def _reading(block: SampleBlock, channel: str) -> Reading:
@@ -306,38 +277,29 @@ def waveform_model(
     """Return the model of samples."""
     units = {each.id: UNITS[each.measurand] for each in settings.channel}
     found = zip(channels, stretch.samples, stretch.quality, strict=True)
-    return WaveformModel(
+    return WaveformModel.of(
+        stretch,
         unit=settings.id,
-        time=rfc3339(stretch.start_ns),
+        time=stretch.start_ns,
         age_s=age_s,
-        epoch=stretch.epoch,
-        first_index=stretch.first_index,
-        rate_hz=stretch.rate_hz,
         n_samples=stretch.samples.shape[1],
         channels={
-            id_: ChannelSamplesModel(
-                unit=units[id_],
-                quality=quality_model(quality),
-                sample=listed(row),
-            )
+            id_: ChannelSamplesModel.of(unit=units[id_], quality=quality, sample=listed(row))
             for id_, row, quality in found
         },
     )
 
 
+NO_SAMPLES = {409: "There are no samples"}
+NEWEST = "Duration of the newest samples; limited to those in memory."
+
 MAX_NUMBERS = 200_000
 """Maximum number of samples in one answer, all channels together."""
-
-PROBLEMS = described_problems(
-    {404: "Unknown unit", 409: "There are no samples", 422: "A wrong parameter"}
-)
 
 
 def channel_router(context: Context) -> APIRouter:
     """Return the routes of channels."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}", tags=["plant"], dependencies=[needs(Permission.READ)]
-    )
+    router = subject_router("/units/{unit}", "plant")
 
     @router.get("/channels", summary="Channels", responses=problem_responses(404))
     async def channels(unit: UnitId) -> ChannelsModel:
@@ -347,7 +309,12 @@ def channel_router(context: Context) -> APIRouter:
         """
         return channels_model(context.live, context.unit(unit))
 
-    @router.get("/waveform", summary="Waveform", responses=PROBLEMS, response_model=WaveformModel)
+    @router.get(
+        "/waveform",
+        summary="Waveform",
+        responses=problem_responses(404, 422, own=NO_SAMPLES),
+        response_model=WaveformModel,
+    )
     async def waveform(
         unit: UnitId,
         channel: Annotated[
@@ -358,15 +325,7 @@ def channel_router(context: Context) -> APIRouter:
                 examples=[["ujb_shaft_x", "ujb_shaft_y"]],
             ),
         ] = None,
-        seconds: Annotated[
-            float,
-            Query(
-                gt=0.0,
-                le=HELD_S,
-                allow_inf_nan=False,
-                description="Duration of the newest samples; limited to those in memory.",
-            ),
-        ] = 2.0,
+        seconds: Annotated[float, duration(HELD_S, NEWEST)] = 2.0,
     ) -> Response:
         """Return the newest samples of a unit from memory, in engineering units.
 
@@ -374,9 +333,7 @@ def channel_router(context: Context) -> APIRouter:
         """
         settings = context.unit(unit)
         chosen = _chosen(settings, channel)
-        blocks, age_s = context.live.blocks(unit), context.live.data_age_s(unit)
-        if not blocks or age_s is None:
-            raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")
+        blocks, age_s = newest_blocks(context.live, unit)
         n_samples = _n_samples(seconds, blocks[-1].rate_hz, len(chosen))
         rows = [rows_of(settings, each)[0] for each in chosen]
         return await rendered(
@@ -386,10 +343,23 @@ def channel_router(context: Context) -> APIRouter:
     return router
 
 
-def _chosen(settings: UnitSettings, channels: list[str] | None) -> list[str]:
+def require_samples(settings: UnitSettings) -> None:
+    """Raise a problem of status 409 for a unit whose source gives no samples."""
     if isinstance(settings.source, ModbusVectorSettings):
         detail = f"unit {settings.id!r} is read from a rack that gives amplitudes, not samples"
         raise ProblemError(409, "No samples", detail)
+
+
+def newest_blocks(live: LiveLook, unit: str) -> tuple[Sequence[SampleBlock], float]:
+    """Return the blocks of a unit in memory and their age; raise a problem without samples."""
+    blocks, age_s = live.blocks(unit), live.data_age_s(unit)
+    if not blocks or age_s is None:
+        raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")
+    return blocks, age_s
+
+
+def _chosen(settings: UnitSettings, channels: list[str] | None) -> list[str]:
+    require_samples(settings)
     known = [channel.id for channel in settings.channel]
     for each in channels or ():
         if each not in known:

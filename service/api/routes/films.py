@@ -15,14 +15,20 @@ from core.change.film_reading import FilmReading
 from core.change.settings import FilmRules
 from core.condition.cells import FilmConditions
 from service.api.answers import rendered
-from service.api.auth.declared import needs
+from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import ProblemError, problem_responses
-from service.api.values import ApiModel, EstimatorName, FilmConditionModel, Time, condition_model
+from service.api.values import (
+    ApiModel,
+    BearingAnswer,
+    ByName,
+    EstimatorName,
+    FilmConditionModel,
+    Time,
+    condition_model,
+)
 from service.live.commands import FilmPlace
 from service.live.live_view import CurrentBearing
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
 
 VerdictName = Literal[
     "normal",
@@ -107,7 +113,7 @@ class FilmCauseModel(ApiModel):
 class FilmDirectionModel(ApiModel):
     """State of a film in one direction."""
 
-    verdict: VerdictName
+    verdict: Annotated[VerdictName, ByName]
     """Verdict on the newest reading. Only "normal", "alert" and "danger" judge the film; the others
     give the reason why not: too little evidence yet ("gathering_evidence"), no baseline for this
     condition ("no_baseline"), too little motion ("insufficient_excitation"), a doubtful value
@@ -144,14 +150,8 @@ class FilmLimitsModel(ApiModel):
     """Absolute change of ln of stiffness for danger."""
 
 
-class FilmModel(ApiModel):
+class FilmModel(BearingAnswer):
     """Film of a bearing now."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
 
     is_watched: bool
     """Whether stiffness is compared with a baseline."""
@@ -258,20 +258,18 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
     seen, place = _seen(context, unit, bearing), context.films.place(unit, bearing)
     x, y = _directions(seen) if seen else (None, None)
     limits = seen.rules.change if seen else None
-    return FilmModel(
+    return FilmModel.of(
         unit=unit,
         bearing=bearing,
         is_watched=seen is not None,
         why_not=why_unwatched(context, unit, bearing),
-        estimator=place.estimator.value if place else None,
-        time=rfc3339(seen.news.reading.time_ns) if seen and seen.news else None,
+        estimator=place and place.estimator,
+        time=seen.news.reading.time_ns if seen and seen.news else None,
         is_current=seen is not None and seen.why_not_current is None,
-        next_reading=_next_reading(seen) if seen else None,
-        condition=_condition(seen) if seen else None,
-        baseline_version=_version(seen.baseline) if seen else None,
-        limits=FilmLimitsModel(alert=limits.alert_change, danger=limits.danger_change)
-        if limits
-        else None,
+        next_reading=seen and _next_reading_ns(seen),
+        condition=seen and _condition(seen),
+        baseline_version=seen and _version(seen.baseline),
+        limits=limits and FilmLimitsModel(alert=limits.alert_change, danger=limits.danger_change),
         x=x,
         y=y,
     )
@@ -315,12 +313,12 @@ def _why_not_current(
     return None if news.findings[0].baseline_version == version else "baseline_changed"
 
 
-def _next_reading(seen: WatchedFilm) -> str | None:
+def _next_reading_ns(seen: WatchedFilm) -> int | None:
     """Return the start of the first reading slot after the newest result."""
     newest, period_ns = seen.current.assessment, seen.rules.reading_ns
     if newest is None or not seen.current.is_current:
         return None
-    return rfc3339((newest.time_ns // period_ns + 1) * period_ns)
+    return (newest.time_ns // period_ns + 1) * period_ns
 
 
 def _condition(seen: WatchedFilm) -> FilmConditionModel | None:
@@ -354,22 +352,14 @@ def _unread(reason: str, level: LevelHeldName | None) -> FilmDirectionModel:
 
 def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionModel:
     finding, ln_k = news.findings[row], news.reading.values[row].ln_k
-    attribution = finding.attribution
-    return FilmDirectionModel(
-        verdict=verdict_name(finding.verdict),
+    return FilmDirectionModel.of(
+        verdict=finding.verdict,
         reason=_reason(seen, news.reading, finding, row),
         level=level_name(finding.level),
         change=_change(finding, news.decisions[row], seen.rules),
         deviation=_deviation(finding),
         stiffness_n_per_m=None if math.isnan(ln_k) else math.exp(ln_k),
-        cause=FilmCauseModel(
-            cause=attribution.cause.value,
-            reason=attribution.reason,
-            film_share=attribution.film_share,
-            film_share_std=attribution.film_share_std,
-        )
-        if attribution
-        else None,
+        cause=finding.attribution,
     )
 
 
@@ -401,16 +391,16 @@ def _change(finding: FilmFinding, decision: Decision, rules: FilmRules) -> FilmC
         return None
     low, high = interval_percent(change, std)
     counted_ns = decision.last_counted_ns
-    return FilmChangeModel(
+    return FilmChangeModel.of(
+        finding,
         percent=percent_of(change),
         low_95=low,
         high_95=high,
         ln=change,
         ln_std=std,
-        time_scale_h=time_scale_h,
         significance=abs(change) / std,
         significance_wanted=rules.change.significance_threshold(time_scale_h),
-        as_of=None if counted_ns is None else rfc3339(round(counted_ns / rules.time_lapse)),
+        as_of=None if counted_ns is None else round(counted_ns / rules.time_lapse),
     )
 
 
@@ -453,11 +443,7 @@ def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
 
 def film_router(context: Context) -> APIRouter:
     """Return the route of the film now."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings/{bearing}/film",
-        tags=["film"],
-        dependencies=[needs(Permission.READ)],
-    )
+    router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 
     @router.get(
         "", summary="A film now", response_model=FilmModel, responses=problem_responses(404)

@@ -10,35 +10,15 @@ from pydantic import Field
 
 from acquisition.errors import ConfigError
 from service.api.answers import rendered, worked
-from service.api.auth.declared import needs
+from service.api.auth.declared import subject_router
 from service.api.context import Context
 from service.api.downloads import TooManyDownloadsError
-from service.api.problems import ProblemError, described_problems
+from service.api.parameters import only
+from service.api.problems import ProblemError, problem_responses
 from service.api.routes.channels import UNITS, ChannelUnit
 from service.api.values import ApiModel, Time
 from service.recordings.library import Kept, Shelf
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
 from service.store.waveform_port import WaveformKind
-
-
-class RecordingAlarmModel(ApiModel):
-    """Event of an alarm that a recording was made for."""
-
-    alarm: Annotated[str, Field(examples=["U1:UJB:shaft_x"])]
-    """Identifier of the alarm."""
-
-    occurrence: int
-    """Occurrence of the alarm."""
-
-    change: Annotated[str, Field(examples=["raised"])]
-    """Kind of event."""
-
-    level: str | None
-    """Level of the alarm at that time."""
-
-    time: Time
-    """Time of the event."""
 
 
 class RunningRecordingModel(ApiModel):
@@ -49,6 +29,19 @@ class RunningRecordingModel(ApiModel):
 
     occurrence: int
     """Occurrence of the alarm."""
+
+
+class RecordingAlarmModel(RunningRecordingModel):
+    """Event of an alarm that a recording was made for."""
+
+    change: Annotated[str, Field(examples=["raised"])]
+    """Kind of event."""
+
+    level: str | None
+    """Level of the alarm at that time."""
+
+    time: Time
+    """Time of the event."""
 
 
 class RecordingModel(ApiModel):
@@ -180,18 +173,14 @@ class RecordingInfoModel(ApiModel):
 def recording_model(kept: Kept) -> RecordingModel:
     """Return the entry of a recording in the list."""
     manifest = kept.manifest
-    return RecordingModel(
+    described = ("unit", "start", "rate_hz", "n_samples")
+    return RecordingModel.of(
+        kept,
         id=kept.name,
-        kind=kept.kind.value,
         state="complete" if kept.fault is None else "damaged",
         reason=kept.fault,
-        unit=None if manifest is None else manifest.unit,
-        start=None if manifest is None else manifest.start,
-        duration_s=None if manifest is None else manifest.n_samples / manifest.rate_hz,
-        rate_hz=None if manifest is None else manifest.rate_hz,
-        n_samples=None if manifest is None else manifest.n_samples,
-        n_bytes=kept.n_bytes,
-        alarms=[RecordingAlarmModel(**each) for each in kept.alarms],
+        duration_s=manifest and manifest.n_samples / manifest.rate_hz,
+        **{name: manifest and getattr(manifest, name) for name in described},
     )
 
 
@@ -207,26 +196,17 @@ def recording_info(shelf: Shelf, kept: Kept) -> RecordingInfoModel:
     if manifest is None or kept.fault is not None:
         raise ConfigError(kept.fault or "its manifest cannot be read")
     summary = shelf.summary(kept.name)
-    return RecordingInfoModel(
+    return RecordingInfoModel.of(
+        summary,
+        manifest,
         recording=recording_model(kept),
-        made_by=manifest.made_by,
-        sample_type=manifest.sample_type,
-        end=rfc3339(summary.stop_ns),
-        n_gaps=summary.n_gaps,
-        n_gap_samples=summary.n_gap_samples,
-        rejected=dict(summary.rejected),
-        epochs=list(summary.epochs),
+        end=summary.stop_ns,
         channels=[
             RecordedChannelModel(
                 id=each.id, unit=UNITS[each.measurand], n_not_ok=summary.n_not_ok.get(each.id, 0)
             )
             for each in manifest.channels
         ],
-        slow_channels=[RecordedSlowModel(id=e.id, unit=e.unit) for e in manifest.slow_channels],
-        files={
-            name: RecordedFileModel(size=file.size, sha256=file.sha256)
-            for name, file in manifest.files.items()
-        },
     )
 
 
@@ -239,15 +219,10 @@ RecordingId = Annotated[
     ),
 ]
 
-LIST_PROBLEMS = described_problems({404: "No recordings are kept here", 422: "A wrong parameter"})
+LIST_PROBLEMS = problem_responses(422, own={404: "No recordings are kept here"})
 
-PROBLEMS = described_problems(
-    {
-        404: "Unknown recording",
-        422: "A wrong parameter",
-        410: "Damaged on the disk",
-        503: "Too many concurrent downloads",
-    }
+PROBLEMS = problem_responses(
+    410, 422, own={404: "Unknown recording", 503: "Too many concurrent downloads"}
 )
 
 Pieces = Generator[bytes, None, None]
@@ -257,16 +232,12 @@ log = structlog.get_logger()
 
 def recording_router(context: Context) -> APIRouter:
     """Return the routes of recordings."""
-    router = APIRouter(
-        prefix="/api/v1/recordings", tags=["recordings"], dependencies=[needs(Permission.READ)]
-    )
+    router = subject_router("/recordings", "recordings")
 
     @router.get("", summary="Recordings", responses=LIST_PROBLEMS)
     async def recordings(
-        unit: Annotated[str | None, Query(description="Only this unit.", examples=["U1"])] = None,
-        kind: Annotated[
-            WaveformKind | None, Query(description="Only this kind.", examples=["capture"])
-        ] = None,
+        unit: Annotated[str | None, only("unit", "U1")] = None,
+        kind: Annotated[WaveformKind | None, only("kind", "capture")] = None,
         limit: Annotated[
             int, Query(ge=1, le=500, description="Maximum number of recordings.")
         ] = 100,

@@ -13,7 +13,7 @@ from core.monitor.assessment import Assessment
 from core.stiffness.order_line import marked_hz
 from core.units import NS_PER_S
 from service.api.answers import Renderings, rendered
-from service.api.auth.declared import needs
+from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import TimeRange
 from service.api.problems import ProblemError, problem_responses
@@ -23,13 +23,12 @@ from service.api.values import (
     PLACES,
     STATE_NAMES,
     ApiModel,
+    BearingHistory,
     LevelName,
     OperatingStateName,
     PlaceName,
     Time,
 )
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
 from service.store.spectra_port import Spectra, SpectraQuery, StoredSpectrum
 
 
@@ -43,20 +42,8 @@ class PlaceSpectraModel(ApiModel):
     """One value per frequency for each time; null where the channel was not usable."""
 
 
-class SpectraModel(ApiModel):
+class SpectraModel(BearingHistory):
     """Averaged amplitude spectra of a bearing over time, oldest first."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
-
-    start: Time
-    """Start of the requested range."""
-
-    end: Time
-    """End of the requested range."""
 
     frequency_hz: Annotated[list[float], Field(examples=[[0.073, 0.146, 0.22]])]
     """Frequencies of the lines of all spectra."""
@@ -159,11 +146,9 @@ def spectra_model(
     shown = [each for each in found.spectra if each.resolution == found.spectra[-1].resolution]
     frequency_hz = _frequencies(shown, max_frequency_hz)
     _require_few(len(shown), len(places) * frequency_hz.size)
-    return SpectraModel(
-        unit=query.unit,
-        bearing=query.bearing,
-        start=rfc3339(query.start_ns),
-        end=rfc3339(query.end_ns),
+    return SpectraModel.of(
+        query,
+        found,
         frequency_hz=frequency_hz.tolist(),
         time=[each.time_ns / NS_PER_S for each in shown],
         duration_s=[each.duration_s for each in shown],
@@ -175,11 +160,8 @@ def spectra_model(
         order1_hz=[each.order1_hz for each in shown],
         vortex_hz=[each.vortex_hz for each in shown],
         channels={place: _place(shown, place, frequency_hz.size) for place in places},
-        n_found=found.n_found,
         n_other_resolution=len(found.spectra) - len(shown),
-        damaged=[rfc3339(time_ns) for time_ns in found.damaged_ns],
-        first=None if found.first_ns is None else rfc3339(found.first_ns),
-        simulated_until=None if past_end_ns is None else rfc3339(past_end_ns),
+        simulated_until=past_end_ns,
     )
 
 
@@ -212,8 +194,8 @@ def _place(shown: Sequence[StoredSpectrum], place: PlaceName, n_lines: int) -> P
 def spectrum_model(assessment: Assessment) -> SpectrumModel:
     """Return the amplitude spectra of an assessment."""
     spectrum, readings = assessment.spectrum, assessment.readings
-    return SpectrumModel(
-        time=rfc3339(assessment.time_ns),
+    return SpectrumModel.of(
+        time=assessment.time_ns,
         frequency_hz=spectrum.frequency_hz.tolist(),
         channels={
             name: SpectrumChannelModel(
@@ -235,11 +217,7 @@ log = structlog.get_logger()
 
 def spectra_router(context: Context) -> APIRouter:
     """Return the routes of spectra."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings",
-        tags=["bearing"],
-        dependencies=[needs(Permission.READ)],
-    )
+    router = subject_router("/units/{unit}/bearings", "bearing")
     newest = Renderings()
 
     @router.get(
