@@ -165,8 +165,8 @@ def create_app(context: Context) -> GuardedApi:
         delivery_router(context),
         audit_router(context),
         session_router(context, desk),
-        account_router(desk.registry),
-        key_router(context, desk.registry),
+        account_router(desk),
+        key_router(context, desk),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     if context.metrics is not None:

@@ -30,42 +30,11 @@ class Refused(IntEnum):
     VIEWS = 2
 
 
-@dataclass(frozen=True)
-class LoadLimits:
-    """Limits above which requests for past values are refused; at twice these, live values too.
+MAX_DELAY_S, MAX_WAITING_SHARE, MAX_LAG_S = 2.0, 0.2, 1.0
+"""Waiting time of the oldest block, fill level of the queue to the analysis, and lasting delay of
+the event loop above which requests for past values are refused; at twice these, live values too.
 
-    In between, continuous recording stops (`service.recordings.continuous.pressure`).
-
-    Parameters
-    ----------
-    delay_s
-        Waiting time of the oldest block.
-    waiting_share
-        Fill level of the queue to the analysis, 0 to 1.
-    lag_s
-        Lasting delay of the event loop.
-    """
-
-    delay_s: float = 2.0
-    waiting_share: float = 0.2
-    lag_s: float = 1.0
-
-
-@dataclass(frozen=True)
-class Load:
-    """Load of the service; fields as in `LoadLimits`."""
-
-    delay_s: float = 0.0
-    waiting_share: float = 0.0
-    lag_s: float = 0.0
-
-    def over(self, limits: LoadLimits) -> float:
-        """Return the largest ratio of a load to its limit."""
-        return max(
-            self.delay_s / limits.delay_s,
-            self.waiting_share / limits.waiting_share,
-            self.lag_s / limits.lag_s,
-        )
+In between, continuous recording stops (`service.recordings.continuous_recorder`)."""
 
 
 @dataclass(frozen=True)
@@ -116,8 +85,8 @@ class LoadWatch:
         Queue of blocks to the analysis.
     """
 
-    def __init__(self, bus: Bus, limits: LoadLimits, clock: Clock) -> None:
-        self._bus, self._limits, self._clock = bus, limits, clock
+    def __init__(self, bus: Bus, clock: Clock) -> None:
+        self._bus, self._clock = bus, clock
         self._lags = deque([0.0] * N_LOOKS, N_LOOKS)
         self._overs = deque([0.0] * N_LOOKS, N_LOOKS)
         self._strain = Strain()
@@ -155,13 +124,20 @@ class LoadWatch:
             Delay of the event loop.
         """
         self._lags.append(max(0.0, late_s))
-        bus = self._bus
-        load = Load(bus.oldest_wait_s, bus.depth / bus.capacity, self.lag_s)
-        self._overs.append(load.over(self._limits))
+        delay_s, waiting_share = self._bus.oldest_wait_s, self._bus.depth / self._bus.capacity
+        ratios = delay_s / MAX_DELAY_S, waiting_share / MAX_WAITING_SHARE, self.lag_s / MAX_LAG_S
+        self._overs.append(max(ratios))
         before = self.refused
         self._strain = advance(self._strain, min(self._overs), self._clock.monotonic_s())
         if self.refused != before:
-            _log(self.refused, load)
+            write = log.warning if self.refused else log.info
+            write(
+                "requests are refused" if self.refused else "requests are accepted again",
+                refused=self.refused.name.lower(),
+                delay_s=round(delay_s, 2),
+                waiting_share=round(waiting_share, 2),
+                lag_s=round(self.lag_s, 2),
+            )
 
     def refuses(self, question: Refused) -> bool:
         """Whether a request of this kind is refused now; count it if so."""
@@ -169,17 +145,6 @@ class LoadWatch:
             return False
         self.n_refused[question] += 1
         return True
-
-
-def _log(refused: Refused, load: Load) -> None:
-    say = log.warning if refused else log.info
-    say(
-        "questions are refused" if refused else "questions are answered again",
-        refused=refused.name.lower(),
-        delay_s=round(load.delay_s, 2),
-        waiting_share=round(load.waiting_share, 2),
-        lag_s=round(load.lag_s, 2),
-    )
 
 
 VITAL = re.compile(

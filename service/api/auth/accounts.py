@@ -7,10 +7,11 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Path, Request
 from pydantic import FailFast, Field
 
+from service.api.auth.authenticator import AccessDesk
 from service.api.auth.declared import Reach, subject_router
 from service.api.auth.gate import identity_of, name_caller
 from service.api.auth.passwords import MAX_LENGTH, PasswordRefusedError, TooManyLoginsError
-from service.api.auth.people import AccessRegistry
+from service.api.auth.people import create_key
 from service.api.context import Context
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel, Time
@@ -177,30 +178,32 @@ CHANGE_PROBLEMS = problem_responses(
 )
 
 
-def account_router(registry: AccessRegistry) -> APIRouter:
+def account_router(desk: AccessDesk) -> APIRouter:
     """Return the routes of accounts."""
+    stored, people, work, now_ns = desk.store.accounts, desk.people, desk.work, desk.clock.now_ns
     router = subject_router("/accounts", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
 
     @router.get("", summary="Accounts", responses=problem_responses(503))
     async def accounts() -> list[AccountModel]:
         """List all accounts by name."""
-        return [account_model(account) for account in await registry.accounts()]
+        return [account_model(account) for account in await work.looked_up(stored.all)]
 
     @router.post("", summary="Add an account", status_code=201, responses=CHANGE_PROBLEMS)
     async def add(asked: NewAccountModel) -> AccountModel:
         """Add an account with a password to change at the first login."""
+        new = asked.name, Role(asked.role), asked.password
         with refusals_as_problems():
-            name = await registry.add(asked.name, Role(asked.role), asked.password)
-        return await _one(registry, name)
+            name = await work.hashed(lambda: people.add(*new, now_ns(), must_change=True))
+        return await _one(desk, name)
 
     @router.put("/{name}/role", summary="Change a role", responses=CHANGE_PROBLEMS)
     async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
         """Change the role of an account from its next request on."""
-        await _one(registry, name)
+        await _one(desk, name)
         with refusals_as_problems():
-            await registry.set_role(name, Role(asked.role))
-        return await _one(registry, name)
+            await work.looked_up(lambda: stored.set_role(name, Role(asked.role), now_ns()))
+        return await _one(desk, name)
 
     @router.put("/{name}/password", summary="Set a password", responses=CHANGE_PROBLEMS)
     async def set_password(
@@ -210,10 +213,11 @@ def account_router(registry: AccessRegistry) -> APIRouter:
         if _is_own(request, name):
             detail = "change your own password with POST /session/password"
             raise ProblemError(409, "Does not fit", detail)
-        await _one(registry, name)
+        await _one(desk, name)
+        new = name, asked.password
         with refusals_as_problems():
-            await registry.set_password(name, asked.password, must_change=True)
-        return await _one(registry, name)
+            await work.hashed(lambda: people.set_password(*new, now_ns(), must_change=True))
+        return await _one(desk, name)
 
     @router.delete(
         "/{name}", summary="Remove an account", status_code=204, responses=CHANGE_PROBLEMS
@@ -222,9 +226,9 @@ def account_router(registry: AccessRegistry) -> APIRouter:
         """Remove an account and end its sessions; the own account cannot be removed."""
         if _is_own(request, name):
             raise ProblemError(409, "Does not fit", "you cannot remove your own account")
-        await _one(registry, name)
+        await _one(desk, name)
         with refusals_as_problems():
-            await registry.remove(name)
+            await work.looked_up(lambda: stored.remove(name, now_ns()))
 
     return router
 
@@ -235,8 +239,8 @@ def _is_own(request: Request, name: str) -> bool:
     return identity.means is Means.SESSION and identity.name == name
 
 
-async def _one(registry: AccessRegistry, name: str) -> AccountModel:
-    found = await registry.account(name)
+async def _one(desk: AccessDesk, name: str) -> AccountModel:
+    found = await desk.work.looked_up(lambda: desk.store.accounts.get(name))
     if found is None:
         raise ProblemError(404, "Unknown account", "there is no such account")
     return account_model(found)
@@ -247,16 +251,17 @@ KeyId = Annotated[
 ]
 
 
-def key_router(context: Context, registry: AccessRegistry) -> APIRouter:
+def key_router(context: Context, desk: AccessDesk) -> APIRouter:
     """Return the routes of keys."""
+    stored, work, clock = desk.store.keys, desk.work, desk.clock
     router = subject_router("/keys", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
 
     @router.get("", summary="Keys", responses=problem_responses(503))
     async def keys() -> list[KeyModel]:
         """List all keys that were ever created, oldest first, without their secrets."""
-        now_ns = context.clock.now_ns()
-        return [KeyModel.of(key, state=key.state(now_ns)) for key in await registry.keys()]
+        keys, now_ns = await work.looked_up(stored.all), clock.now_ns()
+        return [KeyModel.of(key, state=key.state(now_ns)) for key in keys]
 
     @router.post("", summary="Create a key", status_code=201, responses=CHANGE_PROBLEMS)
     async def create(asked: NewKeyModel) -> CreatedKeyModel:
@@ -265,16 +270,16 @@ def key_router(context: Context, registry: AccessRegistry) -> APIRouter:
             if unit not in context.units:
                 detail = "there is no such unit in this plant"
                 raise ProblemError(422, "Wrong parameter", detail, "units")
+        new, now_ns = (asked.name, Role(asked.role), asked.units, asked.days), clock.now_ns()
         with refusals_as_problems():
-            made, shown = await registry.create_key(
-                asked.name, Role(asked.role), asked.units, asked.days
-            )
-        return CreatedKeyModel.of(made, state=made.state(context.clock.now_ns()), key=shown)
+            made, shown = await work.looked_up(lambda: create_key(desk.store, *new, now_ns))
+        return CreatedKeyModel.of(made, state=made.state(now_ns), key=shown)
 
     @router.delete("/{key}", summary="Revoke a key", status_code=204, responses=CHANGE_PROBLEMS)
     async def revoke(key: KeyId) -> None:
         """Revoke a key permanently; repeating the request changes nothing."""
-        if not await registry.revoke_key(key):
+        if await work.looked_up(lambda: stored.get(key)) is None:
             raise ProblemError(404, "Unknown key", "there is no such key")
+        await work.looked_up(lambda: stored.revoke(key, clock.now_ns()))
 
     return router

@@ -11,7 +11,7 @@ from acquisition.clock import Clock
 from core.units import ns_from_s
 from service.api.auth.backoff import Backoff
 from service.api.auth.passwords import AccessWork, Hashing
-from service.api.auth.people import AccessRegistry, People
+from service.api.auth.people import People
 from service.settings.processes import is_loopback
 from service.store.access.identities import (
     LOCAL,
@@ -277,6 +277,8 @@ class AccessDesk:
 
     Parameters
     ----------
+    store
+        Accounts, sessions and keys.
     local_role
         Role of callers on this computer without credentials; None if they must log in.
     hashing
@@ -291,13 +293,9 @@ class AccessDesk:
         hashing: Hashing | None = None,
         limits: SessionLimits | None = None,
     ) -> None:
-        self._store, self._clock, self._limits = store, clock, limits
-        self.local_role = local_role
-        self._hashing = hashing or Hashing()
-        self._people = People(store, self._hashing)
-        self._work = AccessWork()
-        self._backoff = Backoff()
-        self.registry = AccessRegistry(store, self._people, self._work, clock)
+        self.store, self.clock, self.local_role = store, clock, local_role
+        self._hashing, self._limits, self._backoff = hashing or Hashing(), limits, Backoff()
+        self.people, self.work = People(store, self._hashing), AccessWork()
 
     async def caller(self, scope: Scope) -> Caller:
         """Identify the sender of a request.
@@ -324,15 +322,15 @@ class AccessDesk:
         TooManyLoginsError
             If there are too many concurrent logins.
         """
-        now_ns, ticks_ns = self._clock.now_ns(), ns_from_s(self._clock.monotonic_s())
-        return await self._work.hashed(
+        now_ns, ticks_ns = self.clock.now_ns(), ns_from_s(self.clock.monotonic_s())
+        return await self.work.hashed(
             lambda: self._doors.log_in(name, password, peer, now_ns, ticks_ns),
             is_known=self._backoff.knows(tidy_name(name), peer),
         )
 
     async def log_out(self, token: str) -> None:
         """End a session; an ended one is ignored."""
-        await self._work.looked_up(lambda: self._doors.log_out(token))
+        await self.work.looked_up(lambda: self._doors.log_out(token))
 
     async def set_up(self, token: str, name: str, password: str) -> bool:
         """Create the first account, an admin; return whether the token was valid.
@@ -342,36 +340,36 @@ class AccessDesk:
         NameRefusedError, PasswordRefusedError, TooManyLoginsError
             If one is not accepted, or there are too many concurrent logins.
         """
-        now_ns = self._clock.now_ns()
-        return await self._work.hashed(
-            lambda: self._people.set_up(token, name, password, now_ns), is_known=False
+        now_ns = self.clock.now_ns()
+        return await self.work.hashed(
+            lambda: self.people.set_up(token, name, password, now_ns), is_known=False
         )
 
     async def offer_set_up(self) -> str | None:
         """Return a token for creating the first account; None if none is needed."""
         if self.local_role is Role.ADMIN:
             return None
-        now_ns = self._clock.now_ns()
-        return await self._work.looked_up(lambda: self._people.offer_set_up(now_ns))
+        now_ns = self.clock.now_ns()
+        return await self.work.looked_up(lambda: self.people.offer_set_up(now_ns))
 
     async def has_accounts(self) -> bool:
         """Whether there is an account."""
-        return bool(await self._work.looked_up(self._store.accounts.all))
+        return bool(await self.work.looked_up(self.store.accounts.all))
 
     def close(self) -> None:
         """Stop the threads; no further request is served."""
-        self._work.close()
+        self.work.close()
 
     async def _proven(self, shown: Credentials) -> Identity | None:
-        now_ns = self._clock.now_ns()
+        now_ns = self.clock.now_ns()
         if shown.kind is Kind.SESSION:
-            found = await self._work.looked_up(lambda: self._doors.person(shown.secret, now_ns))
+            found = await self.work.looked_up(lambda: self._doors.person(shown.secret, now_ns))
         elif shown.kind is Kind.KEY:
-            found = await self._work.looked_up(lambda: self._doors.machine(shown.secret, now_ns))
+            found = await self.work.looked_up(lambda: self._doors.machine(shown.secret, now_ns))
         else:
             return None
         return None if isinstance(found, Refusal) else found
 
     @cached_property
     def _doors(self) -> Doors:
-        return Doors(self._store, self._hashing, self._backoff, self._limits, self._work.note)
+        return Doors(self.store, self._hashing, self._backoff, self._limits, self.work.note)

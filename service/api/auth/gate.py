@@ -1,7 +1,6 @@
 """The gate before all routes: identifies the caller and compares it with what a route needs."""
 
 from collections.abc import Callable, Iterable, Mapping
-from math import ceil
 from urllib.parse import urlsplit
 
 from fastapi import Request
@@ -67,39 +66,10 @@ def not_logged_in() -> ProblemError:
     return ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
 
 
-def wrong_login() -> ProblemError:
-    """Return the problem of a wrong name or password."""
-    detail = "the name or the password is wrong"
-    return ProblemError(401, "Not let in", detail, headers=BEARER_ONLY)
-
-
-def must_wait(wait_s: float) -> ProblemError:
-    """Return the problem of a login refused after too many failures."""
-    detail = "too many failed logins; wait before the next one"
-    return ProblemError(429, "Wait", detail, headers={"Retry-After": str(max(1, ceil(wait_s)))})
-
-
-def not_allowed() -> ProblemError:
-    """Return the problem of an insufficient role."""
-    return ProblemError(403, "Not allowed", "your role does not allow this")
-
-
-def must_change_password() -> ProblemError:
-    """Return the problem of a password that must be changed first."""
-    detail = "an administrator set your password; change it first"
-    return ProblemError(403, "Change your password", detail)
-
-
 def not_this_unit() -> ProblemError:
     """Return the problem of a key that is not valid for the unit."""
     detail = "this key is valid for some units only; request one of them"
     return ProblemError(403, "Not allowed", detail)
-
-
-def not_this_site() -> ProblemError:
-    """Return the problem of a request from another site."""
-    detail = "requests from pages of another site are refused"
-    return ProblemError(403, "Not from this site", detail)
 
 
 CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
@@ -160,7 +130,8 @@ def _require_own_page(scope: Scope, caller: Caller) -> None:
         return
     must_say = caller.shown.kind is not Kind.NOTHING
     if is_foreign(scope["scheme"], scope["headers"], must_say):
-        raise not_this_site()
+        detail = "requests from pages of another site are refused"
+        raise ProblemError(403, "Not from this site", detail)
 
 
 def caller_of(request: Request) -> Caller:
@@ -185,9 +156,12 @@ async def require_declared(request: Request) -> None:
     if identity is None:
         raise not_logged_in()
     if identity.must_change_password and operation != CHANGE_PASSWORD:
-        raise must_change_password()
+        detail = "an administrator set your password; change it first"
+        raise ProblemError(403, "Change your password", detail)
     if not identity.role.may(needed.permission):
-        raise not_allowed() if identity.is_proven else not_logged_in()
+        if identity.is_proven:
+            raise ProblemError(403, "Not allowed", "your role does not allow this")
+        raise not_logged_in()
     unit = _unit_of(request.path_params)
     if needed.reach is Reach.ASKED:
         unit = _unit_asked(request)

@@ -2,6 +2,7 @@
 
 import asyncio
 from contextlib import suppress
+from math import ceil
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Request, Response
@@ -19,7 +20,7 @@ from service.api.auth.authenticator import (
     NotLoggedIn,
 )
 from service.api.auth.declared import OPEN, Reach, needs
-from service.api.auth.gate import caller_of, identity_of, must_wait, wrong_login
+from service.api.auth.gate import BEARER_ONLY, caller_of, identity_of
 from service.api.context import Context
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
@@ -171,8 +172,9 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
         """Change the password; all sessions of the account end, and this browser gets a new one."""
         identity = _person(identity_of(request))
         await _log_in(desk, request, identity.name, asked.password)
+        new = identity.name, asked.new_password
         with refusals_as_problems("new_password"):
-            await desk.registry.set_password(identity.name, asked.new_password, must_change=False)
+            await desk.work.hashed(lambda: desk.people.set_password(*new, desk.clock.now_ns()))
         let_in = await _log_in(desk, request, identity.name, asked.new_password)
         await _record_login(context, desk, let_in)
         return await _begun(desk, request, response, let_in)
@@ -201,7 +203,12 @@ async def _log_in(desk: AccessDesk, request: Request, name: str, password: str) 
     with refusals_as_problems():
         found = await desk.log_in(name, password, peer)
     if isinstance(found, NotLoggedIn):
-        raise must_wait(found.wait_s) if found.wait_s else wrong_login()
+        if not found.wait_s:
+            detail = "the name or the password is wrong"
+            raise ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
+        wait = {"Retry-After": str(max(1, ceil(found.wait_s)))}
+        detail = "too many failed logins; wait before the next one"
+        raise ProblemError(429, "Wait", detail, headers=wait)
     return found
 
 

@@ -1,6 +1,7 @@
-"""Uvicorn's HTTP/1.1 protocol with deadlines, sizes and counts."""
+"""HTTP/1.1 protocol of uvicorn with limits on time, size and number of connections."""
 
 import asyncio
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 from enum import Enum, auto
 from typing import Any, cast
@@ -12,7 +13,6 @@ from uvicorn._types import ASGI3Application
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 from uvicorn.server import ServerState
 
-from service.api.http.connections import Connections
 from service.api.http.middleware import ALWAYS, API_ONLY, BoundedAnswers, guarded
 from service.api.http.refusals import (
     FULL,
@@ -23,6 +23,93 @@ from service.api.http.refusals import (
     Refusal,
 )
 from service.settings.processes import HttpLimitSettings
+
+MAX_UNSENT_BYTES = 64 * 1024 * 1024
+"""Maximum total of unsent bytes; above it the largest answers are aborted."""
+
+MAX_PAUSE_S = 1.0
+"""Longest pause between sweeps that counts towards deadlines, s."""
+
+
+class Connections:
+    """The open connections of a server.
+
+    Parameters
+    ----------
+    now_s
+        Monotonic time, s.
+    """
+
+    def __init__(self, limits: HttpLimitSettings, now_s: Callable[[], float]) -> None:
+        self.limits, self.now_s = limits, now_s
+        self._of_peer: defaultdict[str, set[GuardedProtocol]] = defaultdict(set)
+        self._n_open = self.n_accepted = 0
+        self._swept_s = now_s()
+
+    def __len__(self) -> int:
+        return self._n_open
+
+    def admit(self, connection: "GuardedProtocol") -> bool:
+        """Add a connection; return False if there is no room for it."""
+        neighbours = self._of_peer[connection.peer]
+        if len(neighbours) >= self.limits.max_connections_per_peer:
+            has_room = _make_room(neighbours)
+        elif self._n_open >= self.limits.max_connections:
+            has_room = _make_room(self.all())
+        else:
+            has_room = True
+        # closing connections count until they are closed
+        neighbours.add(connection)
+        self._n_open += 1
+        self.n_accepted += 1
+        return has_room
+
+    def leave(self, connection: "GuardedProtocol") -> None:
+        """Remove a closed connection."""
+        neighbours = self._of_peer[connection.peer]
+        neighbours.remove(connection)
+        self._n_open -= 1
+        if not neighbours:
+            del self._of_peer[connection.peer]
+
+    def sweep(self) -> None:
+        """Close connections past a deadline; called periodically."""
+        now_s = self.now_s()
+        stalled_s = max(0.0, now_s - self._swept_s - MAX_PAUSE_S)
+        self._swept_s = now_s
+        for connection in self.all():
+            connection.excuse(stalled_s)
+            connection.check(now_s)
+        self._relieve()
+
+    def abort_all(self) -> None:
+        """Abort all connections."""
+        for connection in self.all():
+            connection.abort()
+
+    def all(self) -> set["GuardedProtocol"]:
+        """Return the open connections."""
+        return set().union(*self._of_peer.values())
+
+    def _relieve(self) -> None:
+        unsent = {each: n for each in self.all() if (n := each.n_unsent())}
+        total = sum(unsent.values())
+        for each in sorted(unsent, key=unsent.__getitem__, reverse=True):
+            if total <= MAX_UNSENT_BYTES:
+                return
+            total -= unsent[each]
+            each.abort()
+
+
+def _make_room(connections: set["GuardedProtocol"]) -> bool:
+    """Close the connection that waits longest, preferring those without a request."""
+    waiting = [(since, each) for each in connections if (since := each.waits_since())]
+    if not waiting:
+        return False
+    _, longest = min(waiting, key=lambda pair: pair[0])
+    longest.give_way()
+    return True
+
 
 STOP_S = 2
 """Time after which uvicorn cancels remaining requests, with tracebacks, s."""

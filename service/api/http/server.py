@@ -7,8 +7,7 @@ from contextlib import contextmanager
 
 import uvicorn
 
-from service.api.http.connections import Connections
-from service.api.http.protocol import STOP_S, GuardedConfig, GuardedProtocol
+from service.api.http.protocol import STOP_S, Connections, GuardedConfig, GuardedProtocol
 from service.runtime.heartbeats import UNHEARD, Pulse
 
 PATIENCE_S = 1.0

@@ -114,7 +114,7 @@ def delivery_router(context: Context) -> APIRouter:
     )
     async def delivery() -> Response:
         """List all receivers of webhooks and mail: backlog, failures, undelivered messages."""
-        receivers = [_receiver(view) for view in await context.deliveries.look()]
+        receivers = [_receiver(view) for view in await context.receivers()]
         return await rendered_now(lambda: _delivery(context, receivers))
 
     return router

@@ -171,7 +171,7 @@ async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
         films=films,
         operators=InProcess(alarms, films, recorder),
         captures=captures,
-        deliveries=Deliveries([], store.outbox, clock),
+        receivers=Deliveries([], store.outbox, clock).look,
         max_shelf_s=7200.0,
         evidence=lambda: evidence.status,
         configuration=built_configuration(own),

@@ -10,7 +10,6 @@ from starlette.responses import PlainTextResponse
 
 from service.api.load import (
     N_LOOKS,
-    LoadLimits,
     LoadWatch,
     Refused,
     Shedding,
@@ -38,7 +37,7 @@ def bus(stepped_clock: Any) -> SteppedBus:
 
 @pytest.fixture
 def load(bus: SteppedBus, stepped_clock: Any) -> LoadWatch:
-    return LoadWatch(bus, LoadLimits(), stepped_clock)
+    return LoadWatch(bus, stepped_clock)
 
 
 async def test_questions_about_the_past_are_refused_first_and_views_of_now_after_them(

@@ -79,7 +79,7 @@ def access(service: Any) -> Access:
         films=context.films,
         captures=context.captures,
         evidence=service.evidence,
-        deliveries=context.deliveries,
+        receivers=context.receivers,
         timings=Timings(context.units, service.clock),
         clock=service.clock,
     )
