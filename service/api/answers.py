@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Hashable
 from contextvars import Context, copy_context
 from hashlib import blake2b
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from fastapi import Response
 from pydantic import BaseModel
@@ -13,6 +13,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
+from service.api.values import DatedAnswer
 from service.runtime.asker import ASKER
 from service.runtime.times import rfc3339
 
@@ -52,16 +53,6 @@ T = TypeVar("T")
 JSON = "application/json"
 
 
-class Dated(Protocol):
-    """A model whose field ``time`` is the present time, which its entity tag ignores."""
-
-    time: str
-
-    def model_dump_json(self) -> str:
-        """Return the model as JSON."""
-        ...
-
-
 async def worked(do: Callable[[], T]) -> T:
     """Call a function in a thread."""
     return await asyncio.to_thread(do)
@@ -78,7 +69,7 @@ async def rendered(make: Callable[[], BaseModel]) -> Response:
     return await asyncio.to_thread(lambda: _json(make()))
 
 
-async def rendered_now(make: Callable[[], Dated]) -> Response:
+async def rendered_now(make: Callable[[], DatedAnswer]) -> Response:
     """Like `rendered` for the present state; the tag ignores the time of the answer.
 
     Parameters
@@ -123,7 +114,7 @@ def _content(model: BaseModel) -> tuple[bytes, str]:
     return content, tag_of(digest_of(content))
 
 
-def _dated(model: Dated) -> Response:
+def _dated(model: DatedAnswer) -> Response:
     content = model.model_dump_json().encode()
     undated = content.replace(f'"time":"{model.time}"'.encode(), b"", 1)
     return Response(content, media_type=JSON, headers={"ETag": tag_of(digest_of(undated))})
@@ -145,7 +136,7 @@ class SharedAnswer:
     """
 
     def __init__(
-        self, make: Callable[[], Dated], revision: Callable[[], int], clock: Clock
+        self, make: Callable[[], DatedAnswer], revision: Callable[[], int], clock: Clock
     ) -> None:
         self._make, self._revision, self._clock = make, revision, clock
         self._made: tuple[int, float, asyncio.Task[Response]] | None = None

@@ -59,25 +59,13 @@ def require_order(start_ns: int, end_ns: int) -> None:
 Moment = Annotated[datetime, BeforeValidator(written_as_date)]
 
 
-Start = Annotated[
-    Moment,
-    Query(description="Start, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
-]
+def time_query(description: str, example: str) -> Any:
+    """Declare a query parameter for a time."""
+    return Query(description=description, examples=[example])
 
 
-End = Annotated[
-    Moment,
-    Query(description="End, RFC 3339 with offset.", examples=["2026-11-21T09:00:00Z"]),
-]
-
-FirstTime = Annotated[
-    Moment | None,
-    Query(description="First time, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
-]
-EndTime = Annotated[
-    Moment | None,
-    Query(description="End, RFC 3339 with offset.", examples=["2026-11-21T09:00:00Z"]),
-]
+_START = time_query("Start, RFC 3339 with offset.", "2026-11-21T08:00:00Z")
+_END = time_query("End, RFC 3339 with offset.", "2026-11-21T09:00:00Z")
 
 
 def _bound(description: str, example: float) -> Any:
@@ -89,14 +77,18 @@ def duration(longest_s: float, description: str, **options: Any) -> Any:
     return Query(gt=0.0, le=longest_s, allow_inf_nan=False, description=description, **options)
 
 
-async def time_range(start: Start, end: End) -> tuple[int, int]:
+async def time_range(
+    start: Annotated[Moment, _START], end: Annotated[Moment, _END]
+) -> tuple[int, int]:
     """Return the checked time range."""
     start_ns, end_ns = ns_from_datetime(start, "start"), ns_from_datetime(end, "end")
     require_order(start_ns, end_ns)
     return start_ns, end_ns
 
 
-async def optional_time_range(start: FirstTime = None, end: EndTime = None) -> tuple[int, int]:
+async def optional_time_range(
+    start: Annotated[Moment | None, _START] = None, end: Annotated[Moment | None, _END] = None
+) -> tuple[int, int]:
     """Return the checked time range; an omitted end of it is unlimited."""
     start_ns = ns_from_datetime(start, "start") if start else -(2**63)
     end_ns = ns_from_datetime(end, "end") if end else 2**63 - 1

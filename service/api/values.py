@@ -144,6 +144,13 @@ ByName = BeforeValidator(_name)
 """Makes a field accept a member of an enumeration, whose name in lower case is shown."""
 
 
+class DatedAnswer(ApiModel):
+    """Answer with the present time, which its entity tag ignores."""
+
+    time: Time
+    """Present time."""
+
+
 class BearingAnswer(ApiModel):
     """Answer about one bearing."""
 

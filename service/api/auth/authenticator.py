@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from enum import Enum, StrEnum, auto
+from enum import Enum, auto
 from functools import cached_property
 
 from starlette.types import Scope
@@ -35,14 +35,6 @@ from service.store.access.port import AccessStore, Account
 def immediately(note: Callable[[], None]) -> None:
     """Call a function immediately."""
     note()
-
-
-class Refusal(StrEnum):
-    """Why credentials were refused; for logs, not for the caller."""
-
-    UNKNOWN = "unknown"
-    EXPIRED = "expired"
-    REVOKED = "revoked"
 
 
 @dataclass(frozen=True)
@@ -126,28 +118,27 @@ class Doors:
         if is_token(token):
             self._store.sessions.end(digest(token))
 
-    def person(self, token: str, now_ns: int) -> Identity | Refusal:
-        """Return the identity of a session token."""
+    def person(self, token: str, now_ns: int) -> Identity | None:
+        """Return the identity of a session token; None if it is unknown or expired."""
         found = self._store.sessions.get(digest(token)) if is_token(token) else None
         if found is None:
-            return Refusal.UNKNOWN
+            return None
         session, account = found
         if not self._limits.is_live(session, now_ns):
             self._note(lambda: self._store.sessions.end(session.digest))
-            return Refusal.EXPIRED
+            return None
         if self._limits.is_news(session, now_ns):
             self._note(lambda: self._store.sessions.see(session.digest, now_ns))
         return _person(account)
 
-    def machine(self, key: str, now_ns: int) -> Identity | Refusal:
-        """Return the identity of a key."""
+    def machine(self, key: str, now_ns: int) -> Identity | None:
+        """Return the identity of a key; None if it is unknown, expired or revoked."""
         id_ = key_id(key)
         stored = None if id_ is None else self._store.keys.get(id_)
         if stored is None or not is_token_of(key, stored.digest):
-            return Refusal.UNKNOWN
-        state = stored.state(now_ns)
-        if state is not KeyState.VALID:
-            return Refusal.REVOKED if state is KeyState.REVOKED else Refusal.EXPIRED
+            return None
+        if stored.state(now_ns) is not KeyState.VALID:
+            return None
         if stored.is_news(now_ns):
             self._note(lambda: self._store.keys.see(stored.id, now_ns))
         return Identity(stored.name, stored.role, Means.KEY, stored.units)
@@ -363,12 +354,10 @@ class AccessDesk:
     async def _proven(self, shown: Credentials) -> Identity | None:
         now_ns = self.clock.now_ns()
         if shown.kind is Kind.SESSION:
-            found = await self.work.looked_up(lambda: self._doors.person(shown.secret, now_ns))
-        elif shown.kind is Kind.KEY:
-            found = await self.work.looked_up(lambda: self._doors.machine(shown.secret, now_ns))
-        else:
-            return None
-        return None if isinstance(found, Refusal) else found
+            return await self.work.looked_up(lambda: self._doors.person(shown.secret, now_ns))
+        if shown.kind is Kind.KEY:
+            return await self.work.looked_up(lambda: self._doors.machine(shown.secret, now_ns))
+        return None
 
     @cached_property
     def _doors(self) -> Doors:

@@ -13,6 +13,7 @@ from service.api.values import (
     ApiModel,
     ByName,
     CellModel,
+    DatedAnswer,
     FilmConditionModel,
     OperatingStateName,
     Time,
@@ -190,11 +191,8 @@ class AlarmCountModel(ApiModel):
     """Not active, condition unknown."""
 
 
-class AlarmListModel(ApiModel):
+class AlarmListModel(DatedAnswer):
     """Alarms that are not normal, and alarms whose condition is unknown."""
-
-    time: Time
-    """Present time."""
 
     origin: OriginName
     """Whether this is live or a replay."""

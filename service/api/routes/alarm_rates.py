@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter
 from pydantic import Field
 
 from core.alarms.alarm import PLANT, AlarmEvent
@@ -13,7 +13,7 @@ from core.alarms.statistics import DAY_NS, AlarmFigures, ChatterRule, figures_of
 from core.limits import AlarmLevel
 from service.api.auth.declared import Reach, subject_router
 from service.api.context import Context
-from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, require_order
+from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, require_order, time_query
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarm_models import (
     LEVEL_NAMES,
@@ -150,6 +150,9 @@ def _figures_model(figures: AlarmFigures) -> AlarmFiguresModel:
 
 DEFAULT_DAYS, MAX_DAYS = 7, 400
 
+START = "Start of the range; default: seven days before its end.", "2026-11-14T09:00:00Z"
+END = "End of the range; default: now.", "2026-11-21T09:00:00Z"
+
 
 def alarm_rate_router(context: Context) -> APIRouter:
     """Return the route of alarm rates."""
@@ -161,17 +164,8 @@ def alarm_rate_router(context: Context) -> APIRouter:
     )
     async def rates(
         unit: OnlyUnit = None,
-        start: Annotated[
-            Moment | None,
-            Query(
-                description="Start of the range; default: seven days before its end.",
-                examples=["2026-11-14T09:00:00Z"],
-            ),
-        ] = None,
-        end: Annotated[
-            Moment | None,
-            Query(description="End of the range; default: now.", examples=["2026-11-21T09:00:00Z"]),
-        ] = None,
+        start: Annotated[Moment | None, time_query(*START)] = None,
+        end: Annotated[Moment | None, time_query(*END)] = None,
     ) -> AlarmRatesModel:
         """Count alarms per ten minutes and per day; name frequent, chattering and stale alarms.
 

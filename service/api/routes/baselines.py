@@ -100,27 +100,26 @@ def _direction(learned: QuantityBaseline) -> BaselineDirectionModel:
     )
 
 
+CELL_FIELDS = ("eccentricity_ratio", "oil_temperature_c", "n_readings", "n_days", "support")
+
+
 def _cells(cells: list[CellStatistics], grid: CellGrid) -> BaselineCellsModel:
     low_e, high_e = _bounds(cells, 0, grid.eccentricity_width)
     low_c, high_c = _bounds(cells, 1, grid.temperature_width_c)
     attitude = (
         None if grid.attitude_width_deg is None else _bounds(cells, 2, grid.attitude_width_deg)
     )
-    return BaselineCellsModel(
+    return BaselineCellsModel.of(
         eccentricity_low=low_e,
         eccentricity_high=high_e,
         oil_temperature_low_c=low_c,
         oil_temperature_high_c=high_c,
         attitude_low_deg=attitude[0] if attitude else None,
         attitude_high_deg=attitude[1] if attitude else None,
-        eccentricity_ratio=[cell.eccentricity_ratio for cell in cells],
-        oil_temperature_c=[cell.oil_temperature_c for cell in cells],
-        n_readings=[cell.n_readings for cell in cells],
-        n_days=[cell.n_days for cell in cells],
         stiffness_n_per_m=np.exp([cell.location for cell in cells]).tolist(),
         scatter_percent=[100.0 * cell.scatter for cell in cells],
         surface_std_percent=[100.0 * cell.surface_std for cell in cells],
-        support=[cell.support.value for cell in cells],
+        **{name: [getattr(cell, name) for cell in cells] for name in CELL_FIELDS},
     )
 
 

@@ -339,15 +339,8 @@ def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionMod
 
 def _unread(reason: str, level: LevelHeldName | None) -> FilmDirectionModel:
     """Return the state without a current reading: only the level in force."""
-    return FilmDirectionModel(
-        verdict="no_reading",
-        reason=reason,
-        level=level,
-        change=None,
-        deviation=None,
-        stiffness_n_per_m=None,
-        cause=None,
-    )
+    unknown = dict.fromkeys(("change", "deviation", "stiffness_n_per_m", "cause"))
+    return FilmDirectionModel.of(verdict="no_reading", reason=reason, level=level, **unknown)
 
 
 def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionModel:

@@ -9,7 +9,7 @@ from service.api.answers import rendered_now
 from service.api.auth.declared import Reach, subject_router
 from service.api.context import Context
 from service.api.problems import problem_responses
-from service.api.values import ApiModel, Time
+from service.api.values import ApiModel, DatedAnswer, Time
 from service.notifications.sender import ReceiverView, SenderStatus
 from service.store.outbox import Backlog, LetterState, StoredLetter
 
@@ -80,14 +80,11 @@ class ReceiverModel(ApiModel):
     """Time of the last delivery."""
 
 
-class DeliveryModel(ApiModel):
+class DeliveryModel(DatedAnswer):
     """All receivers."""
 
     origin: Literal["live", "replay"]
     """A replay sends no messages."""
-
-    time: Time
-    """Present time."""
 
     n_waiting: int
     """Waiting messages of all receivers."""

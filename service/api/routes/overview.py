@@ -14,7 +14,7 @@ from service.api.routes.alarm_models import AlarmCountModel
 from service.api.routes.bearings import LatestModel, latest_model
 from service.api.routes.films import FilmBriefModel, film_brief
 from service.api.routes.plant import BasicUnitModel, source_model
-from service.api.values import ApiModel, Time
+from service.api.values import ApiModel, DatedAnswer
 from service.live.live_view import UnitStatus
 
 
@@ -78,14 +78,11 @@ class UnitOverviewModel(BasicUnitModel):
     """Summaries of their films, in the same order."""
 
 
-class OverviewModel(ApiModel):
+class OverviewModel(DatedAnswer):
     """Overview of the plant for a control room."""
 
     plant: PlantModel
     """Name and origin."""
-
-    time: Time
-    """Present time."""
 
     refresh_s: float
     """Period of results, s."""

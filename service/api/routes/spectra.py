@@ -122,11 +122,14 @@ class SpectrumModel(ApiModel):
     """Frequencies of order1 (1×) and of the vortex."""
 
 
+OWN_FIELDS = ("duration_s", "speed_rpm", "power_mw", "order1_hz", "vortex_hz")
+"""Fields with one value of each stored spectrum."""
+
 MAX_NUMBERS = 2_000_000
-"""Amplitudes in one answer; 20 MB of it."""
+"""Maximum number of amplitudes in one answer, about 20 MB."""
 
 DECIMALS = 6
-"""Of amplitudes in µm; spectra are kept to less."""
+"""Decimals of amplitudes in µm; stored spectra are less precise."""
 
 
 def spectra_model(
@@ -151,14 +154,10 @@ def spectra_model(
         found,
         frequency_hz=frequency_hz.tolist(),
         time=[each.time_ns / NS_PER_S for each in shown],
-        duration_s=[each.duration_s for each in shown],
-        speed_rpm=[each.speed_rpm for each in shown],
-        power_mw=[each.power_mw for each in shown],
         operating_state=[STATE_NAMES[each.state] for each in shown],
         level=[LEVEL_NAMES[each.quality.level] for each in shown],
         reason=[each.quality.reason.value for each in shown],
-        order1_hz=[each.order1_hz for each in shown],
-        vortex_hz=[each.vortex_hz for each in shown],
+        **{name: [getattr(each, name) for each in shown] for name in OWN_FIELDS},
         channels={place: _place(shown, place, frequency_hz.size) for place in places},
         n_other_resolution=len(found.spectra) - len(shown),
         simulated_until=past_end_ns,

@@ -11,7 +11,7 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
-from service.api.auth.authenticator import Doors, LoggedIn, Refusal
+from service.api.auth.authenticator import Doors, LoggedIn
 from service.api.auth.backoff import Backoff
 from service.api.auth.passwords import Hashing
 from service.cli.commands import app
@@ -158,7 +158,7 @@ def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
     assert isinstance(doors.machine(key, NOW_NS), Identity)
     said = [padwatch("keys", "revoke", listed["id"]).stdout for _ in range(2)]
     assert said == [f"{listed['id']}: revoked\n", f"{listed['id']}: was revoked already\n"]
-    assert doors.machine(key, NOW_NS) is Refusal.REVOKED
+    assert doors.machine(key, NOW_NS) is None
     assert ", revoked, " in padwatch("keys", "list").stdout
 
 

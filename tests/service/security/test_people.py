@@ -9,7 +9,7 @@ from argon2.low_level import Type
 from harness.places import Place
 
 from core.units import DAY_NS
-from service.api.auth.authenticator import Doors, LoggedIn, Refusal
+from service.api.auth.authenticator import Doors, LoggedIn
 from service.api.auth.passwords import Hashing, PasswordRefusedError, new_password, plant_hasher
 from service.api.auth.people import SET_UP_S, People, create_key
 from service.store.access.audit_entries import Acting, Source, acting_as
@@ -155,7 +155,7 @@ def test_a_key_opens_as_what_it_was_made_for_until_its_day(
     )
     end_ns = T0 + 30 * DAY_NS
     assert isinstance(doors.machine(shown, end_ns - 1), Identity)
-    assert doors.machine(shown, end_ns) is Refusal.EXPIRED
+    assert doors.machine(shown, end_ns) is None
     assert access.keys.get(key.id) != key  # its use is noted
     assert shown not in repr(access.keys.all())
 
@@ -170,7 +170,7 @@ def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(
     for nothing in ("", "pw_", "pw__", shown + "\n", key.id, "pw_" + "0" * 12 + "_"):
         assert key_id(nothing) is None
     for wrong in (forged, shown[:-1], shown + "A", shown.upper(), f" {shown}", shown.swapcase()):
-        assert doors.machine(wrong, T0) is Refusal.UNKNOWN
+        assert doors.machine(wrong, T0) is None
     (stored,) = access.keys.all()
     assert stored.used_ns is None
 
@@ -200,7 +200,7 @@ def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
     key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
     assert access.keys.revoke(key.id, T0 + S)
     assert not access.keys.revoke(key.id, T0 + 2 * S)
-    assert doors.machine(shown, T0 + S) is Refusal.REVOKED
+    assert doors.machine(shown, T0 + S) is None
     (stored,) = access.keys.all()
     assert (stored.revoked_ns, stored.state(T0 + 99 * DAY_NS)) == (T0 + S, KeyState.REVOKED)
     for statement, words in (
