@@ -53,7 +53,7 @@ T = TypeVar("T")
 JSON = "application/json"
 
 
-async def worked(do: Callable[[], T]) -> T:
+async def in_thread(do: Callable[[], T]) -> T:
     """Call a function in a thread."""
     return await asyncio.to_thread(do)
 
@@ -97,7 +97,7 @@ class Renderings:
         """Return the answer for a key; it is rendered again if its source is another object."""
         kept = self._kept.pop(key, None)
         if kept is None or kept[0] is not source:
-            kept = (source, *await worked(lambda: _content(make(source))))
+            kept = (source, *await in_thread(lambda: _content(make(source))))
         self._kept[key] = kept
         while len(self._kept) > self._n_kept:
             del self._kept[next(iter(self._kept))]

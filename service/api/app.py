@@ -11,7 +11,7 @@ from fastapi import Depends, FastAPI, Request, Response
 
 from service.api.answers import ORIGIN_HEADER, FixedHeader, Revalidation, digest_of, tag_of
 from service.api.auth.accounts import account_router, key_router
-from service.api.auth.authenticator import AccessDesk
+from service.api.auth.authenticator import Authenticator
 from service.api.auth.declared import Declared, declared
 from service.api.auth.gate import Gate, require_declared
 from service.api.auth.refusals import AuditTrail, Refusals
@@ -63,9 +63,9 @@ class GuardedApi(FastAPI):
         if self.openapi_url:
             self.add_route(self.openapi_url, self._published, include_in_schema=False)
 
-    def stand_behind(self, desk: AccessDesk) -> None:
+    def add_gate(self, authenticator: Authenticator) -> None:
         """Add the gate; middleware added later runs before it."""
-        self.add_middleware(Gate, declared=lambda: self.declared, desk=desk)
+        self.add_middleware(Gate, declared=lambda: self.declared, authenticator=authenticator)
 
     def require_declarations(self) -> None:
         """Collect the declarations of all routes; call this after the last route was added.
@@ -136,8 +136,8 @@ def create_app(context: Context) -> GuardedApi:
         responses=any_other_problem(),
     )
     app.add_middleware(Revalidation, clock=context.clock)
-    desk = context.access or AccessDesk(context.store.access, context.clock)
-    app.stand_behind(desk)
+    authenticator = context.access or Authenticator(context.store.access, context.clock)
+    app.add_gate(authenticator)
     app.add_middleware(FixedHeader, name=ORIGIN_HEADER, value=context.origin.value)
     refusals = context.refusals or Refusals(context.store.audit, context.clock)
     app.add_middleware(AuditTrail, refusals=refusals, clock=context.clock)
@@ -164,9 +164,9 @@ def create_app(context: Context) -> GuardedApi:
         recorded_motion_router(context),
         delivery_router(context),
         audit_router(context),
-        session_router(context, desk),
-        account_router(desk),
-        key_router(context, desk),
+        session_router(context, authenticator),
+        account_router(authenticator),
+        key_router(context, authenticator),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     if context.metrics is not None:

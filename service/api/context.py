@@ -18,7 +18,7 @@ from core.change.settings import FilmRules
 from core.monitor.assessment import Assessment
 from core.quality import Reason
 from core.samples.blocks import SampleBlock
-from service.api.auth.authenticator import AccessDesk
+from service.api.auth.authenticator import Authenticator
 from service.api.auth.refusals import Refusals
 from service.api.downloads import Downloads
 from service.api.load import LoadWatch
@@ -39,7 +39,7 @@ from service.settings.units import UnitSettings
 from service.store.port import Store
 
 
-class LiveLook(Protocol):
+class LiveState(Protocol):
     """Live state; see :class:`service.live.live_view.LiveView`."""
 
     @property
@@ -76,7 +76,7 @@ class LiveLook(Protocol):
         """Return the newest result; values that are not current are missing."""
 
 
-class FilmBoard(Protocol):
+class FilmState(Protocol):
     """The films of all bearings; see :class:`service.measuring.films.keeper.FilmKeeper`."""
 
     @property
@@ -100,7 +100,7 @@ class FilmBoard(Protocol):
         """Return the baseline in force of a bearing."""
 
 
-class CaptureLook(Protocol):
+class CaptureStatus(Protocol):
     """Samples around alarms; see :class:`service.recordings.capture.captures.Captures`."""
 
     @property
@@ -124,7 +124,7 @@ class CaptureLook(Protocol):
         """Alarms and occurrences of the recordings in progress."""
 
 
-class Operators(Protocol):
+class OperationService(Protocol):
     """Carries out operations in the process that analyses the unit."""
 
     async def operate(self, id_: str, action: Action) -> Alarm:
@@ -204,15 +204,15 @@ class Context:
 
     plant_name: str
     units: Mapping[str, UnitSettings]
-    live: LiveLook
+    live: LiveState
     store: Store
     clock: Clock
     refresh_s: float
     references: ReferencesInForce
     alarms: AlarmBoard
-    films: FilmBoard
-    operators: Operators
-    captures: CaptureLook
+    films: FilmState
+    operators: OperationService
+    captures: CaptureStatus
     receivers: Callable[[], Awaitable[Sequence[ReceiverView]]]
     origin: Origin = Origin.LIVE
     max_shelf_s: float = 86_400.0
@@ -225,7 +225,7 @@ class Context:
     stored_trouble: Callable[[], str | None] = lambda: None
     refusals: Refusals | None = None
     sources: Mapping[str, TimedSource] = field(default_factory=dict)
-    access: AccessDesk | None = None
+    access: Authenticator | None = None
     space: SpaceWatch | None = None
     load: LoadWatch | None = None
     tape: Tape | None = None

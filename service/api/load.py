@@ -38,7 +38,7 @@ In between, continuous recording stops (`service.recordings.continuous_recorder`
 
 
 @dataclass(frozen=True)
-class Strain:
+class RefusalState:
     """Level of refusal.
 
     Parameters
@@ -51,22 +51,22 @@ class Strain:
     relieved_s: float | None = None
 
 
-def advance(strain: Strain, over: float, now_s: float) -> Strain:
+def advance(state: RefusalState, over: float, now_s: float) -> RefusalState:
     """Update the level of refusal: raise it at once, lower it after `RELIEF_S`."""
     wanted = Refused(min(int(over), Refused.VIEWS))
-    if wanted >= strain.refused or over > RELIEF_SHARE * strain.refused:
-        return Strain(max(wanted, strain.refused))
-    if strain.relieved_s is None:
-        return replace(strain, relieved_s=now_s)
-    is_over = now_s - strain.relieved_s >= RELIEF_S
-    return Strain(Refused(strain.refused - 1)) if is_over else strain
+    if wanted >= state.refused or over > RELIEF_SHARE * state.refused:
+        return RefusalState(max(wanted, state.refused))
+    if state.relieved_s is None:
+        return replace(state, relieved_s=now_s)
+    is_over = now_s - state.relieved_s >= RELIEF_S
+    return RefusalState(Refused(state.refused - 1)) if is_over else state
 
 
 log = structlog.get_logger()
 
-LOOK_EVERY_S = 0.25
+CHECK_PERIOD_S = 0.25
 
-N_LOOKS = 4
+N_CHECKS = 4
 """Number of successive checks over the limit that make an overload."""
 
 
@@ -87,15 +87,15 @@ class LoadWatch:
 
     def __init__(self, bus: Bus, clock: Clock) -> None:
         self._bus, self._clock = bus, clock
-        self._lags = deque([0.0] * N_LOOKS, N_LOOKS)
-        self._overs = deque([0.0] * N_LOOKS, N_LOOKS)
-        self._strain = Strain()
+        self._lags = deque([0.0] * N_CHECKS, N_CHECKS)
+        self._overs = deque([0.0] * N_CHECKS, N_CHECKS)
+        self._state = RefusalState()
         self.n_refused: Counter[Refused] = Counter()
 
     @property
     def refused(self) -> Refused:
         """Level of refusal now."""
-        return self._strain.refused
+        return self._state.refused
 
     @property
     def words(self) -> str | None:
@@ -110,9 +110,9 @@ class LoadWatch:
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Check periodically."""
         while True:
-            pulse.beat(LOOK_EVERY_S)
-            due_s = self._clock.monotonic_s() + LOOK_EVERY_S
-            await self._clock.sleep(LOOK_EVERY_S)
+            pulse.beat(CHECK_PERIOD_S)
+            due_s = self._clock.monotonic_s() + CHECK_PERIOD_S
+            await self._clock.sleep(CHECK_PERIOD_S)
             self.look(self._clock.monotonic_s() - due_s)
 
     def look(self, late_s: float) -> None:
@@ -128,7 +128,7 @@ class LoadWatch:
         ratios = delay_s / MAX_DELAY_S, waiting_share / MAX_WAITING_SHARE, self.lag_s / MAX_LAG_S
         self._overs.append(max(ratios))
         before = self.refused
-        self._strain = advance(self._strain, min(self._overs), self._clock.monotonic_s())
+        self._state = advance(self._state, min(self._overs), self._clock.monotonic_s())
         if self.refused != before:
             write = log.warning if self.refused else log.info
             write(
@@ -139,11 +139,11 @@ class LoadWatch:
                 lag_s=round(self.lag_s, 2),
             )
 
-    def refuses(self, question: Refused) -> bool:
+    def refuses(self, refused_from: Refused) -> bool:
         """Whether a request of this kind is refused now; count it if so."""
-        if question is Refused.NOTHING or question > self.refused:
+        if refused_from is Refused.NOTHING or refused_from > self.refused:
             return False
-        self.n_refused[question] += 1
+        self.n_refused[refused_from] += 1
         return True
 
 
@@ -166,14 +166,14 @@ VIEWS = re.compile(
 READING = ("GET", "HEAD")
 
 
-def question(method: str, path: str) -> Refused:
+def refused_from(method: str, path: str) -> Refused:
     """Return the level of load that refuses a request; `Refused.NOTHING` for none."""
     if method not in READING or (VITAL.fullmatch(path) and path != "/api/v1/alarms/rates"):
         return Refused.NOTHING
     return Refused.VIEWS if VIEWS.fullmatch(path) else Refused.HISTORY
 
 
-BEHIND = Refusal(
+OVERLOADED = Refusal(
     503,
     "Too busy",
     "the service is overloaded and analyses samples first; try again later",
@@ -181,7 +181,7 @@ BEHIND = Refusal(
 )
 
 
-class Shedding:
+class LoadShedder:
     """ASGI middleware that refuses requests while the service cannot keep up."""
 
     def __init__(self, app: ASGIApp, load: LoadWatch) -> None:
@@ -189,8 +189,10 @@ class Shedding:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse a request or forward it."""
-        if scope["type"] == "http" and self._load.refuses(question(scope["method"], scope["path"])):
-            await BEHIND.send(scope, send)
+        if scope["type"] == "http" and self._load.refuses(
+            refused_from(scope["method"], scope["path"])
+        ):
+            await OVERLOADED.send(scope, send)
             return
         await self._app(scope, receive, send)
 
@@ -222,7 +224,7 @@ def load_metrics(load: LoadWatch | None) -> Iterator[Metric]:
     )
 
 
-class Allowance:
+class TokenBucket:
     """Token bucket.
 
     Parameters

@@ -137,8 +137,8 @@ def install_problem_handlers(app: FastAPI) -> None:
     async def _http(request: Request, error: HTTPException) -> Response:
         if error.status_code == 405 and (methods := _methods(request)):
             return _not_allowed(request, methods)
-        said = str(error.detail)
-        return _render(request, error.status_code, said, said, headers=error.headers)
+        text = str(error.detail)
+        return _render(request, error.status_code, text, text, headers=error.headers)
 
     @app.exception_handler(RequestValidationError)
     async def _validation(request: Request, error: RequestValidationError) -> Response:

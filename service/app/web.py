@@ -13,7 +13,7 @@ from starlette.types import ASGIApp
 from acquisition.clock import Clock
 from service.api.answers import EDITION_HEADER, FixedHeader
 from service.api.app import GuardedApi, create_app
-from service.api.auth.authenticator import AccessDesk
+from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
 from service.api.http.listening import listen, server_tls, socket_file
 from service.api.http.middleware import TrustedProxy
@@ -84,7 +84,7 @@ class ClosedError(Exception):
 
 def access_desk(
     plant: PlantFile, store: AccessStore, clock: Clock, is_demo: bool = False
-) -> AccessDesk:
+) -> Authenticator:
     """Build the access service, which authenticates requests.
 
     Parameters
@@ -113,7 +113,7 @@ def access_desk(
     if access.login or doorway.is_unix_socket or not is_loopback(service.host):
         local_role = None
     limits = SessionLimits(idle_s=60.0 * access.idle_min, absolute_s=3600.0 * access.longest_h)
-    return AccessDesk(store, clock, local_role, limits=limits)
+    return Authenticator(store, clock, local_role, limits=limits)
 
 
 def application(context: Context, evidence: EvidenceDesk | None = None) -> GuardedApi:

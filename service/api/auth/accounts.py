@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Depends, Path, Request
 from pydantic import FailFast, Field
 
-from service.api.auth.authenticator import AccessDesk
+from service.api.auth.authenticator import Authenticator
 from service.api.auth.declared import Reach, subject_router
 from service.api.auth.gate import identity_of, name_caller
 from service.api.auth.passwords import MAX_LENGTH, PasswordRefusedError, TooManyLoginsError
@@ -178,32 +178,37 @@ CHANGE_PROBLEMS = problem_responses(
 )
 
 
-def account_router(desk: AccessDesk) -> APIRouter:
+def account_router(authenticator: Authenticator) -> APIRouter:
     """Return the routes of accounts."""
-    stored, people, work, now_ns = desk.store.accounts, desk.people, desk.work, desk.clock.now_ns
+    stored, people, work, now_ns = (
+        authenticator.store.accounts,
+        authenticator.people,
+        authenticator.work,
+        authenticator.clock.now_ns,
+    )
     router = subject_router("/accounts", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
 
     @router.get("", summary="Accounts", responses=problem_responses(503))
     async def accounts() -> list[AccountModel]:
         """List all accounts by name."""
-        return [account_model(account) for account in await work.looked_up(stored.all)]
+        return [account_model(account) for account in await work.run(stored.all)]
 
     @router.post("", summary="Add an account", status_code=201, responses=CHANGE_PROBLEMS)
     async def add(asked: NewAccountModel) -> AccountModel:
         """Add an account with a password to change at the first login."""
         new = asked.name, Role(asked.role), asked.password
         with refusals_as_problems():
-            name = await work.hashed(lambda: people.add(*new, now_ns(), must_change=True))
-        return await _one(desk, name)
+            name = await work.run_hashing(lambda: people.add(*new, now_ns(), must_change=True))
+        return await _one(authenticator, name)
 
     @router.put("/{name}/role", summary="Change a role", responses=CHANGE_PROBLEMS)
     async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
         """Change the role of an account from its next request on."""
-        await _one(desk, name)
+        await _one(authenticator, name)
         with refusals_as_problems():
-            await work.looked_up(lambda: stored.set_role(name, Role(asked.role), now_ns()))
-        return await _one(desk, name)
+            await work.run(lambda: stored.set_role(name, Role(asked.role), now_ns()))
+        return await _one(authenticator, name)
 
     @router.put("/{name}/password", summary="Set a password", responses=CHANGE_PROBLEMS)
     async def set_password(
@@ -213,11 +218,11 @@ def account_router(desk: AccessDesk) -> APIRouter:
         if _is_own(request, name):
             detail = "change your own password with POST /session/password"
             raise ProblemError(409, "Does not fit", detail)
-        await _one(desk, name)
+        await _one(authenticator, name)
         new = name, asked.password
         with refusals_as_problems():
-            await work.hashed(lambda: people.set_password(*new, now_ns(), must_change=True))
-        return await _one(desk, name)
+            await work.run_hashing(lambda: people.set_password(*new, now_ns(), must_change=True))
+        return await _one(authenticator, name)
 
     @router.delete(
         "/{name}", summary="Remove an account", status_code=204, responses=CHANGE_PROBLEMS
@@ -226,9 +231,9 @@ def account_router(desk: AccessDesk) -> APIRouter:
         """Remove an account and end its sessions; the own account cannot be removed."""
         if _is_own(request, name):
             raise ProblemError(409, "Does not fit", "you cannot remove your own account")
-        await _one(desk, name)
+        await _one(authenticator, name)
         with refusals_as_problems():
-            await work.looked_up(lambda: stored.remove(name, now_ns()))
+            await work.run(lambda: stored.remove(name, now_ns()))
 
     return router
 
@@ -239,8 +244,8 @@ def _is_own(request: Request, name: str) -> bool:
     return identity.means is Means.SESSION and identity.name == name
 
 
-async def _one(desk: AccessDesk, name: str) -> AccountModel:
-    found = await desk.work.looked_up(lambda: desk.store.accounts.get(name))
+async def _one(authenticator: Authenticator, name: str) -> AccountModel:
+    found = await authenticator.work.run(lambda: authenticator.store.accounts.get(name))
     if found is None:
         raise ProblemError(404, "Unknown account", "there is no such account")
     return account_model(found)
@@ -251,16 +256,16 @@ KeyId = Annotated[
 ]
 
 
-def key_router(context: Context, desk: AccessDesk) -> APIRouter:
+def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
     """Return the routes of keys."""
-    stored, work, clock = desk.store.keys, desk.work, desk.clock
+    stored, work, clock = authenticator.store.keys, authenticator.work, authenticator.clock
     router = subject_router("/keys", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
 
     @router.get("", summary="Keys", responses=problem_responses(503))
     async def keys() -> list[KeyModel]:
         """List all keys that were ever created, oldest first, without their secrets."""
-        keys, now_ns = await work.looked_up(stored.all), clock.now_ns()
+        keys, now_ns = await work.run(stored.all), clock.now_ns()
         return [KeyModel.of(key, state=key.state(now_ns)) for key in keys]
 
     @router.post("", summary="Create a key", status_code=201, responses=CHANGE_PROBLEMS)
@@ -272,14 +277,14 @@ def key_router(context: Context, desk: AccessDesk) -> APIRouter:
                 raise ProblemError(422, "Wrong parameter", detail, "units")
         new, now_ns = (asked.name, Role(asked.role), asked.units, asked.days), clock.now_ns()
         with refusals_as_problems():
-            made, shown = await work.looked_up(lambda: create_key(desk.store, *new, now_ns))
+            made, shown = await work.run(lambda: create_key(authenticator.store, *new, now_ns))
         return CreatedKeyModel.of(made, state=made.state(now_ns), key=shown)
 
     @router.delete("/{key}", summary="Revoke a key", status_code=204, responses=CHANGE_PROBLEMS)
     async def revoke(key: KeyId) -> None:
         """Revoke a key permanently; repeating the request changes nothing."""
-        if await work.looked_up(lambda: stored.get(key)) is None:
+        if await work.run(lambda: stored.get(key)) is None:
             raise ProblemError(404, "Unknown key", "there is no such key")
-        await work.looked_up(lambda: stored.revoke(key, clock.now_ns()))
+        await work.run(lambda: stored.revoke(key, clock.now_ns()))
 
     return router

@@ -10,7 +10,7 @@ from starlette.types import Scope
 from acquisition.clock import Clock
 from core.units import ns_from_s
 from service.api.auth.backoff import Backoff
-from service.api.auth.passwords import AccessWork, Hashing
+from service.api.auth.passwords import AccessThreads, Hashing
 from service.api.auth.people import People
 from service.settings.processes import is_loopback
 from service.store.access.identities import (
@@ -64,7 +64,7 @@ class NotLoggedIn:
     wait_s: float = 0.0
 
 
-class Doors:
+class CredentialChecker:
     """Checks passwords, sessions and keys. It blocks while hashing: call it from a thread.
 
     Parameters
@@ -263,7 +263,7 @@ class Caller:
     must_log_in: bool
 
 
-class AccessDesk:
+class Authenticator:
     """Identifies callers and logs people in, without blocking the event loop.
 
     Parameters
@@ -286,7 +286,7 @@ class AccessDesk:
     ) -> None:
         self.store, self.clock, self.local_role = store, clock, local_role
         self._hashing, self._limits, self._backoff = hashing or Hashing(), limits, Backoff()
-        self.people, self.work = People(store, self._hashing), AccessWork()
+        self.people, self.work = People(store, self._hashing), AccessThreads()
 
     async def caller(self, scope: Scope) -> Caller:
         """Identify the sender of a request.
@@ -314,14 +314,14 @@ class AccessDesk:
             If there are too many concurrent logins.
         """
         now_ns, ticks_ns = self.clock.now_ns(), ns_from_s(self.clock.monotonic_s())
-        return await self.work.hashed(
-            lambda: self._doors.log_in(name, password, peer, now_ns, ticks_ns),
+        return await self.work.run_hashing(
+            lambda: self._checker.log_in(name, password, peer, now_ns, ticks_ns),
             is_known=self._backoff.knows(tidy_name(name), peer),
         )
 
     async def log_out(self, token: str) -> None:
         """End a session; an ended one is ignored."""
-        await self.work.looked_up(lambda: self._doors.log_out(token))
+        await self.work.run(lambda: self._checker.log_out(token))
 
     async def set_up(self, token: str, name: str, password: str) -> bool:
         """Create the first account, an admin; return whether the token was valid.
@@ -332,7 +332,7 @@ class AccessDesk:
             If one is not accepted, or there are too many concurrent logins.
         """
         now_ns = self.clock.now_ns()
-        return await self.work.hashed(
+        return await self.work.run_hashing(
             lambda: self.people.set_up(token, name, password, now_ns), is_known=False
         )
 
@@ -341,11 +341,11 @@ class AccessDesk:
         if self.local_role is Role.ADMIN:
             return None
         now_ns = self.clock.now_ns()
-        return await self.work.looked_up(lambda: self.people.offer_set_up(now_ns))
+        return await self.work.run(lambda: self.people.offer_set_up(now_ns))
 
     async def has_accounts(self) -> bool:
         """Whether there is an account."""
-        return bool(await self.work.looked_up(self.store.accounts.all))
+        return bool(await self.work.run(self.store.accounts.all))
 
     def close(self) -> None:
         """Stop the threads; no further request is served."""
@@ -354,11 +354,13 @@ class AccessDesk:
     async def _proven(self, shown: Credentials) -> Identity | None:
         now_ns = self.clock.now_ns()
         if shown.kind is Kind.SESSION:
-            return await self.work.looked_up(lambda: self._doors.person(shown.secret, now_ns))
+            return await self.work.run(lambda: self._checker.person(shown.secret, now_ns))
         if shown.kind is Kind.KEY:
-            return await self.work.looked_up(lambda: self._doors.machine(shown.secret, now_ns))
+            return await self.work.run(lambda: self._checker.machine(shown.secret, now_ns))
         return None
 
     @cached_property
-    def _doors(self) -> Doors:
-        return Doors(self.store, self._hashing, self._backoff, self._limits, self.work.note)
+    def _checker(self) -> CredentialChecker:
+        return CredentialChecker(
+            self.store, self._hashing, self._backoff, self._limits, self.work.note
+        )

@@ -127,13 +127,13 @@ def _all(app: FastAPI) -> Iterator[Declared]:
 def _needs_of(app: FastAPI, method: str, path: str, context: Any, route: BaseRoute) -> Needs:
     if isinstance(route, Route) and not isinstance(route, APIRoute) and path == app.openapi_url:
         return Needs(None, Reach.NO_UNIT)
-    said = _said(context.dependencies) if isinstance(route, APIRoute) else []
-    if not said:
+    found = _needs_in(context.dependencies) if isinstance(route, APIRoute) else []
+    if not found:
         raise UndeclaredRouteError(f"{method} {path}: does not declare what it needs or OPEN")
-    return said[-1]
+    return found[-1]
 
 
-def _said(dependencies: Sequence[Any]) -> list[Needs]:
+def _needs_in(dependencies: Sequence[Any]) -> list[Needs]:
     return [each.dependency for each in dependencies if isinstance(each.dependency, Needs)]
 
 

@@ -6,7 +6,7 @@ from urllib.parse import urlsplit
 from fastapi import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from service.api.auth.authenticator import AccessDesk, Caller, Kind
+from service.api.auth.authenticator import Authenticator, Caller, Kind
 from service.api.auth.declared import Declared, Reach
 from service.api.problems import ProblemError, problem_answer
 from service.store.access.audit_entries import acting, name_actor
@@ -20,7 +20,7 @@ OWN_SITES = (b"same-origin", b"none")
 """Values of `Sec-Fetch-Site` for pages of the dashboard and for typed addresses."""
 
 
-def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], must_say: bool) -> bool:
+def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], requires_origin: bool) -> bool:
     """Whether a request may come from a page of another origin (cross-site request forgery).
 
     Browsers add cookies, and reach loopback, for pages of any site.
@@ -29,14 +29,14 @@ def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], must_say: bo
     ----------
     scheme
         Scheme of the request.
-    must_say
+    requires_origin
         Whether a request without headers of its origin counts as foreign; browsers send them.
     """
     found = list(headers)
     hosts = _all(found, b"host")
     origins, sites = _all(found, b"origin"), _all(found, b"sec-fetch-site")
     if not origins and not sites:
-        return must_say
+        return requires_origin
     if any(site not in OWN_SITES for site in sites):
         return True
     return any(not _is_own(origin, scheme, hosts) for origin in origins)
@@ -88,9 +88,12 @@ class Gate:
     """
 
     def __init__(
-        self, app: ASGIApp, declared: Callable[[], Mapping[str, Declared]], desk: AccessDesk
+        self,
+        app: ASGIApp,
+        declared: Callable[[], Mapping[str, Declared]],
+        authenticator: Authenticator,
     ) -> None:
-        self._app, self._declared, self._desk = app, declared, desk
+        self._app, self._declared, self._desk = app, declared, authenticator
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward an admitted request."""
@@ -128,8 +131,8 @@ def _require_own_page(scope: Scope, caller: Caller) -> None:
     """Refuse changes requested by a page of another origin."""
     if scope["method"] in SAFE or caller.shown.kind is Kind.KEY:
         return
-    must_say = caller.shown.kind is not Kind.NOTHING
-    if is_foreign(scope["scheme"], scope["headers"], must_say):
+    requires_origin = caller.shown.kind is not Kind.NOTHING
+    if is_foreign(scope["scheme"], scope["headers"], requires_origin):
         detail = "requests from pages of another site are refused"
         raise ProblemError(403, "Not from this site", detail)
 

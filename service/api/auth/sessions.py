@@ -13,7 +13,7 @@ from service.api.auth.accounts import LoginName, Password, RoleName, refusals_as
 from service.api.auth.authenticator import (
     COOKIE,
     PLAIN_COOKIE,
-    AccessDesk,
+    Authenticator,
     Caller,
     Kind,
     LoggedIn,
@@ -126,14 +126,14 @@ SET_UP_PROBLEMS = problem_responses(
 )
 
 
-def session_router(context: Context, desk: AccessDesk) -> APIRouter:
+def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
     """Return the routes of sessions."""
     router = APIRouter(prefix="/api/v1", tags=["access"])
 
     @router.get("/session", summary="The caller", dependencies=[OPEN])
     async def session(request: Request) -> SessionModel:
         """Show whether a login is needed, the caller, and its permissions."""
-        return await session_model(caller_of(request), desk)
+        return await session_model(caller_of(request), authenticator)
 
     @router.post(
         "/session",
@@ -144,16 +144,16 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
     )
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
         """Start a session, kept in a cookie; an earlier session of the browser ends."""
-        let_in = await _log_in(desk, request, asked.name, asked.password)
-        await _end(desk, caller_of(request))
-        await _record_login(context, desk, let_in)
-        return await _begun(desk, request, response, let_in)
+        let_in = await _log_in(authenticator, request, asked.name, asked.password)
+        await _end(authenticator, caller_of(request))
+        await _record_login(context, authenticator, let_in)
+        return await _begun(authenticator, request, response, let_in)
 
     @router.delete("/session", summary="Log out", status_code=204, dependencies=[OPEN])
     async def log_out(request: Request, response: Response) -> None:
         """End the session, if there is one."""
         caller = caller_of(request)
-        await _end(desk, caller)
+        await _end(authenticator, caller)
         if caller.identity is not None and caller.identity.means is Means.SESSION:
             await record(context.store.audit, context.clock, ENDED, caller.identity.name)
         response.delete_cookie(COOKIE, secure=True, httponly=True, samesite="strict")
@@ -171,13 +171,15 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
     ) -> SessionModel:
         """Change the password; all sessions of the account end, and this browser gets a new one."""
         identity = _person(identity_of(request))
-        await _log_in(desk, request, identity.name, asked.password)
+        await _log_in(authenticator, request, identity.name, asked.password)
         new = identity.name, asked.new_password
         with refusals_as_problems("new_password"):
-            await desk.work.hashed(lambda: desk.people.set_password(*new, desk.clock.now_ns()))
-        let_in = await _log_in(desk, request, identity.name, asked.new_password)
-        await _record_login(context, desk, let_in)
-        return await _begun(desk, request, response, let_in)
+            await authenticator.work.run_hashing(
+                lambda: authenticator.people.set_password(*new, authenticator.clock.now_ns())
+            )
+        let_in = await _log_in(authenticator, request, identity.name, asked.new_password)
+        await _record_login(context, authenticator, let_in)
+        return await _begun(authenticator, request, response, let_in)
 
     @router.post(
         "/set-up",
@@ -189,19 +191,21 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
     async def set_up(request: Request, asked: SetUpModel) -> SessionModel:
         """Create the first account, an admin, with the token printed by the service."""
         with refusals_as_problems():
-            is_made = await desk.set_up(asked.token, asked.name, asked.password)
+            is_made = await authenticator.set_up(asked.token, asked.name, asked.password)
         if not is_made:
             detail = "the token is wrong or used up, or there is an account already"
             raise ProblemError(403, "Not set up", detail)
-        return await session_model(caller_of(request), desk)
+        return await session_model(caller_of(request), authenticator)
 
     return router
 
 
-async def _log_in(desk: AccessDesk, request: Request, name: str, password: str) -> LoggedIn:
+async def _log_in(
+    authenticator: Authenticator, request: Request, name: str, password: str
+) -> LoggedIn:
     peer = request.client.host if request.client else ""
     with refusals_as_problems():
-        found = await desk.log_in(name, password, peer)
+        found = await authenticator.log_in(name, password, peer)
     if isinstance(found, NotLoggedIn):
         if not found.wait_s:
             detail = "the name or the password is wrong"
@@ -212,24 +216,26 @@ async def _log_in(desk: AccessDesk, request: Request, name: str, password: str) 
     return found
 
 
-async def _record_login(context: Context, desk: AccessDesk, let_in: LoggedIn) -> None:
+async def _record_login(context: Context, authenticator: Authenticator, let_in: LoggedIn) -> None:
     """Record a login in the audit trail; end the session if that fails."""
     try:
         await record(context.store.audit, context.clock, BEGUN, let_in.identity.name)
     except StoreError:
         with suppress(StoreError):
-            await desk.log_out(let_in.token)
+            await authenticator.log_out(let_in.token)
         raise
 
 
 async def _begun(
-    desk: AccessDesk, request: Request, response: Response, let_in: LoggedIn
+    authenticator: Authenticator, request: Request, response: Response, let_in: LoggedIn
 ) -> SessionModel:
     is_secure = _is_secure(request)
     name = COOKIE if is_secure else PLAIN_COOKIE
     response.set_cookie(name, let_in.token, secure=is_secure, httponly=True, samesite="strict")
     caller = caller_of(request)
-    return await session_model(Caller(let_in.identity, caller.shown, caller.must_log_in), desk)
+    return await session_model(
+        Caller(let_in.identity, caller.shown, caller.must_log_in), authenticator
+    )
 
 
 def _is_secure(request: Request) -> bool:
@@ -237,9 +243,9 @@ def _is_secure(request: Request) -> bool:
     return "https" in (request.url.scheme, request.headers.get("origin", "").partition(":")[0])
 
 
-async def _end(desk: AccessDesk, caller: Caller) -> None:
+async def _end(authenticator: Authenticator, caller: Caller) -> None:
     if caller.shown.kind is Kind.SESSION:
-        await desk.log_out(caller.shown.secret)
+        await authenticator.log_out(caller.shown.secret)
 
 
 def _person(identity: Identity) -> Identity:
@@ -249,11 +255,11 @@ def _person(identity: Identity) -> Identity:
     return identity
 
 
-async def session_model(caller: Caller, desk: AccessDesk) -> SessionModel:
+async def session_model(caller: Caller, authenticator: Authenticator) -> SessionModel:
     """The caller and its permissions."""
     identity = caller.identity
     may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
-    needs_set_up = not may_all and not await desk.has_accounts()
+    needs_set_up = not may_all and not await authenticator.has_accounts()
     return SessionModel(
         login_required=caller.must_log_in,
         set_up_needed=needs_set_up,

@@ -197,12 +197,12 @@ class WholeBodies:
         if refusal is not None:
             await refusal.send(scope, send)
             return
-        await self._app(scope, _given(body, receive), send)
+        await self._app(scope, _replayed(body, receive), send)
 
     async def _body(self, scope: Scope, receive: Receive) -> bytes:
         limit = 1024 * self._limits.max_body_kb
         if any(
-            _says_more(value, limit)
+            _declares_more(value, limit)
             for name, value in scope["headers"]
             if name == b"content-length"
         ):
@@ -226,13 +226,13 @@ class WholeBodies:
         return TOO_DEEP if is_deeper_than(self._limits.max_json_depth, body) else None
 
 
-def _says_more(length: bytes, limit: int) -> bool:
+def _declares_more(length: bytes, limit: int) -> bool:
     digits = length.strip().lstrip(b"0")
     # int() of very long numbers is slow, and fails from 4300 digits
     return len(digits) > 18 or int(digits or b"0") > limit
 
 
-def _given(body: bytes, receive: Receive) -> Receive:
+def _replayed(body: bytes, receive: Receive) -> Receive:
     """Return a receiver of the body, then of the messages of the connection."""
     whole: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 

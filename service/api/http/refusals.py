@@ -43,7 +43,7 @@ class Refusal:
             headers.append((b"retry-after", b"%d" % self.retry_after_s))
         return headers
 
-    def on_the_wire(self, more: Headers) -> bytes:
+    def as_http(self, more: Headers) -> bytes:
         """The whole answer, for a connection that is closed after it."""
         body = self.body()
         line = b"HTTP/1.1 %d %s\r\n" % (self.status, HTTPStatus(self.status).phrase.encode())

@@ -8,7 +8,7 @@ from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
 from core.alarms.kinds import FILM_KINDS
 from core.condition.cells import CellGrid, OperatingPoint
 from core.limits import AlarmLevel
-from service.api.context import FilmBoard
+from service.api.context import FilmState
 from service.api.values import (
     ApiModel,
     ByName,
@@ -279,7 +279,7 @@ class AlarmEventsModel(ApiModel):
 
 
 def alarm_list_model(
-    engine: AlarmBoard, films: FilmBoard, origin: Origin, now_ns: int
+    engine: AlarmBoard, films: FilmState, origin: Origin, now_ns: int
 ) -> AlarmListModel:
     """Return the alarm list."""
     alarms = engine.alarms
@@ -294,7 +294,7 @@ def alarm_list_model(
     )
 
 
-def alarm_model(engine: AlarmBoard, films: FilmBoard, alarm: Alarm) -> AlarmModel:
+def alarm_model(engine: AlarmBoard, films: FilmState, alarm: Alarm) -> AlarmModel:
     """Return the model of an alarm."""
     identity, condition = alarm.identity, alarm.condition
     is_judged = engine.is_judged(alarm)
@@ -314,7 +314,7 @@ def alarm_model(engine: AlarmBoard, films: FilmBoard, alarm: Alarm) -> AlarmMode
     )
 
 
-def _film(films: FilmBoard, identity: AlarmIdentity) -> FilmConditionModel | None:
+def _film(films: FilmState, identity: AlarmIdentity) -> FilmConditionModel | None:
     """Condition of the newest reading of a film, if the alarm is about one."""
     if identity.kind not in FILM_KINDS:
         return None
@@ -335,7 +335,7 @@ def alarm_events_model(
     )
 
 
-def grid_of(films: FilmBoard) -> CellGrid:
+def grid_of(films: FilmState) -> CellGrid:
     """Condition cells of all units."""
     return films.settings.baseline.settings().grid
 

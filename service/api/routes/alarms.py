@@ -20,11 +20,11 @@ from core.alarms.operation import (
 )
 from core.condition.cells import CellGrid
 from core.units import ns_from_s
-from service.api.answers import SharedAnswer, rendered, worked
+from service.api.answers import SharedAnswer, in_thread, rendered
 from service.api.auth.declared import Reach, needs, subject_router
 from service.api.auth.gate import actor_or, identity_of
 from service.api.context import Context
-from service.api.load import Allowance
+from service.api.load import TokenBucket
 from service.api.parameters import (
     Attitude,
     Eccentricity,
@@ -179,13 +179,13 @@ def alarm_router(context: Context) -> APIRouter:
         """
         one_more = replace(query, limit=query.limit + 1)
         grid = grid_of(films)
-        found = await worked(lambda: context.store.alarm_events(one_more))
+        found = await in_thread(lambda: context.store.alarm_events(one_more))
         page, is_more = list(found[: query.limit]), len(found) > query.limit
         if wanted == "json":
             return await rendered(
                 lambda: alarm_events_model(page, context.origin, grid, there_is_more=is_more)
             )
-        columns = await worked(lambda: event_table(page, grid))
+        columns = await in_thread(lambda: event_table(page, grid))
         cursor = str(page[-1].id) if is_more else None
         return table_response(wanted, columns, "alarm-events", cursor)
 
@@ -203,7 +203,7 @@ def alarm_router(context: Context) -> APIRouter:
 def operation_router(context: Context) -> APIRouter:
     """Return the routes that change alarms; each answers with the stored alarm."""
     router = subject_router("/alarms/{alarm}", "alarms", Permission.ACT_ON_ALARMS)
-    allowances: dict[str, Allowance] = {}
+    allowances: dict[str, TokenBucket] = {}
 
     @router.post("/acknowledge", summary="Acknowledge", responses=ACTION_PROBLEMS)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
@@ -255,7 +255,7 @@ def operation_router(context: Context) -> APIRouter:
     async def comment(request: Request, alarm: AlarmId, asked: CommentModel) -> AlarmModel:
         """Add a comment to the events of an alarm; its state does not change."""
         now_s = context.clock.monotonic_s()
-        new = Allowance(N_COMMENTS, S_PER_COMMENT, now_s)
+        new = TokenBucket(N_COMMENTS, S_PER_COMMENT, now_s)
         if not allowances.setdefault(identity_of(request).actor, new).take(now_s):
             detail = f"after {N_COMMENTS} comments, one is accepted every {S_PER_COMMENT:g} s"
             wait = {"Retry-After": f"{S_PER_COMMENT:.0f}"}

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import Field
 
-from service.api.answers import rendered, worked
+from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import Context
 from service.api.parameters import OptionalTimeRange, before_number, only
@@ -109,7 +109,7 @@ def audit_router(context: Context) -> APIRouter:
         As CSV or Parquet: one row per entry, states before and after as JSON.
         """
         one_more = AuditQuery(**{**vars(query), "limit": query.limit + 1})
-        found = await worked(lambda: context.store.audit.entries(one_more))
+        found = await in_thread(lambda: context.store.audit.entries(one_more))
         page = list(found[: query.limit])
         next_before = page[-1].number if len(found) > query.limit else None
         if wanted == "json":

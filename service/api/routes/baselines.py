@@ -10,7 +10,7 @@ from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
 from core.baseline.history import Watched
 from core.condition.cells import CellGrid
-from service.api.answers import rendered, worked
+from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.auth.gate import actor_or
 from service.api.context import BearingId, Context, UnitId
@@ -194,7 +194,7 @@ def baseline_router(context: Context) -> APIRouter:
     async def export(unit: UnitId, bearing: BearingId, version: Version) -> Response:
         """Export the whole baseline with its surface as a file that padwatch reads back exactly."""
         context.bearing(unit, bearing)
-        found = await worked(lambda: to_json(_stored(context, unit, bearing, version)))
+        found = await in_thread(lambda: to_json(_stored(context, unit, bearing, version)))
         name = f"{unit}-{bearing}-baseline-{version}.json"
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
         return Response(found, headers=headers, media_type="application/json")

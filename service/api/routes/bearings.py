@@ -12,7 +12,7 @@ from core.stiffness.estimators import ESTIMATORS
 from core.uncertainty import Budget
 from service.api.answers import rendered
 from service.api.auth.declared import subject_router
-from service.api.context import BearingId, Context, LiveLook, QuantityName, UnitId
+from service.api.context import BearingId, Context, LiveState, QuantityName, UnitId
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import (
     PLACES,
@@ -210,7 +210,7 @@ def budget_model(name: str, time_ns: int, budget: Budget) -> BudgetModel:
     )
 
 
-def latest_model(live: LiveLook, unit: str, bearing: str) -> LatestModel:
+def latest_model(live: LiveState, unit: str, bearing: str) -> LatestModel:
     """Return the newest result of a bearing; values that are not current are null."""
     current = live.current(unit, bearing)
     newest = current.assessment

@@ -13,7 +13,7 @@ from core.quality import Level, Quality, Reading, Reason, bad, missing, worst
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
 from service.api.auth.declared import subject_router
-from service.api.context import Context, LiveLook, UnitId
+from service.api.context import Context, LiveState, UnitId
 from service.api.parameters import duration
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, QualityModel, SampleRange, Time, listed
@@ -189,7 +189,7 @@ UNIT_USES = ("speed_channel", "power_channel", "key_phase")
 """Keys of a unit that name channels."""
 
 
-def channels_model(live: LiveLook, settings: UnitSettings) -> ChannelsModel:
+def channels_model(live: LiveState, settings: UnitSettings) -> ChannelsModel:
     """Return all channels of a unit with the state of its newest block."""
     newest, why_not = live.newest_block(settings.id), live.why_no_samples(settings.id)
     shown = newest if why_not is None else None
@@ -350,7 +350,7 @@ def require_samples(settings: UnitSettings) -> None:
         raise ProblemError(409, "No samples", detail)
 
 
-def newest_blocks(live: LiveLook, unit: str) -> tuple[Sequence[SampleBlock], float]:
+def newest_blocks(live: LiveState, unit: str) -> tuple[Sequence[SampleBlock], float]:
     """Return the blocks of a unit in memory and their age; raise a problem without samples."""
     blocks, age_s = live.blocks(unit), live.data_age_s(unit)
     if not blocks or age_s is None:

@@ -11,7 +11,7 @@ from core.baseline.history import CodeArray, ReadingOutcome
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from core.units import NS_PER_S
-from service.api.answers import rendered, worked
+from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
@@ -298,7 +298,7 @@ def film_history_router(context: Context) -> APIRouter:
 
         if wanted == "json":
             return await rendered(lambda: read()[0])
-        return table_response(wanted, await worked(read_columns), f"film-{unit}-{bearing}")
+        return table_response(wanted, await in_thread(read_columns), f"film-{unit}-{bearing}")
 
     return router
 

@@ -12,7 +12,7 @@ from core.arrays import FloatArray
 from core.machine.unit import Bearing
 from core.monitor.assessment import OrbitTrace
 from core.samples.blocks import SampleBlock
-from service.api.answers import Renderings, rendered, worked
+from service.api.answers import Renderings, in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import duration
@@ -22,7 +22,7 @@ from service.api.routes.channels import NEWEST, NO_SAMPLES, newest_blocks, requi
 from service.api.routes.recordings import (
     RecordingId,
     damaged_recording,
-    shelf_of,
+    library_of,
     unknown_recording,
 )
 from service.api.values import ApiModel, BearingAnswer, SampleRange, Time, listed
@@ -295,7 +295,7 @@ def recorded_motion_router(context: Context) -> APIRouter:
 
         The calibration of the recording applies. The answer ends before a restart of the device.
         """
-        kept = await worked(lambda: shelf_of(context).one(recording))
+        kept = await in_thread(lambda: library_of(context).one(recording))
         if kept is None:
             raise unknown_recording(recording)
         unit = _unit_of(context, kept)
@@ -332,7 +332,7 @@ def _newest(
 def _recorded(
     context: Context, name: str, bearing: Bearing, start_s: float, seconds: float
 ) -> MotionModel:
-    recording = shelf_of(context).opened(name)
+    recording = library_of(context).opened(name)
     unit = recording.manifest.unit
     machine = machine_of(context.unit(unit))
     found = recorded_motion(recording, machine, bearing, start_s, seconds)

@@ -7,7 +7,7 @@ from typing import Literal
 
 from fastapi import APIRouter, Response
 
-from service.api.answers import digest_of, tag_of, worked
+from service.api.answers import digest_of, in_thread, tag_of
 from service.api.auth.declared import subject_router
 from service.api.context import Context
 from service.api.routes.alarm_models import AlarmCountModel
@@ -199,7 +199,7 @@ class Overview:
         states = {unit: self._state(unit) for unit in self._context.units}
         head = self._head()
         if any(self._is_old(unit, state) for unit, state in states.items()):
-            await worked(lambda: self._renew(states))
+            await in_thread(lambda: self._renew(states))
         parts = [self._parts[unit] for unit in states]
         without_time = head.model_copy(update={"time": ""}).model_dump_json().encode()
         tag = tag_of(digest_of(without_time), *(part.digest for part in parts))

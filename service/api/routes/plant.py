@@ -11,7 +11,7 @@ from core.monitor.catalogue import CATALOGUE
 from core.samples.gaps import Gap
 from core.units import ns_from_s
 from service.api.auth.declared import Reach, needs, subject_router
-from service.api.context import Context, LiveLook, UnitId
+from service.api.context import Context, LiveState, UnitId
 from service.api.parameters import TimeRange
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, Time
@@ -127,7 +127,7 @@ class SourceHealthModel(SourceModel):
     """CAN frames rejected since the service started, by reason."""
 
 
-def source_model(live: LiveLook, unit: str) -> SourceModel:
+def source_model(live: LiveState, unit: str) -> SourceModel:
     """Return the state of the source of a unit."""
     status = live.status(unit)
     clock = status.clock and DeviceClockModel.of(

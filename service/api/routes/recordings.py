@@ -9,7 +9,7 @@ from fastapi.responses import StreamingResponse
 from pydantic import Field
 
 from acquisition.errors import ConfigError
-from service.api.answers import rendered, worked
+from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import Context
 from service.api.downloads import TooManyDownloadsError
@@ -245,7 +245,7 @@ def recording_router(context: Context) -> APIRouter:
         """List the newest recordings, and recordings around alarms in progress."""
         if unit is not None:
             context.unit(unit)
-        found = await worked(lambda: shelf_of(context).newest(limit, unit, kind))
+        found = await in_thread(lambda: library_of(context).newest(limit, unit, kind))
         running = sorted(context.captures.being_made)
         return RecordingsModel(
             recordings=[recording_model(kept) for kept in found],
@@ -263,8 +263,8 @@ def recording_router(context: Context) -> APIRouter:
     )
     async def one_recording(recording: RecordingId) -> Response:
         """Check a recording and describe its channels, gaps, rejected samples and files."""
-        shelf = shelf_of(context)
-        kept = await worked(lambda: shelf.one(recording))
+        shelf = library_of(context)
+        kept = await in_thread(lambda: shelf.one(recording))
         if kept is None:
             raise unknown_recording(recording)
         try:
@@ -283,7 +283,7 @@ def recording_router(context: Context) -> APIRouter:
 
         The manifest has their checksums.
         """
-        make = shelf_of(context).zip_pieces
+        make = library_of(context).zip_pieces
         return await _download(context, recording, make, "application/zip", "zip")
 
     @router.get(
@@ -298,7 +298,7 @@ def recording_router(context: Context) -> APIRouter:
         The format is that of `padwatch recording export`: missing samples have no rows, and cells
         of a bad channel are nan.
         """
-        make = shelf_of(context).csv_pieces
+        make = library_of(context).csv_pieces
         return await _download(context, recording, make, "text/csv", "csv")
 
     return router
@@ -307,11 +307,11 @@ def recording_router(context: Context) -> APIRouter:
 async def _download(
     context: Context, recording: str, make: Callable[[str], Pieces], media_type: str, suffix: str
 ) -> StreamingResponse:
-    shelf = shelf_of(context)
-    if await worked(lambda: shelf.one(recording)) is None:
+    shelf = library_of(context)
+    if await in_thread(lambda: shelf.one(recording)) is None:
         raise unknown_recording(recording)
     try:
-        pieces = await context.downloads.download(await worked(lambda: make(recording)))
+        pieces = await context.downloads.download(await in_thread(lambda: make(recording)))
     except TooManyDownloadsError as error:
         raise ProblemError(503, "Busy", f"{error}; try again later") from error
     except (ConfigError, OSError) as error:
@@ -323,7 +323,7 @@ async def _download(
     return StreamingResponse(pieces, media_type=media_type, headers=headers)
 
 
-def shelf_of(context: Context) -> Shelf:
+def library_of(context: Context) -> Shelf:
     """Return the library of recordings; raise a problem of status 404 without one."""
     if context.recordings is None:
         words = "no recordings are kept here; see the process that analyses the unit"

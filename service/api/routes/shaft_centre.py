@@ -3,7 +3,7 @@
 from fastapi import APIRouter, Response
 
 from core.units import ns_from_s
-from service.api.answers import rendered, worked
+from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import OilTemperature, States, TimeRange
@@ -124,7 +124,7 @@ def centre_router(context: Context) -> APIRouter:
         if wanted == "json":
             clearance_um = context.references.bearing(unit, bearing).clearance_um
             return await rendered(lambda: _line(context, query, clearance_um))
-        columns = await worked(lambda: _table(context, query))
+        columns = await in_thread(lambda: _table(context, query))
         return table_response(wanted, columns, f"shaft-centre-{unit}-{bearing}")
 
     return router

@@ -10,7 +10,7 @@ from pydantic import Field
 from core.condition.cells import CellGrid
 from core.monitor.catalogue import BY_NAME
 from core.units import NS_PER_S, ns_from_s
-from service.api.answers import rendered, worked
+from service.api.answers import in_thread, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
@@ -294,8 +294,8 @@ def trend_router(context: Context) -> APIRouter:
         read = partial(_read, context, query, group_by, grid)
         if wanted == "json":
             return await rendered(lambda: trend_model(query, *read()))
-        whole, groups, past = await worked(read)
-        columns = await worked(lambda: trend_table(whole, groups, past))
+        whole, groups, past = await in_thread(read)
+        columns = await in_thread(lambda: trend_table(whole, groups, past))
         cursor = None if whole.next_ns is None else str(whole.next_ns)
         return table_response(wanted, columns, f"trends-{unit}-{bearing}", cursor)
 

@@ -1,4 +1,4 @@
-"""Doors on both databases, with hashes that cost little."""
+"""CredentialChecker on both databases, with hashes that cost little."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -8,7 +8,7 @@ import pytest
 from argon2 import PasswordHasher
 from harness.places import Place, SqlitePlace
 
-from service.api.auth.authenticator import Doors
+from service.api.auth.authenticator import CredentialChecker
 from service.api.auth.backoff import Backoff
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import People
@@ -67,5 +67,5 @@ def people(access: AccessStore, hashing: Hashing) -> People:
 
 
 @pytest.fixture
-def doors(access: AccessStore, hashing: Hashing) -> Doors:
-    return Doors(access, hashing, Backoff())
+def doors(access: AccessStore, hashing: Hashing) -> CredentialChecker:
+    return CredentialChecker(access, hashing, Backoff())

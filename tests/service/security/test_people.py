@@ -9,7 +9,7 @@ from argon2.low_level import Type
 from harness.places import Place
 
 from core.units import DAY_NS
-from service.api.auth.authenticator import Doors, LoggedIn
+from service.api.auth.authenticator import CredentialChecker, LoggedIn
 from service.api.auth.passwords import Hashing, PasswordRefusedError, new_password, plant_hasher
 from service.api.auth.people import SET_UP_S, People, create_key
 from service.store.access.audit_entries import Acting, Source, acting_as
@@ -105,7 +105,7 @@ def test_of_two_admins_who_leave_at_once_one_stays(people: People, access: Acces
 
 
 def test_the_set_up_token_makes_the_first_admin_and_nothing_more(
-    people: People, access: AccessStore, doors: Doors
+    people: People, access: AccessStore, doors: CredentialChecker
 ) -> None:
     token = people.offer_set_up(T0)
     assert token is not None
@@ -146,7 +146,7 @@ def test_of_many_who_set_up_at_once_one_is_admin(people: People, access: AccessS
 
 
 def test_a_key_opens_as_what_it_was_made_for_until_its_day(
-    access: AccessStore, doors: Doors
+    access: AccessStore, doors: CredentialChecker
 ) -> None:
     key, shown = create_key(access, "Historian", Role.VIEWER, ("U1", "U2", "U1"), 30, T0)
 
@@ -161,7 +161,7 @@ def test_a_key_opens_as_what_it_was_made_for_until_its_day(
 
 
 def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(
-    access: AccessStore, doors: Doors
+    access: AccessStore, doors: CredentialChecker
 ) -> None:
     key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
     other_id, other = new_key()
@@ -175,7 +175,9 @@ def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(
     assert stored.used_ns is None
 
 
-def test_the_last_use_of_a_key_is_written_once_a_minute(access: AccessStore, doors: Doors) -> None:
+def test_the_last_use_of_a_key_is_written_once_a_minute(
+    access: AccessStore, doors: CredentialChecker
+) -> None:
     key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
     seen = set()
     for second in range(150):
@@ -195,7 +197,7 @@ def test_no_key_is_made_for_ever_or_for_an_admin_of_one_unit(access: AccessStore
 
 
 def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
-    access: AccessStore, doors: Doors, store_place: Place
+    access: AccessStore, doors: CredentialChecker, store_place: Place
 ) -> None:
     key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
     assert access.keys.revoke(key.id, T0 + S)
