@@ -41,7 +41,7 @@ class Access:
     async def account(self, name: str, role: Role) -> None:
         """Add an account whose password its owner has set."""
         now_ns = self.service.clock.now_ns()
-        await asyncio.to_thread(self.desk._people.add, name, role, PASSWORD, now_ns)
+        await asyncio.to_thread(self.desk.people.add, name, role, PASSWORD, now_ns)
 
     async def session(self, name: str) -> str:
         """Log in; the token of the session."""
