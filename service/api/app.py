@@ -20,7 +20,7 @@ from service.api.context import Context
 from service.api.health import health_router, metrics_router
 from service.api.openapi import describe_access, describe_answers
 from service.api.problems import (
-    any_other_problem,
+    EVERY_OPERATION,
     install_problem_handlers,
     refuse_unknown_parameters,
 )
@@ -133,7 +133,7 @@ def create_app(context: Context) -> GuardedApi:
         openapi_url="/api/v1/openapi.json",
         docs_url=None,  # its pages load scripts from other sites
         redoc_url=None,
-        responses=any_other_problem(),
+        responses=EVERY_OPERATION,
     )
     app.add_middleware(Revalidation, clock=context.clock)
     authenticator = context.access or Authenticator(context.store.access, context.clock)

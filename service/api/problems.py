@@ -80,6 +80,18 @@ class ProblemError(Exception):
         self.errors = [Mistake(parameter=parameter, detail=detail)] if parameter else []
 
 
+def _documented(words: str) -> dict[str, Any]:
+    content = {"schema": {"$ref": f"{SCHEMAS}Problem"}}
+    return {"description": words, "content": {MEDIA_TYPE: content}}
+
+
+EVERY_OPERATION: dict[int | str, dict[str, Any]] = {
+    422: _documented(WORDS[422]),
+    "default": _documented("Any other problem"),
+}
+"""OpenAPI entries for problems of every operation."""
+
+
 def problem_responses(
     *statuses: int, own: Mapping[int, str] | None = None
 ) -> dict[int | str, dict[str, Any]]:
@@ -92,11 +104,6 @@ def problem_responses(
     """
     words = {status: WORDS[status] for status in statuses} | dict(own or {})
     return {status: _documented(text) for status, text in words.items()}
-
-
-def any_other_problem() -> dict[int | str, dict[str, Any]]:
-    """Return OpenAPI entries for problems of every operation."""
-    return {422: _documented(WORDS[422]), "default": _documented("Any other problem")}
 
 
 async def refuse_unknown_parameters(request: Request) -> None:
@@ -119,11 +126,6 @@ def problem_schemas() -> dict[str, Any]:
     """Return the schemas that the entries refer to, by name."""
     schema = Problem.model_json_schema(ref_template=f"{SCHEMAS}{{model}}")
     return {**schema.pop("$defs"), "Problem": schema}
-
-
-def _documented(words: str) -> dict[str, Any]:
-    content = {"schema": {"$ref": f"{SCHEMAS}Problem"}}
-    return {"description": words, "content": {MEDIA_TYPE: content}}
 
 
 def install_problem_handlers(app: FastAPI) -> None:

@@ -324,17 +324,6 @@ def _film(films: FilmState, identity: AlarmIdentity) -> FilmConditionModel | Non
     return condition_model(news.reading.time_ns, news.reading.condition, rules.grid)
 
 
-def alarm_events_model(
-    events: list[StoredEvent], origin: Origin, grid: CellGrid, *, there_is_more: bool
-) -> AlarmEventsModel:
-    """Return a page of alarm events."""
-    return AlarmEventsModel.of(
-        origin=origin,
-        events=[event_model(stored, grid) for stored in events],
-        next_before=events[-1].id if there_is_more else None,
-    )
-
-
 def grid_of(films: FilmState) -> CellGrid:
     """Condition cells of all units."""
     return films.settings.baseline.settings().grid

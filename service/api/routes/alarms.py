@@ -42,7 +42,6 @@ from service.api.routes.alarm_models import (
     AlarmListModel,
     AlarmModel,
     RaisedAtModel,
-    alarm_events_model,
     alarm_list_model,
     alarm_model,
     event_model,
@@ -182,8 +181,13 @@ def alarm_router(context: Context) -> APIRouter:
         found = await in_thread(lambda: context.store.alarm_events(one_more))
         page, is_more = list(found[: query.limit]), len(found) > query.limit
         if wanted == "json":
+            next_before = page[-1].id if is_more else None
             return await rendered(
-                lambda: alarm_events_model(page, context.origin, grid, there_is_more=is_more)
+                lambda: AlarmEventsModel.of(
+                    context,
+                    events=[event_model(stored, grid) for stored in page],
+                    next_before=next_before,
+                )
             )
         columns = await in_thread(lambda: event_table(page, grid))
         cursor = str(page[-1].id) if is_more else None

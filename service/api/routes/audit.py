@@ -113,19 +113,17 @@ def audit_router(context: Context) -> APIRouter:
         page = list(found[: query.limit])
         next_before = page[-1].number if len(found) > query.limit else None
         if wanted == "json":
-            head_error = context.store.audit.head_error
-            return await rendered(lambda: _answer(page, next_before, head_error))
+            return await rendered(
+                lambda: AuditModel.of(
+                    context.store.audit,
+                    entries=[_model(entry) for entry in page],
+                    next_before=next_before,
+                )
+            )
         cursor = None if next_before is None else str(next_before)
         return table_response(wanted, audit_table(page), "audit", cursor)
 
     return router
-
-
-def _answer(
-    page: Sequence[AuditEntry], next_before: int | None, head_error: str | None
-) -> AuditModel:
-    entries = [_model(entry) for entry in page]
-    return AuditModel(entries=entries, next_before=next_before, head_error=head_error)
 
 
 async def audit_query(

@@ -5,11 +5,9 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from core.machine.unit import Bearing
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import BY_NAME
 from core.stiffness.estimators import ESTIMATORS
-from core.uncertainty import Budget
 from service.api.answers import rendered
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, LiveState, QuantityName, UnitId
@@ -173,41 +171,11 @@ class BudgetModel(ApiModel):
     """Contributions, largest first."""
 
 
-def bearing_model(unit: str, bearing: Bearing, reference: GapReference | None) -> BearingModel:
-    """Return the model of a bearing.
-
-    Parameters
-    ----------
-    reference
-        Stored reference, if one is in force.
-    """
-    return BearingModel.of(
-        bearing,
-        unit=unit,
-        reference=reference_model(reference),
-        channels={place: getattr(bearing, place) for place in PLACES},
-    )
-
-
 def reference_model(reference: GapReference | None) -> ReferenceModel:
     """Return the origin of a reference; None stands for the plant file."""
     if reference is None:
         return PLANT_FILE
     return ReferenceModel.of(reference, note=reference.note or None)
-
-
-def budget_model(name: str, time_ns: int, budget: Budget) -> BudgetModel:
-    """Return the model of a budget, largest contribution first."""
-    low, high = budget.interval
-    ordered = sorted(budget.lines, key=lambda line: line.contribution, reverse=True)
-    return BudgetModel.of(
-        budget,
-        quantity=name,
-        unit=BY_NAME[name].unit,
-        time=time_ns,
-        uncertainty=UncertaintyModel.of(budget, low_95=low, high_95=high),
-        lines=[BudgetLineModel.of(line) for line in ordered],
-    )
 
 
 def latest_model(live: LiveState, unit: str, bearing: str) -> LatestModel:
@@ -284,9 +252,13 @@ def bearing_router(context: Context) -> APIRouter:
 
 def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:
     context.bearing(unit, bearing)
-    references = context.references
-    watched = references.bearing(unit, bearing)
-    return bearing_model(unit, watched, references.of(unit, bearing))
+    in_force = context.references.bearing(unit, bearing)
+    return BearingModel.of(
+        in_force,
+        unit=unit,
+        reference=reference_model(context.references.of(unit, bearing)),
+        channels={place: getattr(in_force, place) for place in PLACES},
+    )
 
 
 def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
@@ -300,7 +272,18 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
         estimator = assessment.estimators[axes]
         source = ESTIMATORS[estimator].stiffness.format(axes=axes) if estimator else quantity
     budget = assessment.budgets.get(source)
-    return None if budget is None else budget_model(quantity, assessment.time_ns, budget)
+    if budget is None:
+        return None
+    low, high = budget.interval
+    lines = sorted(budget.lines, key=lambda line: line.contribution, reverse=True)
+    return BudgetModel.of(
+        budget,
+        quantity=quantity,
+        unit=BY_NAME[quantity].unit,
+        time=assessment.time_ns,
+        uncertainty=UncertaintyModel.of(budget, low_95=low, high_95=high),
+        lines=[BudgetLineModel.of(line) for line in lines],
+    )
 
 
 def no_result(unit: str, bearing: str) -> ProblemError:

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from core.arrays import SampleArray
 from core.machine.channel import Measurand
-from core.quality import Level, Quality, Reading, Reason, bad, missing, worst
+from core.quality import Level, Quality, Reason, bad, missing, worst
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
 from service.api.auth.declared import subject_router
@@ -252,12 +252,9 @@ def _extent(
 def _slow(
     channel: SlowChannelSettings, used_by: list[str], block: SampleBlock | None, why: Reason
 ) -> SlowChannelModel:
-    reading = missing(why) if block is None else _reading(block, channel.id)
+    why = why if block is None else Reason.NOT_MEASURED
+    reading = (None if block is None else block.slow.get(channel.id)) or missing(why)
     return SlowChannelModel.of(channel, reading, used_by=used_by)
-
-
-def _reading(block: SampleBlock, channel: str) -> Reading:
-    return block.slow.get(channel) or missing(Reason.NOT_MEASURED)
 
 
 def _uses(settings: UnitSettings) -> dict[str, list[str]]:

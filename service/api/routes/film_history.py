@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 from fastapi import APIRouter, Query, Response
 
-from core.baseline.history import CodeArray, ReadingOutcome
+from core.baseline.history import ReadingOutcome
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from core.units import NS_PER_S
@@ -179,14 +179,10 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
         bearing_um_pk=listed(column(history.bearing_um_pk)),
         evidence=[EVIDENCE_NAMES[ReadingOutcome(code)] for code in column(history.outcome)],
         verdict=[verdict_name(Verdict(code)) for code in column(found.verdict)],
-        level=_levels(column(found.level)),
+        level=[level_name(int(code) or None) for code in column(found.level)],
         change_percent=listed(100.0 * np.expm1(column(found.change))),
         deviation_percent=listed(100.0 * np.expm1(column(found.deviation))),
     )
-
-
-def _levels(codes: CodeArray) -> list[Any]:
-    return [level_name(int(code) or None) for code in codes]
 
 
 UNITS = {
@@ -289,7 +285,10 @@ def film_history_router(context: Context) -> APIRouter:
         )
 
         def read() -> tuple[FilmReadingsModel, FilmHistory, list[int]]:
-            found = _history(context, query)
+            found = context.store.films.history(query)
+            if len(found) > MAX_READ:
+                detail = f"the range has more than {MAX_READ} readings; request a shorter range"
+                raise QueryTooLargeError(detail)
             rows = rows_shown(len(found), max_points, thin)
             return film_readings_model(query, found, rows), found, rows.tolist()
 
@@ -301,10 +300,3 @@ def film_history_router(context: Context) -> APIRouter:
         return table_response(wanted, await in_thread(read_columns), f"film-{unit}-{bearing}")
 
     return router
-
-
-def _history(context: Context, query: FilmQuery) -> FilmHistory:
-    found = context.store.films.history(query)
-    if len(found) > MAX_READ:
-        raise QueryTooLargeError(f"more than {MAX_READ} readings in this range: ask for less")
-    return found

@@ -222,7 +222,6 @@ CURRENT_PERIODS = 2.5
 NORMAL_95 = 1.96
 """Half-width of the 95 % interval of a normal distribution, in standard deviations."""
 
-NONE_IN_FORCE = "none_in_force"
 NOT_LEARNED, ATTITUDE_NOT_LEARNED = "condition_not_learned", "attitude_not_learned"
 
 
@@ -359,10 +358,9 @@ def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionMode
 def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: int) -> str:
     match finding.verdict:
         case Verdict.NO_BASELINE:
-            learned = (
-                seen.baseline.of(Watched.STIFFNESS, DIRECTIONS[row]) if seen.baseline else None
-            )
-            return NONE_IN_FORCE if learned is None else _unseen(learned, reading)
+            baseline = seen.baseline
+            learned = baseline and baseline.of(Watched.STIFFNESS, DIRECTIONS[row])
+            return "none_in_force" if learned is None else _unseen(learned, reading)
         case Verdict.TRANSIENT:
             return "not_settled"
         case _:

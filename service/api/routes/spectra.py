@@ -29,7 +29,7 @@ from service.api.values import (
     PlaceName,
     Time,
 )
-from service.store.spectra_port import Spectra, SpectraQuery, StoredSpectrum
+from service.store.spectra_port import SpectraQuery, StoredSpectrum
 
 
 class PlaceSpectraModel(ApiModel):
@@ -130,38 +130,6 @@ MAX_NUMBERS = 2_000_000
 
 DECIMALS = 6
 """Decimals of amplitudes in µm; stored spectra are less precise."""
-
-
-def spectra_model(
-    query: SpectraQuery,
-    found: Spectra,
-    places: Sequence[PlaceName],
-    max_frequency_hz: float | None,
-    past_end_ns: int | None,
-) -> SpectraModel:
-    """Return the spectra with the resolution of the newest one.
-
-    Raises
-    ------
-    ProblemError
-        If they are too large for one answer.
-    """
-    shown = [each for each in found.spectra if each.resolution == found.spectra[-1].resolution]
-    frequency_hz = _frequencies(shown, max_frequency_hz)
-    _require_few(len(shown), len(places) * frequency_hz.size)
-    return SpectraModel.of(
-        query,
-        found,
-        frequency_hz=frequency_hz.tolist(),
-        time=[each.time_ns / NS_PER_S for each in shown],
-        operating_state=[STATE_NAMES[each.state] for each in shown],
-        level=[LEVEL_NAMES[each.quality.level] for each in shown],
-        reason=[each.quality.reason.value for each in shown],
-        **{name: [getattr(each, name) for each in shown] for name in OWN_FIELDS},
-        channels={place: _place(shown, place, frequency_hz.size) for place in places},
-        n_other_resolution=len(found.spectra) - len(shown),
-        simulated_until=past_end_ns,
-    )
 
 
 def _frequencies(shown: Sequence[StoredSpectrum], max_frequency_hz: float | None) -> FloatArray:
@@ -280,5 +248,19 @@ def _read(
         log.error(
             "spectra are damaged", unit=query.unit, bearing=query.bearing, n=len(found.damaged_ns)
         )
-    past_end_ns = context.store.films.past_end_ns(query.unit, query.bearing)
-    return spectra_model(query, found, places, max_frequency_hz, past_end_ns)
+    shown = [each for each in found.spectra if each.resolution == found.spectra[-1].resolution]
+    frequency_hz = _frequencies(shown, max_frequency_hz)
+    _require_few(len(shown), len(places) * frequency_hz.size)
+    return SpectraModel.of(
+        query,
+        found,
+        frequency_hz=frequency_hz.tolist(),
+        time=[each.time_ns / NS_PER_S for each in shown],
+        operating_state=[STATE_NAMES[each.state] for each in shown],
+        level=[LEVEL_NAMES[each.quality.level] for each in shown],
+        reason=[each.quality.reason.value for each in shown],
+        **{name: [getattr(each, name) for each in shown] for name in OWN_FIELDS},
+        channels={place: _place(shown, place, frequency_hz.size) for place in places},
+        n_other_resolution=len(found.spectra) - len(shown),
+        simulated_until=context.store.films.past_end_ns(query.unit, query.bearing),
+    )
