@@ -1,4 +1,4 @@
-"""What every answer has in common: JSON made in a thread, its entity tag, its headers."""
+"""JSON answers rendered in threads, their entity tags, caches and headers."""
 
 import asyncio
 import re
@@ -121,7 +121,7 @@ def _dated(model: DatedAnswer) -> Response:
 
 
 FRESH_S = 1.0
-"""Maximum age of an answer whose revision is unchanged: some states end by time alone."""
+"""Maximum age of an answer whose revision is unchanged: some states change with time alone."""
 
 
 class SharedAnswer:

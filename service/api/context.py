@@ -1,4 +1,4 @@
-"""What the routes work with."""
+"""Parts of the running service that routes use."""
 
 import pathlib
 from collections.abc import Awaitable, Callable, Mapping, Sequence, Set

@@ -71,8 +71,8 @@ N_CHECKS = 4
 
 
 WORDS = {
-    Refused.HISTORY: "questions about the past",
-    Refused.VIEWS: "questions about the past and views of now",
+    Refused.HISTORY: "requests for past values",
+    Refused.VIEWS: "requests for past and live values",
 }
 
 
@@ -206,19 +206,19 @@ def load_metrics(load: LoadWatch | None) -> Iterator[Metric]:
         return
     yield counter(
         "questions_refused",
-        "Questions answered by 503 because the service was behind.",
+        "Requests rejected with 503 because the service was overloaded.",
         ("about",),
         [((kind.name.lower(),), load.n_refused[kind]) for kind in KINDS],
     )
     yield gauge(
         "refusing",
-        "1 while such questions are refused.",
+        "1 while such requests are rejected.",
         ("about",),
         [((kind.name.lower(),), load.refused >= kind) for kind in KINDS],
     )
     yield gauge(
         "event_loop_lag_seconds",
-        "By how much the program has been late at every look within the last second.",
+        "Smallest delay of the event loop within the last second.",
         (),
         [((), load.lag_s)],
     )

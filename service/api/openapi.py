@@ -324,7 +324,7 @@ NEEDED = "x-padwatch-needs"
 
 REFUSALS = {
     401: "Not authenticated",
-    403: "Not allowed, or asked for by a page of another site",
+    403: "Not allowed, or requested by a page of another site",
 }
 
 

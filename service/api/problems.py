@@ -163,7 +163,7 @@ def install_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(StoreError)
     async def _store(request: Request, error: StoreError) -> Response:
-        log.error("a query failed in the store", path=request.url.path, reason=str(error))
+        log.error("database query failed", path=request.url.path, reason=str(error))
         return _render(request, 503, "Store not available", "the store cannot be read just now")
 
     @app.exception_handler(NotHereError)

@@ -141,7 +141,7 @@ Time = Annotated[str, BeforeValidator(_time), Field(examples=["2026-11-21T09:03:
 """Time, RFC 3339; given as text or in nanoseconds since 1970."""
 
 ByName = BeforeValidator(_name)
-"""Makes a field accept a member of an enumeration, whose name in lower case is shown."""
+"""Validator that replaces a member of an enumeration by its name in lower case."""
 
 
 class DatedAnswer(ApiModel):
@@ -366,7 +366,7 @@ def states_named(names: list[OperatingStateName] | None) -> tuple[OperatingState
 def condition_model(
     time_ns: int, condition: BearingCondition, grid: CellGrid
 ) -> FilmConditionModel:
-    """Operating condition of a bearing."""
+    """Return the operating condition of a bearing."""
     cell = None if condition.cell is None else cell_model(condition.cell, grid)
     return FilmConditionModel.of(
         condition, time=time_ns, operating_state=condition.state, cell=cell

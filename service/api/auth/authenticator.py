@@ -1,4 +1,4 @@
-"""Logins, and who is behind a request."""
+"""Logins, and identification of callers."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from acquisition.clock import Clock
 from core.units import ns_from_s
 from service.api.auth.backoff import Backoff
 from service.api.auth.passwords import AccessThreads, Hashing
-from service.api.auth.people import People
+from service.api.auth.people import AccountService
 from service.settings.processes import is_loopback
 from service.store.access.identities import (
     LOCAL,
@@ -233,7 +233,7 @@ def _cookies(values: Iterable[str], wanted: str) -> list[str]:
 
 
 PASSED_ON = (b"forwarded", b"x-forwarded-for", b"x-real-ip", b"via")
-"""Headers of a proxy, whose requests may come from anywhere."""
+"""Headers added by proxies; a forwarded request may come from any computer."""
 
 
 def is_from_here(scope: Scope) -> bool:
@@ -286,7 +286,7 @@ class Authenticator:
     ) -> None:
         self.store, self.clock, self.local_role = store, clock, local_role
         self._hashing, self._limits, self._backoff = hashing or Hashing(), limits, Backoff()
-        self.people, self.work = People(store, self._hashing), AccessThreads()
+        self.people, self.work = AccountService(store, self._hashing), AccessThreads()
 
     async def caller(self, scope: Scope) -> Caller:
         """Identify the sender of a request.

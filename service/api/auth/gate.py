@@ -1,4 +1,4 @@
-"""The gate before all routes: identifies the caller and compares it with what a route needs."""
+"""Identification of callers before all routes, and the check of their permissions."""
 
 from collections.abc import Callable, Iterable, Mapping
 from urllib.parse import urlsplit
@@ -23,7 +23,7 @@ OWN_SITES = (b"same-origin", b"none")
 def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], requires_origin: bool) -> bool:
     """Whether a request may come from a page of another origin (cross-site request forgery).
 
-    Browsers add cookies, and reach loopback, for pages of any site.
+    Browsers send cookies, and can reach loopback, for pages of any site.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Gate:
     Parameters
     ----------
     declared
-        Returns what each operation needs.
+        Returns the requirements of each operation.
     """
 
     def __init__(
@@ -144,7 +144,7 @@ def caller_of(request: Request) -> Caller:
 
 
 async def require_declared(request: Request) -> None:
-    """Require what a route declares; a dependency of all routes.
+    """Check the permission that a route declares; a dependency of all routes.
 
     Raises
     ------

@@ -21,7 +21,7 @@ SET_UP_S = 3600.0
 """Validity of the set-up token, s."""
 
 
-class People:
+class AccountService:
     """Changes accounts. It blocks while hashing: call it from a thread.
 
     Parameters

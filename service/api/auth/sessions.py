@@ -144,10 +144,10 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
     )
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
         """Start a session, kept in a cookie; an earlier session of the browser ends."""
-        let_in = await _log_in(authenticator, request, asked.name, asked.password)
+        logged_in = await _log_in(authenticator, request, asked.name, asked.password)
         await _end(authenticator, caller_of(request))
-        await _record_login(context, authenticator, let_in)
-        return await _begun(authenticator, request, response, let_in)
+        await _record_login(context, authenticator, logged_in)
+        return await _begun(authenticator, request, response, logged_in)
 
     @router.delete("/session", summary="Log out", status_code=204, dependencies=[OPEN])
     async def log_out(request: Request, response: Response) -> None:
@@ -177,9 +177,9 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
             await authenticator.work.run_hashing(
                 lambda: authenticator.people.set_password(*new, authenticator.clock.now_ns())
             )
-        let_in = await _log_in(authenticator, request, identity.name, asked.new_password)
-        await _record_login(context, authenticator, let_in)
-        return await _begun(authenticator, request, response, let_in)
+        logged_in = await _log_in(authenticator, request, identity.name, asked.new_password)
+        await _record_login(context, authenticator, logged_in)
+        return await _begun(authenticator, request, response, logged_in)
 
     @router.post(
         "/set-up",
@@ -216,25 +216,27 @@ async def _log_in(
     return found
 
 
-async def _record_login(context: Context, authenticator: Authenticator, let_in: LoggedIn) -> None:
+async def _record_login(
+    context: Context, authenticator: Authenticator, logged_in: LoggedIn
+) -> None:
     """Record a login in the audit trail; end the session if that fails."""
     try:
-        await record(context.store.audit, context.clock, BEGUN, let_in.identity.name)
+        await record(context.store.audit, context.clock, BEGUN, logged_in.identity.name)
     except StoreError:
         with suppress(StoreError):
-            await authenticator.log_out(let_in.token)
+            await authenticator.log_out(logged_in.token)
         raise
 
 
 async def _begun(
-    authenticator: Authenticator, request: Request, response: Response, let_in: LoggedIn
+    authenticator: Authenticator, request: Request, response: Response, logged_in: LoggedIn
 ) -> SessionModel:
     is_secure = _is_secure(request)
     name = COOKIE if is_secure else PLAIN_COOKIE
-    response.set_cookie(name, let_in.token, secure=is_secure, httponly=True, samesite="strict")
+    response.set_cookie(name, logged_in.token, secure=is_secure, httponly=True, samesite="strict")
     caller = caller_of(request)
     return await session_model(
-        Caller(let_in.identity, caller.shown, caller.must_log_in), authenticator
+        Caller(logged_in.identity, caller.shown, caller.must_log_in), authenticator
     )
 
 
@@ -256,7 +258,7 @@ def _person(identity: Identity) -> Identity:
 
 
 async def session_model(caller: Caller, authenticator: Authenticator) -> SessionModel:
-    """The caller and its permissions."""
+    """Return the caller and its permissions."""
     identity = caller.identity
     may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
     needs_set_up = not may_all and not await authenticator.has_accounts()

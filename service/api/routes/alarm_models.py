@@ -315,7 +315,7 @@ def alarm_model(engine: AlarmBoard, films: FilmState, alarm: Alarm) -> AlarmMode
 
 
 def _film(films: FilmState, identity: AlarmIdentity) -> FilmConditionModel | None:
-    """Condition of the newest reading of a film, if the alarm is about one."""
+    """Return the condition of the newest reading of a film; None for other alarms."""
     if identity.kind not in FILM_KINDS:
         return None
     news, rules = films.newest(identity.unit, identity.subject), films.rules(identity.unit)
@@ -325,7 +325,7 @@ def _film(films: FilmState, identity: AlarmIdentity) -> FilmConditionModel | Non
 
 
 def grid_of(films: FilmState) -> CellGrid:
-    """Condition cells of all units."""
+    """Return the grid of condition cells, the same for all units."""
     return films.settings.baseline.settings().grid
 
 

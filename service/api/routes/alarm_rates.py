@@ -1,4 +1,4 @@
-"""How often alarms come."""
+"""Alarm rates."""
 
 import asyncio
 from collections.abc import Iterable, Sequence

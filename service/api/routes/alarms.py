@@ -1,4 +1,4 @@
-"""The list of alarms, their events, and what operators do to them."""
+"""Alarm list, alarm events, and operations on alarms."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -177,10 +177,10 @@ class BaselineCellsModel(ApiModel):
     """Upper bound, likewise."""
 
     eccentricity_ratio: list[float]
-    """Middle of what the cell has seen."""
+    """Middle of the readings in the cell."""
 
     oil_temperature_c: list[float]
-    """Likewise, °C."""
+    """Middle of the readings in the cell, °C."""
 
     n_readings: list[int]
     """Readings used; 0 in a cell between others that has no readings."""

@@ -131,22 +131,22 @@ class BudgetLineModel(ApiModel):
     """One contribution to the uncertainty of a result."""
 
     name: Annotated[str, Field(examples=["bracket stiffness"])]
-    """What contributes."""
+    """Source of uncertainty."""
 
     kind: Literal["random", "systematic"]
-    """Whether it differs from one result to the next, or stays."""
+    """Random if it differs from result to result, systematic if it stays the same."""
 
     distribution: Literal["normal", "uniform"]
-    """What is known about it besides its width."""
+    """Assumed distribution."""
 
     width: float
-    """Standard uncertainty if normal, half-width if uniform, in the unit of what contributes."""
+    """Standard uncertainty if normal, half-width if uniform, in the unit of the source."""
 
     sensitivity: float
-    """Change of the result per unit of what contributes."""
+    """Change of the result per unit of the source."""
 
     contribution: float
-    """Standard uncertainty of the result by this alone."""
+    """Standard uncertainty of the result due to this source alone."""
 
 
 class BudgetModel(ApiModel):

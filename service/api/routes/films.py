@@ -253,7 +253,7 @@ def why_unwatched(context: Context, unit: str, bearing: str) -> str | None:
 
 
 def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
-    """Film of a bearing now."""
+    """Return the film of a bearing now."""
     seen, place = _seen(context, unit, bearing), context.films.place(unit, bearing)
     x, y = _directions(seen) if seen else (None, None)
     limits = seen.rules.change if seen else None
@@ -275,7 +275,7 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
 
 
 def film_brief(context: Context, unit: str, bearing: str) -> FilmBriefModel:
-    """Summary of the film of a bearing."""
+    """Return the summary of the film of a bearing."""
     seen = _seen(context, unit, bearing)
     x, y = (_word(found) for found in _directions(seen)) if seen else (None, None)
     return FilmBriefModel(bearing=bearing, why_not=why_unwatched(context, unit, bearing), x=x, y=y)
@@ -368,7 +368,7 @@ def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: 
 
 
 def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
-    """Return what was not learned: the cell, or only the attitude angle within it."""
+    """Return the reason: the cell was not learned, or only its attitude angle."""
     here = FilmConditions.one(
         reading.eccentricity_ratio, reading.oil_temperature_c, reading.attitude_deg
     )
@@ -442,7 +442,7 @@ def film_router(context: Context) -> APIRouter:
     async def film(unit: UnitId, bearing: BearingId) -> Response:
         """Show verdict, change with its uncertainty, cause and condition, by direction.
 
-        A film that cannot be judged is never reported as normal: the verdict says why not.
+        A film that cannot be judged is never reported as normal: the verdict gives the reason.
         """
         context.bearing(unit, bearing)
         return await rendered(lambda: film_model(context, unit, bearing))

@@ -192,7 +192,7 @@ class UnitModel(BasicUnitModel):
 
 
 class QuantityModel(ApiModel):
-    """A quantity that trends can be asked for."""
+    """A quantity of results and trends."""
 
     name: str
     """Name in readings and trends."""
@@ -239,7 +239,7 @@ def plant_router(context: Context) -> APIRouter:
 
     @router.get("/units/{unit}", summary="One unit", responses=problem_responses(404))
     async def one_unit(unit: UnitId) -> UnitModel:
-        """A unit and the state of its source."""
+        """Show a unit and the state of its source."""
         return _unit(context, context.unit(unit).id)
 
     @router.get(

@@ -11,7 +11,7 @@ from harness.places import Place, SqlitePlace
 from service.api.auth.authenticator import CredentialChecker
 from service.api.auth.backoff import Backoff
 from service.api.auth.passwords import Hashing
-from service.api.auth.people import People
+from service.api.auth.people import AccountService
 from service.store.access.port import AccessStore
 from service.store.sql_store import SqlStore
 
@@ -62,8 +62,8 @@ def hashing(hasher: CountingHasher) -> Hashing:
 
 
 @pytest.fixture
-def people(access: AccessStore, hashing: Hashing) -> People:
-    return People(access, hashing)
+def people(access: AccessStore, hashing: Hashing) -> AccountService:
+    return AccountService(access, hashing)
 
 
 @pytest.fixture

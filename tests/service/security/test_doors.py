@@ -12,7 +12,7 @@ from argon2 import PasswordHasher
 from service.api.auth.authenticator import CredentialChecker, LoggedIn, NotLoggedIn
 from service.api.auth.backoff import ACCOUNT_RULE, Backoff
 from service.api.auth.passwords import Hashing
-from service.api.auth.people import People, create_key
+from service.api.auth.people import AccountService, create_key
 from service.settings.processes import Doorway, why_closed
 from service.store.access.identities import Identity, Means, Permission, Role, SessionLimits, digest
 from service.store.access.port import AccessStore
@@ -26,7 +26,7 @@ HERE = "10.0.0.1"
 
 
 @pytest.fixture
-def anna(people: People) -> str:
+def anna(people: AccountService) -> str:
     return people.add("anna", Role.OPERATOR, PASSWORD, T0)
 
 
@@ -135,7 +135,7 @@ def test_logging_out_ends_this_login_and_no_other_and_a_forged_token_opens_nothi
 
 
 def test_a_new_password_ends_every_login_of_its_account_alone(
-    doors: CredentialChecker, people: People, anna: str
+    doors: CredentialChecker, people: AccountService, anna: str
 ) -> None:
     people.add("berta", Role.VIEWER, PASSWORD, T0)
     hers, others = [log_in(doors) for _ in range(3)], log_in(doors, name="berta")
@@ -163,7 +163,7 @@ def test_a_password_changed_while_the_old_one_is_checked_opens_nothing(
 
 
 def test_removing_an_account_ends_its_logins_also_for_one_of_the_same_name(
-    doors: CredentialChecker, people: People, access: AccessStore, anna: str
+    doors: CredentialChecker, people: AccountService, access: AccessStore, anna: str
 ) -> None:
     token = log_in(doors)
     people.add("berta", Role.ADMIN, PASSWORD, T0)
@@ -189,7 +189,7 @@ def test_an_account_has_only_so_many_logins_and_the_oldest_goes(doors: Credentia
 
 @pytest.mark.usefixtures("anna")
 def test_old_logins_are_forgotten_when_somebody_logs_in(
-    doors: CredentialChecker, people: People, path: Path
+    doors: CredentialChecker, people: AccountService, path: Path
 ) -> None:
     people.add("berta", Role.VIEWER, PASSWORD, T0)
     log_in(doors)
