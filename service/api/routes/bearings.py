@@ -251,10 +251,10 @@ def bearing_router(context: Context) -> APIRouter:
 
 
 def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:
-    context.bearing(unit, bearing)
-    in_force = context.references.bearing(unit, bearing)
+    settings, in_force = context.bearing(unit, bearing), context.references.bearing(unit, bearing)
     return BearingModel.of(
         in_force,
+        settings,
         unit=unit,
         reference=reference_model(context.references.of(unit, bearing)),
         channels={place: getattr(in_force, place) for place in PLACES},

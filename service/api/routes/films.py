@@ -358,8 +358,9 @@ def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionMode
 def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: int) -> str:
     match finding.verdict:
         case Verdict.NO_BASELINE:
-            baseline = seen.baseline
-            learned = baseline and baseline.of(Watched.STIFFNESS, DIRECTIONS[row])
+            if seen.baseline is None:
+                return "none_in_force"
+            learned = seen.baseline.of(Watched.STIFFNESS, DIRECTIONS[row])
             return "none_in_force" if learned is None else _unseen(learned, reading)
         case Verdict.TRANSIENT:
             return "not_settled"
