@@ -227,12 +227,10 @@ NOT_LEARNED, ATTITUDE_NOT_LEARNED = "condition_not_learned", "attitude_not_learn
 
 @dataclass(frozen=True)
 class WatchedFilm:
-    """A watched film with its newest reading.
+    """A watched film with the findings of its newest reading.
 
     Parameters
     ----------
-    news
-        Newest reading with its findings.
     why_not_current
         Why the reading is not current; None if it is.
     """
