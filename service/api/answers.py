@@ -66,7 +66,7 @@ async def rendered(make: Callable[[], BaseModel]) -> Response:
     make
         Builds the model; may block.
     """
-    return await asyncio.to_thread(lambda: _json(make()))
+    return await asyncio.to_thread(lambda: _response(*_content(make())))
 
 
 async def rendered_now(make: Callable[[], DatedAnswer]) -> Response:
@@ -101,11 +101,10 @@ class Renderings:
         self._kept[key] = kept
         while len(self._kept) > self._n_kept:
             del self._kept[next(iter(self._kept))]
-        return Response(kept[1], media_type=JSON, headers={"ETag": kept[2]})
+        return _response(*kept[1:])
 
 
-def _json(model: BaseModel) -> Response:
-    content, tag = _content(model)
+def _response(content: bytes, tag: str) -> Response:
     return Response(content, media_type=JSON, headers={"ETag": tag})
 
 
@@ -117,7 +116,7 @@ def _content(model: BaseModel) -> tuple[bytes, str]:
 def _dated(model: DatedAnswer) -> Response:
     content = model.model_dump_json().encode()
     undated = content.replace(f'"time":"{model.time}"'.encode(), b"", 1)
-    return Response(content, media_type=JSON, headers={"ETag": tag_of(digest_of(undated))})
+    return _response(content, tag_of(digest_of(undated)))
 
 
 FRESH_S = 1.0
@@ -149,7 +148,7 @@ class SharedAnswer:
             self._made = (revision, now_s, making)
         # a client that disconnects must not cancel the answer of the others
         shared = await asyncio.shield(self._made[2])
-        return Response(shared.body, media_type=shared.media_type, headers=dict(_tag(shared)))
+        return _response(bytes(shared.body), shared.headers["etag"])
 
 
 def _shared_context() -> Context:
@@ -157,10 +156,6 @@ def _shared_context() -> Context:
     context = copy_context()
     context.run(ASKER.set, None)
     return context
-
-
-def _tag(response: Response) -> list[tuple[str, str]]:
-    return [("ETag", response.headers["etag"])]
 
 
 TIME_HEADER = "Padwatch-Time"
@@ -228,20 +223,3 @@ def _is_whole_json(head: Message) -> bool:
 
 
 ORIGIN_HEADER, EDITION_HEADER = "Padwatch-Origin", "Padwatch-Edition"
-
-
-class FixedHeader:
-    """ASGI middleware that adds a header to all answers."""
-
-    def __init__(self, app: ASGIApp, name: str, value: str) -> None:
-        self._app, self._name, self._value = app, name, value
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request and add the header to the answer."""
-
-        async def marked(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                MutableHeaders(scope=message)[self._name] = self._value
-            await send(message)
-
-        await self._app(scope, receive, marked)

@@ -9,7 +9,7 @@ from typing import Any
 
 from fastapi import Depends, FastAPI, Request, Response
 
-from service.api.answers import ORIGIN_HEADER, FixedHeader, Revalidation, digest_of, tag_of
+from service.api.answers import ORIGIN_HEADER, Revalidation, digest_of, tag_of
 from service.api.auth.accounts import account_router, key_router
 from service.api.auth.authenticator import Authenticator
 from service.api.auth.declared import Declared, declared
@@ -18,6 +18,7 @@ from service.api.auth.refusals import AuditTrail, Refusals
 from service.api.auth.sessions import session_router
 from service.api.context import Context
 from service.api.health import health_router, metrics_router
+from service.api.http.middleware import AddedHeaders
 from service.api.openapi import describe_access, describe_answers
 from service.api.problems import (
     EVERY_OPERATION,
@@ -138,7 +139,7 @@ def create_app(context: Context) -> GuardedApi:
     app.add_middleware(Revalidation, clock=context.clock)
     authenticator = context.access or Authenticator(context.store.access, context.clock)
     app.add_gate(authenticator)
-    app.add_middleware(FixedHeader, name=ORIGIN_HEADER, value=context.origin.value)
+    app.add_middleware(AddedHeaders, headers=[(ORIGIN_HEADER, context.origin.value)])
     refusals = context.refusals or Refusals(context.store.audit, context.clock)
     app.add_middleware(AuditTrail, refusals=refusals, clock=context.clock)
     install_problem_handlers(app)

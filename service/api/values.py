@@ -59,8 +59,8 @@ class _Merged:
 
     def __getattr__(self, name: str) -> Any:
         for source in self._sources:
-            if hasattr(source, name):
-                return getattr(source, name)
+            if (value := getattr(source, name, ...)) is not ...:
+                return value
         raise AttributeError(name)
 
 

@@ -11,12 +11,12 @@ from fastapi import Depends
 from starlette.types import ASGIApp
 
 from acquisition.clock import Clock
-from service.api.answers import EDITION_HEADER, FixedHeader
+from service.api.answers import EDITION_HEADER
 from service.api.app import GuardedApi, create_app
 from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
 from service.api.http.listening import listen, server_tls, socket_file
-from service.api.http.middleware import TrustedProxy
+from service.api.http.middleware import AddedHeaders, TrustedProxy
 from service.api.http.protocol import GuardedConfig
 from service.api.http.server import GuardedServer
 from service.api.problems import refuse_unknown_parameters
@@ -125,7 +125,7 @@ def application(context: Context, evidence: EvidenceDesk | None = None) -> Guard
         Service that hands out evidence of alarms; None if none is stored.
     """
     app = create_app(context)
-    app.add_middleware(FixedHeader, name=EDITION_HEADER, value=edition())
+    app.add_middleware(AddedHeaders, headers=[(EDITION_HEADER, edition())])
     guarded = [Depends(refuse_unknown_parameters)]
     app.include_router(evidence_router(context, evidence), dependencies=guarded)
     app.include_router(dashboard_router())

@@ -13,7 +13,7 @@ from uvicorn._types import ASGI3Application
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 from uvicorn.server import ServerState
 
-from service.api.http.middleware import ALWAYS, API_ONLY, BoundedAnswers, guarded
+from service.api.http.middleware import SECURITY_HEADERS, BoundedAnswers, guarded
 from service.api.http.refusals import (
     FULL,
     HEAD_TOO_LARGE,
@@ -385,7 +385,7 @@ class GuardedProtocol(HttpToolsProtocol):
         """Close the connection, with a problem document if possible."""
         self._ignores_input = True
         if refusal is not None and self._may_answer():
-            self.transport.write(refusal.as_http([*ALWAYS, *API_ONLY]))
+            self.transport.write(refusal.as_http(SECURITY_HEADERS))
         self._drop_answers()
         self.transport.close()
 

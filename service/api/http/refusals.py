@@ -12,8 +12,6 @@ MEDIA_TYPE = b"application/problem+json"
 MAX_INSTANCE = 256
 """Maximum number of characters of a path in an answer."""
 
-Headers = Sequence[tuple[bytes, bytes]]
-
 
 @dataclass(frozen=True)
 class Refusal:
@@ -43,11 +41,12 @@ class Refusal:
             headers.append((b"retry-after", b"%d" % self.retry_after_s))
         return headers
 
-    def as_http(self, more: Headers) -> bytes:
+    def as_http(self, more: Sequence[tuple[str, str]]) -> bytes:
         """Return the whole answer; the connection is closed after it."""
         body = self.body()
         line = b"HTTP/1.1 %d %s\r\n" % (self.status, HTTPStatus(self.status).phrase.encode())
-        headers = [*self.headers(len(body)), *more, (b"connection", b"close")]
+        added = [(name.encode(), value.encode()) for name, value in more]
+        headers = [*self.headers(len(body)), *added, (b"connection", b"close")]
         return line + b"".join(b"%s: %s\r\n" % header for header in headers) + b"\r\n" + body
 
     async def send(self, scope: Scope, send: Send) -> None:

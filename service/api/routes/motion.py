@@ -12,7 +12,7 @@ from core.arrays import FloatArray
 from core.machine.unit import Bearing
 from core.monitor.assessment import OrbitTrace
 from core.samples.blocks import SampleBlock
-from service.api.answers import Renderings, in_thread, rendered
+from service.api.answers import Renderings, rendered
 from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import duration
@@ -22,8 +22,8 @@ from service.api.routes.channels import NEWEST, NO_SAMPLES, newest_blocks, requi
 from service.api.routes.recordings import (
     RecordingId,
     damaged_recording,
+    entry_of,
     library_of,
-    unknown_recording,
 )
 from service.api.values import ApiModel, BearingAnswer, SampleRange, Time, listed
 from service.live.live_view import HELD_S
@@ -295,9 +295,7 @@ def recorded_motion_router(context: Context) -> APIRouter:
 
         The calibration of the recording applies. The answer ends before a restart of the device.
         """
-        kept = await in_thread(lambda: library_of(context).one(recording))
-        if kept is None:
-            raise unknown_recording(recording)
+        kept = await entry_of(context, recording)
         unit = _unit_of(context, kept)
         context.bearing(unit, bearing)
         watched = context.references.bearing(unit, bearing)

@@ -263,12 +263,9 @@ def recording_router(context: Context) -> APIRouter:
     )
     async def one_recording(recording: RecordingId) -> Response:
         """Check a recording and describe its channels, gaps, rejected samples and files."""
-        shelf = library_of(context)
-        kept = await in_thread(lambda: shelf.one(recording))
-        if kept is None:
-            raise unknown_recording(recording)
+        kept = await entry_of(context, recording)
         try:
-            return await rendered(lambda: recording_info(shelf, kept))
+            return await rendered(lambda: recording_info(library_of(context), kept))
         except ConfigError as error:
             raise damaged_recording(recording, error) from error
 
@@ -307,9 +304,7 @@ def recording_router(context: Context) -> APIRouter:
 async def _download(
     context: Context, recording: str, make: Callable[[str], Pieces], media_type: str, suffix: str
 ) -> StreamingResponse:
-    shelf = library_of(context)
-    if await in_thread(lambda: shelf.one(recording)) is None:
-        raise unknown_recording(recording)
+    await entry_of(context, recording)
     try:
         pieces = await context.downloads.download(await in_thread(lambda: make(recording)))
     except TooManyDownloadsError as error:
@@ -331,9 +326,13 @@ def library_of(context: Context) -> Shelf:
     return Shelf(context.recordings, context.faults())
 
 
-def unknown_recording(recording: str) -> ProblemError:
-    """Return the problem of an unknown recording."""
-    return ProblemError(404, "Unknown recording", f"there is no recording {recording!r}")
+async def entry_of(context: Context, recording: str) -> Kept:
+    """Return a recording of the library; raise a problem of status 404 without it."""
+    library = library_of(context)
+    found = await in_thread(lambda: library.one(recording))
+    if found is None:
+        raise ProblemError(404, "Unknown recording", f"there is no recording {recording!r}")
+    return found
 
 
 def damaged_recording(recording: str, error: Exception) -> ProblemError:
