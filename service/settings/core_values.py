@@ -1,5 +1,7 @@
 """Settings of units as values of core: machine, calibration, analysis, alarm and film rules."""
 
+from dataclasses import fields
+
 from acquisition.delivery.calibration import ChannelCalibration, SlowCalibration, UnitCalibration
 from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
@@ -29,19 +31,6 @@ from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.storage import Origin
 from service.settings.transducers import response_of
 from service.settings.units import UnitSettings
-
-ACCURACY_KEYS = {
-    "bracket_stiffness_uncertainty",
-    "bracket_mass_uncertainty",
-    "bracket_damping_uncertainty",
-    "cross_coupling_uncertainty",
-    "delay_uncertainty_s",
-    "gap_reference_uncertainty_um",
-    "thermal_growth_um",
-    "thermal_growth_change_um",
-    "clearance_uncertainty",
-}
-"""Keys of a bearing that say how well something is known."""
 
 
 def machine_of(settings: UnitSettings) -> Unit:
@@ -83,7 +72,7 @@ def _calibration(settings: ChannelSettings) -> ChannelCalibration:
 
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
     return Bearing(
-        **settings.model_dump(exclude=ACCURACY_KEYS | {"alarms", "watched_estimator"}),
+        **settings.model_dump(include={field.name for field in fields(Bearing)}),
         accuracy=_accuracy(settings, unit),
         gap_accuracy=_gap_accuracy(settings, unit),
     )
