@@ -1,11 +1,11 @@
-"""What every answer has in common: JSON made in a thread, its entity tag, its headers."""
+"""JSON answers rendered in threads, their entity tags, caches and headers."""
 
 import asyncio
 import re
 from collections.abc import Callable, Hashable
 from contextvars import Context, copy_context
 from hashlib import blake2b
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 from fastapi import Response
 from pydantic import BaseModel
@@ -13,9 +13,9 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
+from service.api.values import DatedAnswer
 from service.runtime.asker import ASKER
 from service.runtime.times import rfc3339
-from service.settings.storage import Origin
 
 _AGE = re.compile(rb'("(?:data_)?age_s":)[0-9][0-9.e+-]*')
 
@@ -53,17 +53,7 @@ T = TypeVar("T")
 JSON = "application/json"
 
 
-class Dated(Protocol):
-    """A model whose field ``time`` is the present time, which its entity tag ignores."""
-
-    time: str
-
-    def model_dump_json(self) -> str:
-        """Return the model as JSON."""
-        ...
-
-
-async def worked(do: Callable[[], T]) -> T:
+async def in_thread(do: Callable[[], T]) -> T:
     """Call a function in a thread."""
     return await asyncio.to_thread(do)
 
@@ -76,10 +66,10 @@ async def rendered(make: Callable[[], BaseModel]) -> Response:
     make
         Builds the model; may block.
     """
-    return await asyncio.to_thread(lambda: _json(make()))
+    return await asyncio.to_thread(lambda: _response(*_content(make())))
 
 
-async def rendered_now(make: Callable[[], Dated]) -> Response:
+async def rendered_now(make: Callable[[], DatedAnswer]) -> Response:
     """Like `rendered` for the present state; the tag ignores the time of the answer.
 
     Parameters
@@ -107,15 +97,14 @@ class Renderings:
         """Return the answer for a key; it is rendered again if its source is another object."""
         kept = self._kept.pop(key, None)
         if kept is None or kept[0] is not source:
-            kept = (source, *await worked(lambda: _content(make(source))))
+            kept = (source, *await in_thread(lambda: _content(make(source))))
         self._kept[key] = kept
         while len(self._kept) > self._n_kept:
             del self._kept[next(iter(self._kept))]
-        return Response(kept[1], media_type=JSON, headers={"ETag": kept[2]})
+        return _response(*kept[1:])
 
 
-def _json(model: BaseModel) -> Response:
-    content, tag = _content(model)
+def _response(content: bytes, tag: str) -> Response:
     return Response(content, media_type=JSON, headers={"ETag": tag})
 
 
@@ -124,14 +113,14 @@ def _content(model: BaseModel) -> tuple[bytes, str]:
     return content, tag_of(digest_of(content))
 
 
-def _dated(model: Dated) -> Response:
+def _dated(model: DatedAnswer) -> Response:
     content = model.model_dump_json().encode()
     undated = content.replace(f'"time":"{model.time}"'.encode(), b"", 1)
-    return Response(content, media_type=JSON, headers={"ETag": tag_of(digest_of(undated))})
+    return _response(content, tag_of(digest_of(undated)))
 
 
 FRESH_S = 1.0
-"""Maximum age of an answer whose revision is unchanged: some states end by time alone."""
+"""Maximum age of an answer whose revision is unchanged: some states change with time alone."""
 
 
 class SharedAnswer:
@@ -146,7 +135,7 @@ class SharedAnswer:
     """
 
     def __init__(
-        self, make: Callable[[], Dated], revision: Callable[[], int], clock: Clock
+        self, make: Callable[[], DatedAnswer], revision: Callable[[], int], clock: Clock
     ) -> None:
         self._make, self._revision, self._clock = make, revision, clock
         self._made: tuple[int, float, asyncio.Task[Response]] | None = None
@@ -159,7 +148,7 @@ class SharedAnswer:
             self._made = (revision, now_s, making)
         # a client that disconnects must not cancel the answer of the others
         shared = await asyncio.shield(self._made[2])
-        return Response(shared.body, media_type=shared.media_type, headers=dict(_tag(shared)))
+        return _response(bytes(shared.body), shared.headers["etag"])
 
 
 def _shared_context() -> Context:
@@ -167,10 +156,6 @@ def _shared_context() -> Context:
     context = copy_context()
     context.run(ASKER.set, None)
     return context
-
-
-def _tag(response: Response) -> list[tuple[str, str]]:
-    return [("ETag", response.headers["etag"])]
 
 
 TIME_HEADER = "Padwatch-Time"
@@ -237,41 +222,4 @@ def _is_whole_json(head: Message) -> bool:
     return head["status"] == 200 and is_json and "content-length" in headers
 
 
-ORIGIN_HEADER = "Padwatch-Origin"
-
-
-class OriginHeader:
-    """ASGI middleware that adds the header to all responses."""
-
-    def __init__(self, app: ASGIApp, origin: Origin) -> None:
-        self._app, self._origin = app, origin
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request and add the header to the answer."""
-
-        async def marked(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                MutableHeaders(scope=message)[ORIGIN_HEADER] = self._origin.value
-            await send(message)
-
-        await self._app(scope, receive, marked)
-
-
-EDITION_HEADER = "Padwatch-Edition"
-
-
-class EditionHeader:
-    """ASGI middleware that adds the header to all responses."""
-
-    def __init__(self, app: ASGIApp, edition: str) -> None:
-        self._app, self._edition = app, edition
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request and add the header to the answer."""
-
-        async def marked(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                MutableHeaders(scope=message)[EDITION_HEADER] = self._edition
-            await send(message)
-
-        await self._app(scope, receive, marked)
+ORIGIN_HEADER, EDITION_HEADER = "Padwatch-Origin", "Padwatch-Edition"

@@ -9,23 +9,24 @@ from typing import Any
 
 from fastapi import Depends, FastAPI, Request, Response
 
-from service.api.answers import OriginHeader, Revalidation, digest_of, tag_of
+from service.api.answers import ORIGIN_HEADER, Revalidation, digest_of, tag_of
 from service.api.auth.accounts import account_router, key_router
-from service.api.auth.authenticator import AccessDesk
+from service.api.auth.authenticator import Authenticator
 from service.api.auth.declared import Declared, declared
 from service.api.auth.gate import Gate, require_declared
 from service.api.auth.refusals import AuditTrail, Refusals
 from service.api.auth.sessions import session_router
 from service.api.context import Context
 from service.api.health import health_router, metrics_router
+from service.api.http.middleware import AddedHeaders
 from service.api.openapi import describe_access, describe_answers
 from service.api.problems import (
-    any_other_problem,
+    EVERY_OPERATION,
     install_problem_handlers,
     refuse_unknown_parameters,
 )
 from service.api.routes.alarm_rates import alarm_rate_router
-from service.api.routes.alarms import alarm_by_id_router, alarm_router, operation_router
+from service.api.routes.alarms import alarm_router, operation_router
 from service.api.routes.audit import audit_router
 from service.api.routes.baselines import baseline_action_router, baseline_router
 from service.api.routes.bearings import bearing_router
@@ -35,9 +36,9 @@ from service.api.routes.films import film_router
 from service.api.routes.motion import motion_router, recorded_motion_router
 from service.api.routes.notifications import delivery_router
 from service.api.routes.overview import overview_router
-from service.api.routes.plant import configuration_router, gap_router, plant_router, source_router
+from service.api.routes.plant import plant_router
 from service.api.routes.recordings import recording_router
-from service.api.routes.references import order1_reference_router, reference_router
+from service.api.routes.references import reference_router
 from service.api.routes.shaft_centre import centre_router
 from service.api.routes.spectra import spectra_router
 from service.api.routes.trends import trend_router
@@ -63,9 +64,9 @@ class GuardedApi(FastAPI):
         if self.openapi_url:
             self.add_route(self.openapi_url, self._published, include_in_schema=False)
 
-    def stand_behind(self, desk: AccessDesk) -> None:
+    def add_gate(self, authenticator: Authenticator) -> None:
         """Add the gate; middleware added later runs before it."""
-        self.add_middleware(Gate, declared=lambda: self.declared, desk=desk)
+        self.add_middleware(Gate, declared=lambda: self.declared, authenticator=authenticator)
 
     def require_declarations(self) -> None:
         """Collect the declarations of all routes; call this after the last route was added.
@@ -133,12 +134,12 @@ def create_app(context: Context) -> GuardedApi:
         openapi_url="/api/v1/openapi.json",
         docs_url=None,  # its pages load scripts from other sites
         redoc_url=None,
-        responses=any_other_problem(),
+        responses=EVERY_OPERATION,
     )
     app.add_middleware(Revalidation, clock=context.clock)
-    desk = context.access or AccessDesk(context.store.access, context.clock)
-    app.stand_behind(desk)
-    app.add_middleware(OriginHeader, origin=context.origin)
+    authenticator = context.access or Authenticator(context.store.access, context.clock)
+    app.add_gate(authenticator)
+    app.add_middleware(AddedHeaders, headers=[(ORIGIN_HEADER, context.origin.value)])
     refusals = context.refusals or Refusals(context.store.audit, context.clock)
     app.add_middleware(AuditTrail, refusals=refusals, clock=context.clock)
     install_problem_handlers(app)
@@ -147,9 +148,6 @@ def create_app(context: Context) -> GuardedApi:
         overview_router(context),
         plant_router(context),
         channel_router(context),
-        source_router(context),
-        configuration_router(context),
-        gap_router(context),
         bearing_router(context),
         trend_router(context),
         spectra_router(context),
@@ -160,18 +158,16 @@ def create_app(context: Context) -> GuardedApi:
         film_history_router(context),
         baseline_router(context),
         baseline_action_router(context),
-        alarm_router(context),
         alarm_rate_router(context),
-        order1_reference_router(context),
+        alarm_router(context),
         operation_router(context),
         recording_router(context),
         recorded_motion_router(context),
         delivery_router(context),
         audit_router(context),
-        alarm_by_id_router(context),
-        session_router(context, desk),
-        account_router(desk.registry),
-        key_router(context, desk.registry),
+        session_router(context, authenticator),
+        account_router(authenticator),
+        key_router(context, authenticator),
     ):
         app.include_router(router, dependencies=[Depends(refuse_unknown_parameters)])
     if context.metrics is not None:

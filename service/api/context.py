@@ -1,4 +1,4 @@
-"""What the routes work with."""
+"""Parts of the running service that routes use."""
 
 import pathlib
 from collections.abc import Awaitable, Callable, Mapping, Sequence, Set
@@ -18,7 +18,7 @@ from core.change.settings import FilmRules
 from core.monitor.assessment import Assessment
 from core.quality import Reason
 from core.samples.blocks import SampleBlock
-from service.api.auth.authenticator import AccessDesk
+from service.api.auth.authenticator import Authenticator
 from service.api.auth.refusals import Refusals
 from service.api.downloads import Downloads
 from service.api.load import LoadWatch
@@ -39,113 +39,92 @@ from service.settings.units import UnitSettings
 from service.store.port import Store
 
 
-class LiveLook(Protocol):
+class LiveState(Protocol):
     """Live state; see :class:`service.live.live_view.LiveView`."""
 
     @property
     def revision(self) -> int:
         """Number that changes with every link change and result."""
-        ...
 
     @property
     def store_error(self) -> str | None:
         """Why results are not stored or read; None if they are."""
-        ...
 
     @property
     def n_unstored(self) -> int:
         """Number of dropped findings."""
-        ...
 
     def status(self, unit: str) -> UnitStatus:
         """Return the state of the source of a unit."""
-        ...
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
         """Return the newest blocks of a unit; raise `NotAvailableError` if there are none."""
-        ...
 
     def newest_block(self, unit: str) -> SampleBlock | None:
         """Return the newest block of a unit; None without one."""
-        ...
 
     def why_no_samples(self, unit: str) -> Reason | None:
         """Return why the newest samples of a unit are not current; None if they are."""
-        ...
 
     def data_age_s(self, unit: str) -> float | None:
         """Return the age of the newest block; None without one."""
-        ...
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
         """Return the newest result with spectrum and orbit; raise as `blocks` does."""
-        ...
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:
         """Return the newest result; values that are not current are missing."""
-        ...
 
 
-class FilmBoard(Protocol):
+class FilmState(Protocol):
     """The films of all bearings; see :class:`service.measuring.films.FilmMonitor`."""
 
     @property
     def unwatched(self) -> Mapping[str, str]:
         """Why films are not watched, by unit."""
-        ...
 
     @property
     def settings(self) -> FilmAlarmSettings:
         """Settings of film monitoring."""
-        ...
 
     def rules(self, unit: str) -> FilmRules | None:
         """Return the film rules of a unit; None if its films are not watched."""
-        ...
 
     def place(self, unit: str, bearing: str) -> FilmPlace | None:
         """Return a bearing with its estimator; None if it is not watched."""
-        ...
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
         """Return the newest findings of a bearing."""
-        ...
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
         """Return the baseline in force of a bearing."""
-        ...
 
 
-class CaptureLook(Protocol):
+class CaptureStatus(Protocol):
     """Samples around alarms; see :class:`service.recordings.around_alarms.Captures`."""
 
     @property
     def error(self) -> str | None:
         """Why the newest recording failed; None if it did not."""
-        ...
 
     @property
     def trouble(self) -> str | None:
         """Why samples are not recorded now."""
-        ...
 
     @property
     def n_running(self) -> int:
         """Number of recordings in progress."""
-        ...
 
     @property
     def n_written(self) -> int:
         """Number of recordings finished since the start."""
-        ...
 
     @property
     def being_made(self) -> Set[tuple[str, int]]:
         """Alarms and occurrences of the recordings in progress."""
-        ...
 
 
-class Operators(Protocol):
+class OperationService(Protocol):
     """Carries out operations in the process that analyses the unit."""
 
     async def operate(self, id_: str, action: Action) -> Alarm:
@@ -160,7 +139,6 @@ class Operators(Protocol):
         CommandFailedError
             If no process carries it out, or the disk does not answer.
         """
-        ...
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
         """Carry out an action on the baselines of a bearing; it is stored on return.
@@ -172,19 +150,9 @@ class Operators(Protocol):
         CommandFailedError
             If no process carries it out.
         """
-        ...
 
     async def refer_to(self, reference: VectorReference) -> None:
         """Apply a 1× reference that was just stored."""
-        ...
-
-
-class DeliveryLook(Protocol):
-    """Receivers of alarm messages; see :class:`service.notifications.deliveries.Deliveries`."""
-
-    async def look(self) -> Sequence[ReceiverView]:
-        """Return the state of all receivers."""
-        ...
 
 
 UnitId = Annotated[str, Path(description="Identifier of a unit.", examples=["U1"])]
@@ -202,6 +170,8 @@ class Context:
     ----------
     refresh_s
         Period of results.
+    receivers
+        Returns the state of all receivers of alarm messages.
     evidence
         State of the evidence of alarms; None where none is kept.
     configuration
@@ -234,16 +204,16 @@ class Context:
 
     plant_name: str
     units: Mapping[str, UnitSettings]
-    live: LiveLook
+    live: LiveState
     store: Store
     clock: Clock
     refresh_s: float
     references: ReferencesInForce
     alarms: AlarmList
-    films: FilmBoard
-    operators: Operators
-    captures: CaptureLook
-    deliveries: DeliveryLook
+    films: FilmState
+    operators: OperationService
+    captures: CaptureStatus
+    receivers: Callable[[], Awaitable[Sequence[ReceiverView]]]
     origin: Origin = Origin.LIVE
     max_shelf_s: float = 86_400.0
     evidence: Callable[[], EvidenceStatus] | None = None
@@ -255,7 +225,7 @@ class Context:
     stored_trouble: Callable[[], str | None] = lambda: None
     refusals: Refusals | None = None
     sources: Mapping[str, TimedSource] = field(default_factory=dict)
-    access: AccessDesk | None = None
+    access: Authenticator | None = None
     space: SpaceWatch | None = None
     load: LoadWatch | None = None
     tape: ContinuousRecorder | None = None

@@ -30,46 +30,15 @@ class Refused(IntEnum):
     VIEWS = 2
 
 
-@dataclass(frozen=True)
-class LoadLimits:
-    """Limits above which requests for past values are refused; at twice these, live values too.
+MAX_DELAY_S, MAX_WAITING_SHARE, MAX_LAG_S = 2.0, 0.2, 1.0
+"""Waiting time of the oldest block, fill level of the queue to the analysis, and lasting delay of
+the event loop above which requests for past values are refused; at twice these, live values too.
 
-    In between, continuous recording stops (`service.recordings.continuous.pressure`).
-
-    Parameters
-    ----------
-    delay_s
-        Waiting time of the oldest block.
-    waiting_share
-        Fill level of the queue to the analysis, 0 to 1.
-    lag_s
-        Lasting delay of the event loop.
-    """
-
-    delay_s: float = 2.0
-    waiting_share: float = 0.2
-    lag_s: float = 1.0
+In between, continuous recording stops (`service.recordings.continuous_recorder`)."""
 
 
 @dataclass(frozen=True)
-class Load:
-    """Load of the service; fields as in `LoadLimits`."""
-
-    delay_s: float = 0.0
-    waiting_share: float = 0.0
-    lag_s: float = 0.0
-
-    def over(self, limits: LoadLimits) -> float:
-        """Return the largest ratio of a load to its limit."""
-        return max(
-            self.delay_s / limits.delay_s,
-            self.waiting_share / limits.waiting_share,
-            self.lag_s / limits.lag_s,
-        )
-
-
-@dataclass(frozen=True)
-class Strain:
+class RefusalState:
     """Level of refusal.
 
     Parameters
@@ -82,28 +51,28 @@ class Strain:
     relieved_s: float | None = None
 
 
-def advance(strain: Strain, over: float, now_s: float) -> Strain:
+def advance(state: RefusalState, over: float, now_s: float) -> RefusalState:
     """Update the level of refusal: raise it at once, lower it after `RELIEF_S`."""
     wanted = Refused(min(int(over), Refused.VIEWS))
-    if wanted >= strain.refused or over > RELIEF_SHARE * strain.refused:
-        return Strain(max(wanted, strain.refused))
-    if strain.relieved_s is None:
-        return replace(strain, relieved_s=now_s)
-    is_over = now_s - strain.relieved_s >= RELIEF_S
-    return Strain(Refused(strain.refused - 1)) if is_over else strain
+    if wanted >= state.refused or over > RELIEF_SHARE * state.refused:
+        return RefusalState(max(wanted, state.refused))
+    if state.relieved_s is None:
+        return replace(state, relieved_s=now_s)
+    is_over = now_s - state.relieved_s >= RELIEF_S
+    return RefusalState(Refused(state.refused - 1)) if is_over else state
 
 
 log = structlog.get_logger()
 
-LOOK_EVERY_S = 0.25
+CHECK_PERIOD_S = 0.25
 
-N_LOOKS = 4
+N_CHECKS = 4
 """Number of successive checks over the limit that make an overload."""
 
 
 WORDS = {
-    Refused.HISTORY: "questions about the past",
-    Refused.VIEWS: "questions about the past and views of now",
+    Refused.HISTORY: "requests for past values",
+    Refused.VIEWS: "requests for past and live values",
 }
 
 
@@ -116,17 +85,17 @@ class LoadWatch:
         Queue of blocks to the analysis.
     """
 
-    def __init__(self, bus: Bus, limits: LoadLimits, clock: Clock) -> None:
-        self._bus, self._limits, self._clock = bus, limits, clock
-        self._lags = deque([0.0] * N_LOOKS, N_LOOKS)
-        self._overs = deque([0.0] * N_LOOKS, N_LOOKS)
-        self._strain = Strain()
+    def __init__(self, bus: Bus, clock: Clock) -> None:
+        self._bus, self._clock = bus, clock
+        self._lags = deque([0.0] * N_CHECKS, N_CHECKS)
+        self._overs = deque([0.0] * N_CHECKS, N_CHECKS)
+        self._state = RefusalState()
         self.n_refused: Counter[Refused] = Counter()
 
     @property
     def refused(self) -> Refused:
         """Level of refusal now."""
-        return self._strain.refused
+        return self._state.refused
 
     @property
     def words(self) -> str | None:
@@ -141,9 +110,9 @@ class LoadWatch:
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Check periodically."""
         while True:
-            pulse.beat(LOOK_EVERY_S)
-            due_s = self._clock.monotonic_s() + LOOK_EVERY_S
-            await self._clock.sleep(LOOK_EVERY_S)
+            pulse.beat(CHECK_PERIOD_S)
+            due_s = self._clock.monotonic_s() + CHECK_PERIOD_S
+            await self._clock.sleep(CHECK_PERIOD_S)
             self.look(self._clock.monotonic_s() - due_s)
 
     def look(self, late_s: float) -> None:
@@ -155,31 +124,27 @@ class LoadWatch:
             Delay of the event loop.
         """
         self._lags.append(max(0.0, late_s))
-        bus = self._bus
-        load = Load(bus.oldest_wait_s, bus.depth / bus.capacity, self.lag_s)
-        self._overs.append(load.over(self._limits))
+        delay_s, waiting_share = self._bus.oldest_wait_s, self._bus.depth / self._bus.capacity
+        ratios = delay_s / MAX_DELAY_S, waiting_share / MAX_WAITING_SHARE, self.lag_s / MAX_LAG_S
+        self._overs.append(max(ratios))
         before = self.refused
-        self._strain = advance(self._strain, min(self._overs), self._clock.monotonic_s())
+        self._state = advance(self._state, min(self._overs), self._clock.monotonic_s())
         if self.refused != before:
-            _log(self.refused, load)
+            write = log.warning if self.refused else log.info
+            write(
+                "requests are refused" if self.refused else "requests are accepted again",
+                refused=self.refused.name.lower(),
+                delay_s=round(delay_s, 2),
+                waiting_share=round(waiting_share, 2),
+                lag_s=round(self.lag_s, 2),
+            )
 
-    def refuses(self, question: Refused) -> bool:
+    def refuses(self, refused_from: Refused) -> bool:
         """Whether a request of this kind is refused now; count it if so."""
-        if question is Refused.NOTHING or question > self.refused:
+        if refused_from is Refused.NOTHING or refused_from > self.refused:
             return False
-        self.n_refused[question] += 1
+        self.n_refused[refused_from] += 1
         return True
-
-
-def _log(refused: Refused, load: Load) -> None:
-    say = log.warning if refused else log.info
-    say(
-        "questions are refused" if refused else "questions are answered again",
-        refused=refused.name.lower(),
-        delay_s=round(load.delay_s, 2),
-        waiting_share=round(load.waiting_share, 2),
-        lag_s=round(load.lag_s, 2),
-    )
 
 
 VITAL = re.compile(
@@ -201,14 +166,14 @@ VIEWS = re.compile(
 READING = ("GET", "HEAD")
 
 
-def question(method: str, path: str) -> Refused:
+def refused_from(method: str, path: str) -> Refused:
     """Return the level of load that refuses a request; `Refused.NOTHING` for none."""
     if method not in READING or (VITAL.fullmatch(path) and path != "/api/v1/alarms/rates"):
         return Refused.NOTHING
     return Refused.VIEWS if VIEWS.fullmatch(path) else Refused.HISTORY
 
 
-BEHIND = Refusal(
+OVERLOADED = Refusal(
     503,
     "Too busy",
     "the service is overloaded and analyses samples first; try again later",
@@ -216,7 +181,7 @@ BEHIND = Refusal(
 )
 
 
-class Shedding:
+class LoadShedder:
     """ASGI middleware that refuses requests while the service cannot keep up."""
 
     def __init__(self, app: ASGIApp, load: LoadWatch) -> None:
@@ -224,8 +189,10 @@ class Shedding:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse a request or forward it."""
-        if scope["type"] == "http" and self._load.refuses(question(scope["method"], scope["path"])):
-            await BEHIND.send(scope, send)
+        if scope["type"] == "http" and self._load.refuses(
+            refused_from(scope["method"], scope["path"])
+        ):
+            await OVERLOADED.send(scope, send)
             return
         await self._app(scope, receive, send)
 
@@ -239,25 +206,25 @@ def load_metrics(load: LoadWatch | None) -> Iterator[Metric]:
         return
     yield counter(
         "questions_refused",
-        "Questions answered by 503 because the service was behind.",
+        "Requests rejected with 503 because the service was overloaded.",
         ("about",),
         [((kind.name.lower(),), load.n_refused[kind]) for kind in KINDS],
     )
     yield gauge(
         "refusing",
-        "1 while such questions are refused.",
+        "1 while such requests are rejected.",
         ("about",),
         [((kind.name.lower(),), load.refused >= kind) for kind in KINDS],
     )
     yield gauge(
         "event_loop_lag_seconds",
-        "By how much the program has been late at every look within the last second.",
+        "Smallest delay of the event loop within the last second.",
         (),
         [((), load.lag_s)],
     )
 
 
-class Allowance:
+class TokenBucket:
     """Token bucket.
 
     Parameters

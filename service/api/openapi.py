@@ -235,7 +235,7 @@ HEADERS = {
 }
 """Headers of every answer of the API."""
 
-OF_REFUSALS: dict[str, dict[str, Any]] = {
+PROBLEM_HEADERS: dict[str, dict[str, Any]] = {
     "401": {
         "WWW-Authenticate": {
             "description": "How a machine authenticates.",
@@ -292,7 +292,7 @@ def _add_examples(operation: dict[str, Any], examples: Examples) -> None:
 
 def _add_headers(operation: dict[str, Any]) -> None:
     for status, answer in operation["responses"].items():
-        common = HEADERS if status.startswith("2") else OF_REFUSALS.get(status, {})
+        common = HEADERS if status.startswith("2") else PROBLEM_HEADERS.get(status, {})
         if common:
             answer["headers"] = {**common, **answer.get("headers", {})}
 
@@ -324,7 +324,7 @@ NEEDED = "x-padwatch-needs"
 
 REFUSALS = {
     401: "Not authenticated",
-    403: "Not allowed, or asked for by a page of another site",
+    403: "Not allowed, or requested by a page of another site",
 }
 
 
@@ -341,5 +341,5 @@ def describe_access(document: dict[str, Any], operations: Mapping[str, Declared]
 
 
 def _add_refusals(responses: dict[str, Any]) -> None:
-    for status, said in REFUSALS.items():
-        responses.setdefault(str(status), {**responses["default"], "description": said})
+    for status, text in REFUSALS.items():
+        responses.setdefault(str(status), {**responses["default"], "description": text})

@@ -59,34 +59,39 @@ def require_order(start_ns: int, end_ns: int) -> None:
 Moment = Annotated[datetime, BeforeValidator(written_as_date)]
 
 
-Start = Annotated[
-    Moment,
-    Query(description="Start, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
-]
+def time_query(description: str, example: str) -> Any:
+    """Declare a query parameter for a time."""
+    return Query(description=description, examples=[example])
 
 
-End = Annotated[
-    Moment,
-    Query(description="End, RFC 3339 with offset.", examples=["2026-11-21T09:00:00Z"]),
-]
-
-FirstTime = Annotated[
-    Moment | None,
-    Query(description="First time, RFC 3339 with offset.", examples=["2026-11-21T08:00:00Z"]),
-]
-EndTime = Annotated[
-    Moment | None,
-    Query(description="End, RFC 3339 with offset.", examples=["2026-11-21T09:00:00Z"]),
-]
+_START = time_query("Start, RFC 3339 with offset.", "2026-11-21T08:00:00Z")
+_END = time_query("End, RFC 3339 with offset.", "2026-11-21T09:00:00Z")
 
 
 def _bound(description: str, example: float) -> Any:
     return Query(allow_inf_nan=False, description=description, examples=[example])
 
 
-async def time_range(start: Start, end: End) -> tuple[int, int]:
+def duration(longest_s: float, description: str, **options: Any) -> Any:
+    """Declare a query parameter for a duration, s."""
+    return Query(gt=0.0, le=longest_s, allow_inf_nan=False, description=description, **options)
+
+
+async def time_range(
+    start: Annotated[Moment, _START], end: Annotated[Moment, _END]
+) -> tuple[int, int]:
     """Return the checked time range."""
     start_ns, end_ns = ns_from_datetime(start, "start"), ns_from_datetime(end, "end")
+    require_order(start_ns, end_ns)
+    return start_ns, end_ns
+
+
+async def optional_time_range(
+    start: Annotated[Moment | None, _START] = None, end: Annotated[Moment | None, _END] = None
+) -> tuple[int, int]:
+    """Return the checked time range; an omitted end of it is unlimited."""
+    start_ns = ns_from_datetime(start, "start") if start else -(2**63)
+    end_ns = ns_from_datetime(end, "end") if end else 2**63 - 1
     require_order(start_ns, end_ns)
     return start_ns, end_ns
 
@@ -116,6 +121,10 @@ async def attitude_range(
 
 
 TimeRange = Annotated[tuple[int, int], Depends(time_range)]
+OptionalTimeRange = Annotated[tuple[int, int], Depends(optional_time_range)]
+Eccentricity = Annotated[ValueRange, Depends(eccentricity_range)]
+OilTemperature = Annotated[ValueRange, Depends(oil_temperature_range)]
+Attitude = Annotated[ValueRange, Depends(attitude_range)]
 
 
 def _ordered(low: float | None, high: float | None, parameter: str) -> ValueRange:
@@ -129,3 +138,17 @@ States = Annotated[
     list[OperatingStateName] | None,
     Query(description="Only in this operating state; may be repeated.", examples=[["full_load"]]),
 ]
+
+OnlyUnit = Annotated[
+    str | None, Query(max_length=32, description="Only this unit.", examples=["U1"])
+]
+
+
+def only(description: str, example: str, max_length: int | None = None) -> Any:
+    """Declare a query parameter that selects by text."""
+    return Query(max_length=max_length, description=f"Only this {description}.", examples=[example])
+
+
+def before_number(description: str) -> Any:
+    """Declare a query parameter for the number before which a page ends."""
+    return Query(ge=1, le=10**15, description=description, examples=[117])

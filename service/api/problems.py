@@ -26,11 +26,14 @@ MAX_MISTAKES = 8
 SCHEMAS = "#/components/schemas/"
 
 WORDS = {
+    403: "Not allowed, or requested by a page of another site",
     404: "Unknown unit or bearing",
-    409: "No result yet",
+    409: "Does not fit the present state",
+    410: "Damaged on the disk",
     422: "A wrong parameter",
-    503: "The store cannot be read",
+    503: "The store cannot be used",
 }
+"""Descriptions of problems by status."""
 
 log = structlog.get_logger()
 
@@ -77,19 +80,30 @@ class ProblemError(Exception):
         self.errors = [Mistake(parameter=parameter, detail=detail)] if parameter else []
 
 
-def problem_responses(*statuses: int) -> dict[int | str, dict[str, Any]]:
-    """Return OpenAPI entries for the problems of an operation."""
-    return {status: _documented(WORDS[status]) for status in statuses}
+def _documented(words: str) -> dict[str, Any]:
+    content = {"schema": {"$ref": f"{SCHEMAS}Problem"}}
+    return {"description": words, "content": {MEDIA_TYPE: content}}
 
 
-def described_problems(words: Mapping[int, str]) -> dict[int | str, dict[str, Any]]:
-    """Return OpenAPI entries for problems with their own descriptions."""
-    return {status: _documented(said) for status, said in words.items()}
+EVERY_OPERATION: dict[int | str, dict[str, Any]] = {
+    422: _documented(WORDS[422]),
+    "default": _documented("Any other problem"),
+}
+"""OpenAPI entries for problems of every operation."""
 
 
-def any_other_problem() -> dict[int | str, dict[str, Any]]:
-    """Return OpenAPI entries for problems of every operation."""
-    return {422: _documented(WORDS[422]), "default": _documented("Any other problem")}
+def problem_responses(
+    *statuses: int, own: Mapping[int, str] | None = None
+) -> dict[int | str, dict[str, Any]]:
+    """Return OpenAPI entries for the problems of an operation.
+
+    Parameters
+    ----------
+    own
+        Descriptions of further statuses that `WORDS` does not fit.
+    """
+    words = {status: WORDS[status] for status in statuses} | dict(own or {})
+    return {status: _documented(text) for status, text in words.items()}
 
 
 async def refuse_unknown_parameters(request: Request) -> None:
@@ -114,11 +128,6 @@ def problem_schemas() -> dict[str, Any]:
     return {**schema.pop("$defs"), "Problem": schema}
 
 
-def _documented(words: str) -> dict[str, Any]:
-    content = {"schema": {"$ref": f"{SCHEMAS}Problem"}}
-    return {"description": words, "content": {MEDIA_TYPE: content}}
-
-
 def install_problem_handlers(app: FastAPI) -> None:
     """Render all errors of an application as problem documents."""
 
@@ -130,8 +139,8 @@ def install_problem_handlers(app: FastAPI) -> None:
     async def _http(request: Request, error: HTTPException) -> Response:
         if error.status_code == 405 and (methods := _methods(request)):
             return _not_allowed(request, methods)
-        said = str(error.detail)
-        return _render(request, error.status_code, said, said, headers=error.headers)
+        text = str(error.detail)
+        return _render(request, error.status_code, text, text, headers=error.headers)
 
     @app.exception_handler(RequestValidationError)
     async def _validation(request: Request, error: RequestValidationError) -> Response:
@@ -154,7 +163,7 @@ def install_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(StoreError)
     async def _store(request: Request, error: StoreError) -> Response:
-        log.error("a query failed in the store", path=request.url.path, reason=str(error))
+        log.error("database query failed", path=request.url.path, reason=str(error))
         return _render(request, 503, "Store not available", "the store cannot be read just now")
 
     @app.exception_handler(NotAvailableError)

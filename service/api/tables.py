@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from io import BytesIO, StringIO
 from itertools import islice
-from typing import Annotated, Any, Literal
+from types import NoneType
+from typing import Annotated, Any, Literal, get_args
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -44,6 +45,16 @@ ARROW_TYPES: dict[ColumnKind, Any] = {
     "text": pa.string(),
     "flag": pa.bool_(),
 }
+
+
+COLUMN_KINDS: dict[type, ColumnKind] = {bool: "flag", int: "count", float: "number"}
+
+
+def kind_of(annotation: Any) -> ColumnKind:
+    """Return the kind of column for values of a type, or of a list of it, such as `list[int]`."""
+    inner = [each for each in get_args(annotation) if each is not NoneType]
+    is_leaf = not inner or isinstance(inner[0], str)  # text is a member of a Literal
+    return COLUMN_KINDS.get(annotation, "text") if is_leaf else kind_of(inner[0])
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,18 @@
 """Models that several subjects share: quality, reading, uncertainty, window, condition."""
 
 import math
-from typing import Annotated, Any, Literal, cast
+from collections.abc import Iterable
+from enum import Enum
+from types import SimpleNamespace
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 from pydantic import (
     AfterValidator,
+    AliasChoices,
+    AliasGenerator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     StringConstraints,
@@ -18,15 +24,44 @@ from core.condition.cells import BearingCondition, Cell, CellGrid, FilmCondition
 from core.condition.operating_state import OperatingState
 from core.monitor.assessment import AveragingWindow
 from core.monitor.catalogue import BY_NAME
-from core.quality import Level, Quality, Reading
+from core.quality import Level, Reading
 from core.spectra.cross_spectrum import BEARING_X, BEARING_Y, SHAFT_X, SHAFT_Y
 from service.runtime.times import rfc3339
 
 
 class ApiModel(BaseModel):
-    """Model of an answer, without NaN or infinity; field docstrings are its documentation."""
+    """Model of an answer, without NaN or infinity; field docstrings are its documentation.
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True)
+    A model can be made from the attributes of an object: a field takes the attribute of its name,
+    or of its name with the suffix ``_ns`` for times.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid",
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+        from_attributes=True,
+        populate_by_name=True,
+        alias_generator=AliasGenerator(validation_alias=lambda n: AliasChoices(n, f"{n}_ns")),
+    )
+
+    @classmethod
+    def of(cls, *sources: object, **values: object) -> Self:
+        """Return a model of given values and, for the other fields, of attributes of objects."""
+        return cls.model_validate(_Merged(SimpleNamespace(**values), *sources))
+
+
+class _Merged:
+    """Attributes of several objects; the first object with an attribute counts."""
+
+    def __init__(self, *sources: object) -> None:
+        self._sources = sources
+
+    def __getattr__(self, name: str) -> Any:
+        for source in self._sources:
+            if (value := getattr(source, name, ...)) is not ...:
+                return value
+        raise AttributeError(name)
 
 
 MAX_UNKNOWN = 8
@@ -36,7 +71,7 @@ MAX_UNKNOWN = 8
 class RequestModel(ApiModel):
     """Body of a request, without unknown members or type conversions."""
 
-    model_config = ConfigDict(strict=True)
+    model_config = ConfigDict(strict=True, alias_generator=None, from_attributes=False)
 
     @model_validator(mode="before")
     @classmethod
@@ -93,13 +128,66 @@ SpeedSourceName = Literal["key_phase", "slow_channel", "line", "rated"]
 
 RunoutName = Literal["applied", "no_vector", "other_probe", "not_slow_roll", "no_phase_reference"]
 
-Time = Annotated[str, Field(examples=["2026-11-21T09:03:12.400Z"])]
+
+def _time(value: object) -> object:
+    return rfc3339(value) if isinstance(value, int) else value
+
+
+def _name(value: object) -> object:
+    return value.name.lower() if isinstance(value, Enum) else value
+
+
+Time = Annotated[str, BeforeValidator(_time), Field(examples=["2026-11-21T09:03:12.400Z"])]
+"""Time, RFC 3339; given as text or in nanoseconds since 1970."""
+
+ByName = BeforeValidator(_name)
+"""Validator that replaces a member of an enumeration by its name in lower case."""
+
+
+class DatedAnswer(ApiModel):
+    """Answer with the present time, which its entity tag ignores."""
+
+    time: Time
+    """Present time."""
+
+
+class BearingAnswer(ApiModel):
+    """Answer about one bearing."""
+
+    unit: str
+    """Identifier of the unit."""
+
+    bearing: str
+    """Identifier of the bearing."""
+
+
+class BearingHistory(BearingAnswer):
+    """Answer about one bearing in a time range."""
+
+    start: Time
+    """Start of the requested range."""
+
+    end: Time
+    """End of the requested range."""
+
+
+class SampleRange(ApiModel):
+    """Consecutive samples of a unit."""
+
+    epoch: int
+    """Changes when the device restarts its count."""
+
+    first_index: int
+    """Index of the first sample."""
+
+    rate_hz: float
+    """Samples per second."""
 
 
 class QualityModel(ApiModel):
     """Quality of a value."""
 
-    level: LevelName
+    level: Annotated[LevelName, ByName]
     """Worst level of everything it is derived from."""
 
     reason: Annotated[str, Field(examples=["insufficient_excitation"])]
@@ -205,7 +293,7 @@ class FilmConditionModel(ApiModel):
     time: Time
     """Time."""
 
-    operating_state: OperatingStateName
+    operating_state: Annotated[OperatingStateName, ByName]
     """Operating state of the unit."""
 
     is_settled: bool
@@ -225,17 +313,17 @@ LEVEL_NAMES: dict[Level, LevelName] = {
 }
 
 
+def level_names(levels: Iterable[Level | None]) -> list[LevelName | None]:
+    """Return the names of levels."""
+    return [None if level is None else LEVEL_NAMES[level] for level in levels]
+
+
 PLACES: dict[PlaceName, int] = {
     "shaft_x": SHAFT_X,
     "shaft_y": SHAFT_Y,
     "bearing_x": BEARING_X,
     "bearing_y": BEARING_Y,
 }
-
-
-def quality_model(quality: Quality) -> QualityModel:
-    """Return the model of a quality."""
-    return QualityModel(level=LEVEL_NAMES[quality.level], reason=quality.reason.value)
 
 
 def reading_model(name: str, reading: Reading) -> ReadingModel:
@@ -264,16 +352,7 @@ def _uncertainty(reading: Reading) -> UncertaintyModel | None:
 
 def window_model(window: AveragingWindow) -> WindowModel:
     """Return the samples of a result."""
-    return WindowModel(
-        epoch=window.epoch,
-        first_index=window.first_index,
-        last_index=window.stop_index - 1,
-        n_segments=window.n_segments,
-        n_segments_wanted=window.n_segments_wanted,
-        n_voided=window.n_voided,
-        coverage=window.coverage,
-        duration_s=window.duration_s,
-    )
+    return WindowModel.of(window, last_index=window.stop_index - 1)
 
 
 STATE_NAMES = {state: cast("OperatingStateName", state.name.lower()) for state in OperatingState}
@@ -287,12 +366,10 @@ def states_named(names: list[OperatingStateName] | None) -> tuple[OperatingState
 def condition_model(
     time_ns: int, condition: BearingCondition, grid: CellGrid
 ) -> FilmConditionModel:
-    """Operating condition of a bearing."""
-    return FilmConditionModel(
-        time=rfc3339(time_ns),
-        operating_state=STATE_NAMES[condition.state],
-        is_settled=condition.is_settled,
-        cell=None if condition.cell is None else cell_model(condition.cell, grid),
+    """Return the operating condition of a bearing."""
+    cell = None if condition.cell is None else cell_model(condition.cell, grid)
+    return FilmConditionModel.of(
+        condition, time=time_ns, operating_state=condition.state, cell=cell
     )
 
 

@@ -32,7 +32,7 @@ from service.measuring.metrics import store_info
 from service.measuring.reported_alarms import SHARED
 from service.measuring.service_alarms import StreamStatus
 from service.measuring.sources import WatchedUnit
-from service.measuring.timings import Timings
+from service.measuring.timings import TimedMonitor, Timings
 from service.notifications.message import LiveContext
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.runtime.process import stop_on_signals

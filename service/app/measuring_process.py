@@ -8,7 +8,7 @@ from pathlib import Path
 from core.alarms.alarm import AlarmNews
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.api.load import LoadLimits, LoadWatch
+from service.api.load import LoadWatch
 from service.app.notifications import receivers_of
 from service.app.process import Ground
 from service.app.service_health import Pressure, health_of
@@ -160,7 +160,7 @@ async def analysis_on(
     )
     captures = captures_of(plant, origin, clock)
     recordings = waveform_keeper(plant, store, clock)
-    load = LoadWatch(bus, LoadLimits(), clock)
+    load = LoadWatch(bus, clock)
     pressure = Pressure(bus, recordings.is_full, lambda: bool(load.refused))
     tape = tape_of(plant, origin, clock, pressure.look)
     space = space_watch(plant, clock)

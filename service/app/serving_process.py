@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from functools import partial
 
 from acquisition.clock import Clock
-from service.api.auth.authenticator import AccessDesk
+from service.api.auth.authenticator import Authenticator
 from service.api.auth.refusals import Refusals
 from service.api.context import Context
 from service.api.http.listening import url_of
 from service.api.http.server import GuardedServer
-from service.api.load import Shedding
+from service.api.load import LoadShedder
 from service.app.measuring_process import Analysis
 from service.app.metrics import Watched, scrape
 from service.app.notifications import receivers_of
@@ -60,7 +60,7 @@ class Serving:
     ground: Ground
     server: GuardedServer
     listener: socket.socket
-    desk: AccessDesk
+    desk: Authenticator
     announce: Callable[[str], None]
     afterwards: Callable[[], object]
 
@@ -91,20 +91,20 @@ def serving_of(
     context: Context,
     ground: Ground,
     listener: socket.socket,
-    desk: AccessDesk,
+    desk: Authenticator,
     announce: Callable[[str], None],
     evidence: EvidenceDesk | None = None,
 ) -> Serving:
     """Build the server of a context; the OpenAPI document is rendered once, after the start."""
     app = application(context, evidence)
-    asked = app if context.load is None else Shedding(app, context.load)
+    asked = app if context.load is None else LoadShedder(app, context.load)
     server = server_of(asked, ground.plant, ground.clock)
     return Serving(ground, server, listener, desk, announce, afterwards=app.rendered)
 
 
 def context_of(
     analysis: Analysis,
-    desk: AccessDesk,
+    desk: Authenticator,
     refusals: Refusals,
     bus: Bus,
     sources: Mapping[str, TimedSource],
@@ -124,7 +124,7 @@ def context_of(
         films=analysis.films,
         operators=LocalCommands(analysis.alarms, analysis.films, analysis.recorder),
         captures=analysis.captures,
-        deliveries=analysis.deliveries,
+        receivers=analysis.deliveries.look,
         evidence=lambda: analysis.evidence.status,
         configuration=analysis.evidence.configuration,
         metrics=partial(scrape, metrics_of(analysis, bus, sources)),
@@ -222,7 +222,7 @@ async def replica_on(plant: PlantFile, store: Store, clock: Clock) -> Replica:
 
 
 def replica_context(
-    replica: Replica, desk: AccessDesk | None, refusals: Refusals | None, beats: Heartbeats
+    replica: Replica, desk: Authenticator | None, refusals: Refusals | None, beats: Heartbeats
 ) -> Context:
     """Return the context of the API in a process that only serves."""
     plant = replica.plant
@@ -240,7 +240,7 @@ def replica_context(
         films=replica.films,
         operators=CommandClient(replica.store, replica.alarms, replica.clock),
         captures=NoCaptures(),
-        deliveries=replica.deliveries,
+        receivers=replica.deliveries.look,
         metrics=ReplicaMetrics(bearings, *seen, replica.store.kind).scrape,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
         loops=beats.look,

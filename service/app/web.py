@@ -11,12 +11,12 @@ from fastapi import Depends
 from starlette.types import ASGIApp
 
 from acquisition.clock import Clock
-from service.api.answers import EditionHeader
+from service.api.answers import EDITION_HEADER
 from service.api.app import GuardedApi, create_app
-from service.api.auth.authenticator import AccessDesk
+from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
 from service.api.http.listening import listen, server_tls, socket_file
-from service.api.http.middleware import TrustedProxy
+from service.api.http.middleware import AddedHeaders, TrustedProxy
 from service.api.http.protocol import GuardedConfig
 from service.api.http.server import GuardedServer
 from service.api.problems import refuse_unknown_parameters
@@ -84,7 +84,7 @@ class ClosedError(Exception):
 
 def access_desk(
     plant: PlantFile, store: AccessStore, clock: Clock, is_demo: bool = False
-) -> AccessDesk:
+) -> Authenticator:
     """Build the access service, which authenticates requests.
 
     Parameters
@@ -113,7 +113,7 @@ def access_desk(
     if access.login or is_unix_socket or not is_loopback(service.host):
         local_role = None
     limits = SessionLimits(idle_s=60.0 * access.idle_min, absolute_s=3600.0 * access.longest_h)
-    return AccessDesk(store, clock, local_role, limits=limits)
+    return Authenticator(store, clock, local_role, limits=limits)
 
 
 def application(context: Context, evidence: EvidenceDesk | None = None) -> GuardedApi:
@@ -125,7 +125,7 @@ def application(context: Context, evidence: EvidenceDesk | None = None) -> Guard
         Service that hands out evidence of alarms; None if none is stored.
     """
     app = create_app(context)
-    app.add_middleware(EditionHeader, edition=edition())
+    app.add_middleware(AddedHeaders, headers=[(EDITION_HEADER, edition())])
     guarded = [Depends(refuse_unknown_parameters)]
     app.include_router(evidence_router(context, evidence), dependencies=guarded)
     app.include_router(dashboard_router())

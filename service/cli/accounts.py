@@ -10,7 +10,7 @@ import typer
 
 from acquisition.clock import SystemClock
 from service.api.auth.passwords import Hashing, PasswordRefusedError
-from service.api.auth.people import People, create_key
+from service.api.auth.people import AccountService, create_key
 from service.app.storage import has_store, open_store, store_name
 from service.cli.options import PasswordFd, PlantPath, fail, password_from, read_plant_file
 from service.runtime.process import made_by
@@ -151,7 +151,7 @@ def add(
     plant = read_plant_file(plant_file)
     password = password_from(password_fd, "padwatch users add")
     with access_of(plant, "padwatch users add", creates=True) as access:
-        added = People(access, Hashing()).add(name, role, password, SystemClock().now_ns())
+        added = AccountService(access, Hashing()).add(name, role, password, SystemClock().now_ns())
     typer.echo(f"{added}: added as {role}")
 
 
@@ -195,7 +195,7 @@ def set_password(plant_file: PlantPath, name: Name, password_fd: PasswordFd = No
     plant = read_plant_file(plant_file)
     password = password_from(password_fd, "padwatch users password")
     with access_of(plant, "padwatch users password") as access:
-        people = People(access, Hashing())
+        people = AccountService(access, Hashing())
         people.set_password(account_name(name), password, SystemClock().now_ns())
     typer.echo(f"{account_name(name)}: has a new password, its sessions are ended")
 

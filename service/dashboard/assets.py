@@ -1,4 +1,4 @@
-"""Files of the dashboard in memory, with media type and entity tag, and their edition."""
+"""Files of the dashboard in memory, with media types, entity tags and their edition."""
 
 import gzip
 import hashlib
@@ -17,7 +17,7 @@ MEDIA_TYPES = {
     "js": "text/javascript; charset=utf-8",
     "svg": "image/svg+xml",
 }
-"""Media types of the files that are served, by suffix; others are not served."""
+"""Media types of served files by suffix; other files are not served."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def plotly() -> Asset:
 def edition() -> str:
     """Return the edition of program, chart library and files, such as ``0.6.0-1f2e3d4c``.
 
-    An open page compares it with the edition of answers to find out that it is outdated.
+    An open page compares it with the edition of answers and so detects an upgrade.
     """
     tags = "".join(f"{path} {asset.etag}" for path, asset in sorted(pages().items()))
     tags += version("plotly")

@@ -45,8 +45,8 @@ def dashboard_router() -> APIRouter:
     return router
 
 
-# A page has some 130 files. They are in memory, so that none waits for a thread: twelve browsers
-# that open it at once would otherwise use up the places that there are for requests.
+# The page has about 130 files. They are sent from memory by the event loop: in threads, twelve
+# browsers that open the page together would reach the limit on concurrent requests.
 
 
 async def _index(request: Request) -> Response:
@@ -54,7 +54,7 @@ async def _index(request: Request) -> Response:
 
 
 def _plotly(request: Request) -> Response:
-    """In a thread: the first time, five megabytes are compressed."""
+    """Return the chart library, in a thread: the first call compresses five megabytes."""
     return _sent(plotly(), request, KEEP)
 
 

@@ -16,6 +16,7 @@ from core.samples.blocks import SampleBlock
 from service.live.live_view import LinkState, LiveView
 from service.measuring.sources import WatchedUnit
 from service.runtime.heartbeats import Heartbeats, Pulse
+from service.runtime.polls import TimedSource
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import structlog
 
 from acquisition.clock import Clock
 from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmNews
-from core.alarms.board import AlarmMemory
+from core.alarms.board import AlarmBoard, AlarmMemory
 from core.alarms.judgements import VectorReference
 from core.alarms.kinds import LINK_LOST
 from core.alarms.operation import Action

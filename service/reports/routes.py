@@ -17,7 +17,7 @@ from service.api.auth.declared import needs
 from service.api.auth.gate import identity_of
 from service.api.context import Context
 from service.api.downloads import Downloads, TooManyDownloadsError
-from service.api.problems import ProblemError, described_problems
+from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarm_models import LEVEL_NAMES
 from service.api.routes.alarms import AlarmId
 from service.api.values import ApiModel, Time
@@ -170,18 +170,16 @@ Number = Annotated[
     int, Path(ge=1, le=10**12, description="Which occurrence of the alarm.", examples=[3])
 ]
 
-LIST_PROBLEMS = described_problems(
-    {404: "Unknown alarm", 422: "A wrong parameter", 503: "The store cannot be read"}
-)
+LIST_PROBLEMS = problem_responses(422, 503, own={404: "Unknown alarm"})
 
-PROBLEMS = described_problems(
-    {
-        404: "Unknown alarm or occurrence, or there is no evidence of it: the detail says why",
+PROBLEMS = problem_responses(
+    422,
+    own={
+        404: "Unknown alarm or occurrence, or no evidence of it: the detail gives the reason",
         409: "Not on the disk yet",
-        422: "A wrong parameter",
         500: "Damaged on the disk",
-        503: "The store cannot be read, or too many bundles are on their way",
-    }
+        503: "The store cannot be read, or too many concurrent downloads",
+    },
 )
 
 WHY_NOT = {

@@ -1,6 +1,7 @@
 """Conversion of settings to values of core: machine, calibration, analysis and rules."""
 
 from collections.abc import Mapping
+from dataclasses import fields
 
 from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
@@ -30,19 +31,6 @@ from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.storage import Origin
 from service.settings.transducers import response_of
 from service.settings.units import UnitSettings
-
-ACCURACY_KEYS = {
-    "bracket_stiffness_uncertainty",
-    "bracket_mass_uncertainty",
-    "bracket_damping_uncertainty",
-    "cross_coupling_uncertainty",
-    "delay_uncertainty_s",
-    "gap_reference_uncertainty_um",
-    "thermal_growth_um",
-    "thermal_growth_change_um",
-    "clearance_uncertainty",
-}
-"""Keys of a bearing that state uncertainties."""
 
 
 def machine_of(settings: UnitSettings) -> Unit:
@@ -81,7 +69,7 @@ def _channel(settings: ChannelSettings) -> Channel:
 def _bearing(settings: BearingSettings, unit: UnitSettings) -> Bearing:
     gain = {channel.id: channel.gain_uncertainty for channel in unit.channel}
     return Bearing(
-        **settings.model_dump(exclude=ACCURACY_KEYS | {"alarms", "watched_estimator"}),
+        **settings.model_dump(include={field.name for field in fields(Bearing)}),
         accuracy=_accuracy(settings, gain),
         gap_accuracy=_gap_accuracy(settings, gain),
     )

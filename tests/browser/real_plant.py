@@ -14,7 +14,7 @@ from pathlib import Path
 from rigs.command_line import OPEN
 
 from service.api.auth.passwords import Hashing
-from service.api.auth.people import People
+from service.api.auth.people import AccountService
 from service.app.storage import open_store
 from service.cli.accounts import access_of
 from service.cli.offline.demo_history import fill
@@ -98,7 +98,7 @@ class Plant(ExitStack):
     def add_accounts(self) -> None:
         """Add an account of each role, named after it, before anything is started."""
         with access_of(self._plant_here(), "padwatch users add", creates=True) as access:
-            people = People(access, Hashing())
+            people = AccountService(access, Hashing())
             for role in Role:
                 people.add(role.value, role, PASSWORD, time.time_ns())
 

@@ -2,23 +2,22 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Depends, Path, Request
 from pydantic import FailFast, Field
 
-from service.api.auth.declared import Reach, needs
+from service.api.auth.authenticator import Authenticator
+from service.api.auth.declared import Reach, subject_router
 from service.api.auth.gate import identity_of, name_caller
 from service.api.auth.passwords import MAX_LENGTH, PasswordRefusedError, TooManyLoginsError
-from service.api.auth.people import AccessRegistry
+from service.api.auth.people import create_key
 from service.api.context import Context
-from service.api.problems import ProblemError, described_problems
+from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel, Time
-from service.runtime.times import rfc3339
 from service.store.access.identities import (
     MAX_DAYS,
     MAX_NAME,
-    ApiKey,
     Means,
     NameRefusedError,
     Permission,
@@ -139,27 +138,7 @@ class CreatedKeyModel(KeyModel):
 
 def account_model(account: Account) -> AccountModel:
     """Return an account without the hash of its password."""
-    return AccountModel(
-        name=account.name,
-        role=account.role.value,
-        created=rfc3339(account.created_ns),
-        password_set=rfc3339(account.password_ns),
-    )
-
-
-def key_model(key: ApiKey, now_ns: int) -> dict[str, Any]:
-    """Return a key without its digest."""
-    return {
-        "id": key.id,
-        "name": key.name,
-        "role": key.role.value,
-        "units": list(key.units),
-        "state": key.state(now_ns).value,
-        "created": rfc3339(key.created_ns),
-        "expires": rfc3339(key.expires_ns),
-        "used": None if key.used_ns is None else rfc3339(key.used_ns),
-        "revoked": None if key.revoked_ns is None else rfc3339(key.revoked_ns),
-    }
+    return AccountModel.of(account, password_set=account.password_ns)
 
 
 @contextmanager
@@ -188,49 +167,48 @@ AccountName = Annotated[
     str, Path(description="Name of an account.", max_length=256, examples=["anna"])
 ]
 
-READ_PROBLEMS = described_problems({503: "The store cannot be read"})
-
-CHANGE_PROBLEMS = described_problems(
-    {
-        403: "Not allowed, or asked for by a page of another site",
-        404: "Unknown account",
-        409: "Does not fit the present accounts",
+CHANGE_PROBLEMS = problem_responses(
+    403,
+    409,
+    503,
+    own={
+        404: "Unknown account or key",
         422: "A wrong parameter, or a name or password that is not accepted",
-        503: "Not stored",
-    }
+    },
 )
 
 
-def account_router(registry: AccessRegistry) -> APIRouter:
+def account_router(authenticator: Authenticator) -> APIRouter:
     """Return the routes of accounts."""
-    router = APIRouter(
-        prefix="/api/v1/accounts",
-        tags=["access"],
-        dependencies=[
-            needs(Permission.CHANGE_ACCESS, Reach.NO_UNIT),
-            Depends(name_caller),
-        ],
+    stored, people, work, now_ns = (
+        authenticator.store.accounts,
+        authenticator.people,
+        authenticator.work,
+        authenticator.clock.now_ns,
     )
+    router = subject_router("/accounts", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
+    router.dependencies.append(Depends(name_caller))
 
-    @router.get("", summary="Accounts", responses=READ_PROBLEMS)
+    @router.get("", summary="Accounts", responses=problem_responses(503))
     async def accounts() -> list[AccountModel]:
         """List all accounts by name."""
-        return [account_model(account) for account in await registry.accounts()]
+        return [account_model(account) for account in await work.run(stored.all)]
 
     @router.post("", summary="Add an account", status_code=201, responses=CHANGE_PROBLEMS)
     async def add(asked: NewAccountModel) -> AccountModel:
         """Add an account with a password to change at the first login."""
+        new = asked.name, Role(asked.role), asked.password
         with refusals_as_problems():
-            name = await registry.add(asked.name, Role(asked.role), asked.password)
-        return await _one(registry, name)
+            name = await work.run_hashing(lambda: people.add(*new, now_ns(), must_change=True))
+        return await _one(authenticator, name)
 
     @router.put("/{name}/role", summary="Change a role", responses=CHANGE_PROBLEMS)
     async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
         """Change the role of an account from its next request on."""
-        await _one(registry, name)
+        await _one(authenticator, name)
         with refusals_as_problems():
-            await registry.set_role(name, Role(asked.role))
-        return await _one(registry, name)
+            await work.run(lambda: stored.set_role(name, Role(asked.role), now_ns()))
+        return await _one(authenticator, name)
 
     @router.put("/{name}/password", summary="Set a password", responses=CHANGE_PROBLEMS)
     async def set_password(
@@ -240,10 +218,11 @@ def account_router(registry: AccessRegistry) -> APIRouter:
         if _is_own(request, name):
             detail = "change your own password with POST /session/password"
             raise ProblemError(409, "Does not fit", detail)
-        await _one(registry, name)
+        await _one(authenticator, name)
+        new = name, asked.password
         with refusals_as_problems():
-            await registry.set_password(name, asked.password, must_change=True)
-        return await _one(registry, name)
+            await work.run_hashing(lambda: people.set_password(*new, now_ns(), must_change=True))
+        return await _one(authenticator, name)
 
     @router.delete(
         "/{name}", summary="Remove an account", status_code=204, responses=CHANGE_PROBLEMS
@@ -252,9 +231,9 @@ def account_router(registry: AccessRegistry) -> APIRouter:
         """Remove an account and end its sessions; the own account cannot be removed."""
         if _is_own(request, name):
             raise ProblemError(409, "Does not fit", "you cannot remove your own account")
-        await _one(registry, name)
+        await _one(authenticator, name)
         with refusals_as_problems():
-            await registry.remove(name)
+            await work.run(lambda: stored.remove(name, now_ns()))
 
     return router
 
@@ -265,8 +244,8 @@ def _is_own(request: Request, name: str) -> bool:
     return identity.means is Means.SESSION and identity.name == name
 
 
-async def _one(registry: AccessRegistry, name: str) -> AccountModel:
-    found = await registry.account(name)
+async def _one(authenticator: Authenticator, name: str) -> AccountModel:
+    found = await authenticator.work.run(lambda: authenticator.store.accounts.get(name))
     if found is None:
         raise ProblemError(404, "Unknown account", "there is no such account")
     return account_model(found)
@@ -276,54 +255,36 @@ KeyId = Annotated[
     str, Path(description="Public part of a key.", max_length=64, examples=["5f0c6f3a9b1e"])
 ]
 
-KEY_READ_PROBLEMS = described_problems({503: "The store cannot be read"})
 
-KEY_CHANGE_PROBLEMS = described_problems(
-    {
-        403: "Not allowed, or asked for by a page of another site",
-        404: "Unknown key",
-        409: "No such key can be made",
-        422: "A wrong parameter, or a name that is not accepted",
-        503: "Not stored",
-    }
-)
-
-
-def key_router(context: Context, registry: AccessRegistry) -> APIRouter:
+def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
     """Return the routes of keys."""
-    router = APIRouter(
-        prefix="/api/v1/keys",
-        tags=["access"],
-        dependencies=[
-            needs(Permission.CHANGE_ACCESS, Reach.NO_UNIT),
-            Depends(name_caller),
-        ],
-    )
+    stored, work, clock = authenticator.store.keys, authenticator.work, authenticator.clock
+    router = subject_router("/keys", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
+    router.dependencies.append(Depends(name_caller))
 
-    @router.get("", summary="Keys", responses=KEY_READ_PROBLEMS)
+    @router.get("", summary="Keys", responses=problem_responses(503))
     async def keys() -> list[KeyModel]:
         """List all keys that were ever created, oldest first, without their secrets."""
-        now_ns = context.clock.now_ns()
-        return [KeyModel.model_validate(key_model(key, now_ns)) for key in await registry.keys()]
+        keys, now_ns = await work.run(stored.all), clock.now_ns()
+        return [KeyModel.of(key, state=key.state(now_ns)) for key in keys]
 
-    @router.post("", summary="Create a key", status_code=201, responses=KEY_CHANGE_PROBLEMS)
+    @router.post("", summary="Create a key", status_code=201, responses=CHANGE_PROBLEMS)
     async def create(asked: NewKeyModel) -> CreatedKeyModel:
         """Create a key for a machine and show it once."""
         for unit in asked.units:
             if unit not in context.units:
                 detail = "there is no such unit in this plant"
                 raise ProblemError(422, "Wrong parameter", detail, "units")
+        new, now_ns = (asked.name, Role(asked.role), asked.units, asked.days), clock.now_ns()
         with refusals_as_problems():
-            made, shown = await registry.create_key(
-                asked.name, Role(asked.role), asked.units, asked.days
-            )
-        about = key_model(made, context.clock.now_ns())
-        return CreatedKeyModel.model_validate({**about, "key": shown})
+            made, shown = await work.run(lambda: create_key(authenticator.store, *new, now_ns))
+        return CreatedKeyModel.of(made, state=made.state(now_ns), key=shown)
 
-    @router.delete("/{key}", summary="Revoke a key", status_code=204, responses=KEY_CHANGE_PROBLEMS)
+    @router.delete("/{key}", summary="Revoke a key", status_code=204, responses=CHANGE_PROBLEMS)
     async def revoke(key: KeyId) -> None:
         """Revoke a key permanently; repeating the request changes nothing."""
-        if not await registry.revoke_key(key):
+        if await work.run(lambda: stored.get(key)) is None:
             raise ProblemError(404, "Unknown key", "there is no such key")
+        await work.run(lambda: stored.revoke(key, clock.now_ns()))
 
     return router

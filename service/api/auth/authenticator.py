@@ -1,8 +1,8 @@
-"""Logins, and who is behind a request."""
+"""Logins, and identification of callers."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from enum import Enum, StrEnum, auto
+from enum import Enum, auto
 from functools import cached_property
 
 from starlette.types import Scope
@@ -10,8 +10,8 @@ from starlette.types import Scope
 from acquisition.clock import Clock
 from core.units import ns_from_s
 from service.api.auth.backoff import Backoff
-from service.api.auth.passwords import AccessWork, Hashing
-from service.api.auth.people import AccessRegistry, People
+from service.api.auth.passwords import AccessThreads, Hashing
+from service.api.auth.people import AccountService
 from service.settings.processes import is_loopback
 from service.store.access.identities import (
     LOCAL,
@@ -35,14 +35,6 @@ from service.store.access.port import AccessStore, Account
 def immediately(note: Callable[[], None]) -> None:
     """Call a function immediately."""
     note()
-
-
-class Refusal(StrEnum):
-    """Why credentials were refused; for logs, not for the caller."""
-
-    UNKNOWN = "unknown"
-    EXPIRED = "expired"
-    REVOKED = "revoked"
 
 
 @dataclass(frozen=True)
@@ -72,7 +64,7 @@ class NotLoggedIn:
     wait_s: float = 0.0
 
 
-class Doors:
+class CredentialChecker:
     """Checks passwords, sessions and keys. It blocks while hashing: call it from a thread.
 
     Parameters
@@ -126,28 +118,27 @@ class Doors:
         if is_token(token):
             self._store.sessions.end(digest(token))
 
-    def person(self, token: str, now_ns: int) -> Identity | Refusal:
-        """Return the identity of a session token."""
+    def person(self, token: str, now_ns: int) -> Identity | None:
+        """Return the identity of a session token; None if it is unknown or expired."""
         found = self._store.sessions.get(digest(token)) if is_token(token) else None
         if found is None:
-            return Refusal.UNKNOWN
+            return None
         session, account = found
         if not self._limits.is_live(session, now_ns):
             self._note(lambda: self._store.sessions.end(session.digest))
-            return Refusal.EXPIRED
+            return None
         if self._limits.is_news(session, now_ns):
             self._note(lambda: self._store.sessions.see(session.digest, now_ns))
         return _person(account)
 
-    def machine(self, key: str, now_ns: int) -> Identity | Refusal:
-        """Return the identity of a key."""
+    def machine(self, key: str, now_ns: int) -> Identity | None:
+        """Return the identity of a key; None if it is unknown, expired or revoked."""
         id_ = key_id(key)
         stored = None if id_ is None else self._store.keys.get(id_)
         if stored is None or not is_token_of(key, stored.digest):
-            return Refusal.UNKNOWN
-        state = stored.state(now_ns)
-        if state is not KeyState.VALID:
-            return Refusal.REVOKED if state is KeyState.REVOKED else Refusal.EXPIRED
+            return None
+        if stored.state(now_ns) is not KeyState.VALID:
+            return None
         if stored.is_news(now_ns):
             self._note(lambda: self._store.keys.see(stored.id, now_ns))
         return Identity(stored.name, stored.role, Means.KEY, stored.units)
@@ -242,7 +233,7 @@ def _cookies(values: Iterable[str], wanted: str) -> list[str]:
 
 
 PASSED_ON = (b"forwarded", b"x-forwarded-for", b"x-real-ip", b"via")
-"""Headers of a proxy, whose requests may come from anywhere."""
+"""Headers added by proxies; a forwarded request may come from any computer."""
 
 
 def is_from_here(scope: Scope) -> bool:
@@ -272,11 +263,13 @@ class Caller:
     must_log_in: bool
 
 
-class AccessDesk:
+class Authenticator:
     """Identifies callers and logs people in, without blocking the event loop.
 
     Parameters
     ----------
+    store
+        Accounts, sessions and keys.
     local_role
         Role of callers on this computer without credentials; None if they must log in.
     hashing
@@ -291,13 +284,9 @@ class AccessDesk:
         hashing: Hashing | None = None,
         limits: SessionLimits | None = None,
     ) -> None:
-        self._store, self._clock, self._limits = store, clock, limits
-        self.local_role = local_role
-        self._hashing = hashing or Hashing()
-        self._people = People(store, self._hashing)
-        self._work = AccessWork()
-        self._backoff = Backoff()
-        self.registry = AccessRegistry(store, self._people, self._work, clock)
+        self.store, self.clock, self.local_role = store, clock, local_role
+        self._hashing, self._limits, self._backoff = hashing or Hashing(), limits, Backoff()
+        self.people, self.work = AccountService(store, self._hashing), AccessThreads()
 
     async def caller(self, scope: Scope) -> Caller:
         """Identify the sender of a request.
@@ -324,15 +313,15 @@ class AccessDesk:
         TooManyLoginsError
             If there are too many concurrent logins.
         """
-        now_ns, ticks_ns = self._clock.now_ns(), ns_from_s(self._clock.monotonic_s())
-        return await self._work.hashed(
-            lambda: self._doors.log_in(name, password, peer, now_ns, ticks_ns),
+        now_ns, ticks_ns = self.clock.now_ns(), ns_from_s(self.clock.monotonic_s())
+        return await self.work.run_hashing(
+            lambda: self._checker.log_in(name, password, peer, now_ns, ticks_ns),
             is_known=self._backoff.knows(tidy_name(name), peer),
         )
 
     async def log_out(self, token: str) -> None:
         """End a session; an ended one is ignored."""
-        await self._work.looked_up(lambda: self._doors.log_out(token))
+        await self.work.run(lambda: self._checker.log_out(token))
 
     async def set_up(self, token: str, name: str, password: str) -> bool:
         """Create the first account, an admin; return whether the token was valid.
@@ -342,36 +331,36 @@ class AccessDesk:
         NameRefusedError, PasswordRefusedError, TooManyLoginsError
             If one is not accepted, or there are too many concurrent logins.
         """
-        now_ns = self._clock.now_ns()
-        return await self._work.hashed(
-            lambda: self._people.set_up(token, name, password, now_ns), is_known=False
+        now_ns = self.clock.now_ns()
+        return await self.work.run_hashing(
+            lambda: self.people.set_up(token, name, password, now_ns), is_known=False
         )
 
     async def offer_set_up(self) -> str | None:
         """Return a token for creating the first account; None if none is needed."""
         if self.local_role is Role.ADMIN:
             return None
-        now_ns = self._clock.now_ns()
-        return await self._work.looked_up(lambda: self._people.offer_set_up(now_ns))
+        now_ns = self.clock.now_ns()
+        return await self.work.run(lambda: self.people.offer_set_up(now_ns))
 
     async def has_accounts(self) -> bool:
         """Whether there is an account."""
-        return bool(await self._work.looked_up(self._store.accounts.all))
+        return bool(await self.work.run(self.store.accounts.all))
 
     def close(self) -> None:
         """Stop the threads; no further request is served."""
-        self._work.close()
+        self.work.close()
 
     async def _proven(self, shown: Credentials) -> Identity | None:
-        now_ns = self._clock.now_ns()
+        now_ns = self.clock.now_ns()
         if shown.kind is Kind.SESSION:
-            found = await self._work.looked_up(lambda: self._doors.person(shown.secret, now_ns))
-        elif shown.kind is Kind.KEY:
-            found = await self._work.looked_up(lambda: self._doors.machine(shown.secret, now_ns))
-        else:
-            return None
-        return None if isinstance(found, Refusal) else found
+            return await self.work.run(lambda: self._checker.person(shown.secret, now_ns))
+        if shown.kind is Kind.KEY:
+            return await self.work.run(lambda: self._checker.machine(shown.secret, now_ns))
+        return None
 
     @cached_property
-    def _doors(self) -> Doors:
-        return Doors(self._store, self._hashing, self._backoff, self._limits, self._work.note)
+    def _checker(self) -> CredentialChecker:
+        return CredentialChecker(
+            self.store, self._hashing, self._backoff, self._limits, self.work.note
+        )

@@ -38,10 +38,10 @@ class WaitRule:
         return round(min(doubled_s, self.longest_s) * NS_PER_S)
 
 
-OF_ACCOUNT = WaitRule(n_free=5, longest_s=60.0)
+ACCOUNT_RULE = WaitRule(n_free=5, longest_s=60.0)
 """Waits of an account; short, so that failures of others do not lock a person out."""
 
-OF_PEER = WaitRule(n_free=10, longest_s=900.0)
+PEER_RULE = WaitRule(n_free=10, longest_s=900.0)
 """Waits of an address; more failures are free, since a control room may share one."""
 
 
@@ -64,13 +64,13 @@ class Backoff:
 
     def __init__(
         self,
-        of_account: WaitRule = OF_ACCOUNT,
-        of_peer: WaitRule = OF_PEER,
+        of_account: WaitRule = ACCOUNT_RULE,
+        of_peer: WaitRule = PEER_RULE,
         max_remembered: int = MAX_REMEMBERED,
     ) -> None:
         self._lock = Lock()
-        self._accounts = FailureBook(of_account, max_remembered)
-        self._peers = FailureBook(of_peer, max_remembered)
+        self._accounts = FailureCounts(of_account, max_remembered)
+        self._peers = FailureCounts(of_peer, max_remembered)
         self._known: OrderedDict[tuple[str, str], None] = OrderedDict()
         self._max_remembered = max_remembered
 
@@ -81,7 +81,7 @@ class Backoff:
         Unknown names count too, so that waits reveal nothing. An attempt that must wait does not
         count.
         """
-        place = place_of(peer)
+        place = client_of(peer)
         with self._lock:
             is_known = (name, place) in self._known
             account_ns = 0 if is_known else self._accounts.wait(name, now_ns)
@@ -96,14 +96,14 @@ class Backoff:
     def knows(self, name: str, peer: str) -> bool:
         """Whether an account has logged in from a peer since the service started."""
         with self._lock:
-            return (name, place_of(peer)) in self._known
+            return (name, client_of(peer)) in self._known
 
     def succeeded(self, name: str, peer: str) -> None:
         """Remember the address of a login; earlier failures of that address remain.
 
         Otherwise the owner of one account could try others without limit by logging in between.
         """
-        place = place_of(peer)
+        place = client_of(peer)
         with self._lock:
             self._accounts.forget(name)
             self._peers.take_back(place)
@@ -113,7 +113,7 @@ class Backoff:
                 self._known.popitem(last=False)
 
 
-class FailureBook:
+class FailureCounts:
     """Failures by account or address; the least recently used is forgotten first."""
 
     def __init__(self, rule: WaitRule, max_remembered: int) -> None:
@@ -123,39 +123,39 @@ class FailureBook:
     def __len__(self) -> int:
         return len(self._failures)
 
-    def wait(self, whom: Hashable, now_ns: int) -> int:
+    def wait(self, key: Hashable, now_ns: int) -> int:
         """Return the time until the next attempt, ns."""
-        found = self._of_late(whom, now_ns)
+        found = self._recent(key, now_ns)
         if found is None:
             return 0
         return max(0, found.newest_ns + self._rule.wait_ns(found.number) - now_ns)
 
-    def add(self, whom: Hashable, now_ns: int) -> None:
+    def add(self, key: Hashable, now_ns: int) -> None:
         """Count a failure."""
-        before = self._of_late(whom, now_ns)
-        self._failures[whom] = Failures((before.number if before else 0) + 1, now_ns)
-        self._failures.move_to_end(whom)
+        before = self._recent(key, now_ns)
+        self._failures[key] = Failures((before.number if before else 0) + 1, now_ns)
+        self._failures.move_to_end(key)
         if len(self._failures) > self._max_remembered:
             self._failures.popitem(last=False)
 
-    def take_back(self, whom: Hashable) -> None:
+    def take_back(self, key: Hashable) -> None:
         """Count one failure less."""
-        found = self._failures.pop(whom, None)
+        found = self._failures.pop(key, None)
         if found is not None and found.number > 1:
-            self._failures[whom] = Failures(found.number - 1, found.newest_ns)
+            self._failures[key] = Failures(found.number - 1, found.newest_ns)
 
-    def forget(self, whom: Hashable) -> None:
+    def forget(self, key: Hashable) -> None:
         """Forget the failures."""
-        self._failures.pop(whom, None)
+        self._failures.pop(key, None)
 
-    def _of_late(self, whom: Hashable, now_ns: int) -> Failures | None:
-        found = self._failures.get(whom)
+    def _recent(self, key: Hashable, now_ns: int) -> Failures | None:
+        found = self._failures.get(key)
         if found is None or now_ns - found.newest_ns >= self._rule.forget_s * NS_PER_S:
             return None
         return found
 
 
-def place_of(peer: str) -> str:
+def client_of(peer: str) -> str:
     """Return the client of an address: an IPv4 address, an IPv6 network, or the text itself."""
     try:
         address = ip_address(peer.partition("%")[0])

@@ -1,4 +1,4 @@
-"""What each route needs, declared beside it; the service does not start without it."""
+"""Permissions that routes declare; the service does not start if a declaration is missing."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from enum import StrEnum
 from functools import cached_property
 from typing import Any
 
-from fastapi import Depends, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from fastapi.dependencies.models import Dependant
 from fastapi.routing import APIRoute, iter_route_contexts
 from starlette.routing import BaseRoute, Route
@@ -15,7 +15,7 @@ from service.store.access.identities import Permission
 
 
 class Reach(StrEnum):
-    """Units that a route concerns if its path names none."""
+    """Units that a route concerns if its path contains none."""
 
     PLANT = "plant"
     """All units; refused to a key of some units."""
@@ -29,7 +29,7 @@ class Reach(StrEnum):
 
 @dataclass(frozen=True)
 class Needs:
-    """What a route needs, as a dependency of it; no permission for open routes."""
+    """Permission and reach that a route requires; an open route requires no permission."""
 
     permission: Permission | None
     reach: Reach = Reach.PLANT
@@ -39,12 +39,19 @@ class Needs:
 
 
 def needs(permission: Permission, reach: Reach = Reach.PLANT) -> Any:
-    """Declare what a route, or every route of a router, needs."""
+    """Declare the permission of a route, or of all routes of a router."""
     return Depends(Needs(permission, reach))
 
 
 OPEN: Any = Depends(Needs(None, Reach.NO_UNIT))
 """Declares an open route."""
+
+
+def subject_router(
+    path: str, tag: str, permission: Permission = Permission.READ, reach: Reach = Reach.PLANT
+) -> APIRouter:
+    """Return a router for one subject; a single route may declare another permission."""
+    return APIRouter(prefix=f"/api/v1{path}", tags=[tag], dependencies=[needs(permission, reach)])
 
 
 class UndeclaredRouteError(Exception):
@@ -53,7 +60,7 @@ class UndeclaredRouteError(Exception):
 
 @dataclass(frozen=True)
 class Declared:
-    """A route with what it needs."""
+    """A route with its requirements."""
 
     method: str
     path: str
@@ -83,7 +90,7 @@ class Declared:
 
 
 def declared(app: FastAPI) -> Mapping[str, Declared]:
-    """Return what each operation of an application needs, by method and path.
+    """Return the requirements of each operation of an application, by method and path.
 
     Raises
     ------
@@ -120,13 +127,13 @@ def _all(app: FastAPI) -> Iterator[Declared]:
 def _needs_of(app: FastAPI, method: str, path: str, context: Any, route: BaseRoute) -> Needs:
     if isinstance(route, Route) and not isinstance(route, APIRoute) and path == app.openapi_url:
         return Needs(None, Reach.NO_UNIT)
-    said = _said(context.dependencies) if isinstance(route, APIRoute) else []
-    if not said:
-        raise UndeclaredRouteError(f"{method} {path}: does not declare what it needs or OPEN")
-    return said[-1]
+    found = _needs_in(context.dependencies) if isinstance(route, APIRoute) else []
+    if not found:
+        raise UndeclaredRouteError(f"{method} {path}: declares no permission; add needs() or OPEN")
+    return found[-1]
 
 
-def _said(dependencies: Sequence[Any]) -> list[Needs]:
+def _needs_in(dependencies: Sequence[Any]) -> list[Needs]:
     return [each.dependency for each in dependencies if isinstance(each.dependency, Needs)]
 
 

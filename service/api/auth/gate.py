@@ -1,13 +1,12 @@
-"""The gate before all routes: identifies the caller and compares it with what a route needs."""
+"""Identification of callers before all routes, and the check of their permissions."""
 
 from collections.abc import Callable, Iterable, Mapping
-from math import ceil
 from urllib.parse import urlsplit
 
 from fastapi import Request
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from service.api.auth.authenticator import AccessDesk, Caller, Kind
+from service.api.auth.authenticator import Authenticator, Caller, Kind
 from service.api.auth.declared import Declared, Reach
 from service.api.problems import ProblemError, problem_answer
 from service.store.access.audit_entries import acting, name_actor
@@ -21,23 +20,23 @@ OWN_SITES = (b"same-origin", b"none")
 """Values of `Sec-Fetch-Site` for pages of the dashboard and for typed addresses."""
 
 
-def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], must_say: bool) -> bool:
+def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], requires_origin: bool) -> bool:
     """Whether a request may come from a page of another origin (cross-site request forgery).
 
-    Browsers add cookies, and reach loopback, for pages of any site.
+    Browsers send cookies, and can reach loopback, for pages of any site.
 
     Parameters
     ----------
     scheme
         Scheme of the request.
-    must_say
+    requires_origin
         Whether a request without headers of its origin counts as foreign; browsers send them.
     """
     found = list(headers)
     hosts = _all(found, b"host")
     origins, sites = _all(found, b"origin"), _all(found, b"sec-fetch-site")
     if not origins and not sites:
-        return must_say
+        return requires_origin
     if any(site not in OWN_SITES for site in sites):
         return True
     return any(not _is_own(origin, scheme, hosts) for origin in origins)
@@ -67,39 +66,10 @@ def not_logged_in() -> ProblemError:
     return ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
 
 
-def wrong_login() -> ProblemError:
-    """Return the problem of a wrong name or password."""
-    detail = "the name or the password is wrong"
-    return ProblemError(401, "Not let in", detail, headers=BEARER_ONLY)
-
-
-def must_wait(wait_s: float) -> ProblemError:
-    """Return the problem of a login refused after too many failures."""
-    detail = "too many failed logins; wait before the next one"
-    return ProblemError(429, "Wait", detail, headers={"Retry-After": str(max(1, ceil(wait_s)))})
-
-
-def not_allowed() -> ProblemError:
-    """Return the problem of an insufficient role."""
-    return ProblemError(403, "Not allowed", "your role does not allow this")
-
-
-def must_change_password() -> ProblemError:
-    """Return the problem of a password that must be changed first."""
-    detail = "an administrator set your password; change it first"
-    return ProblemError(403, "Change your password", detail)
-
-
 def not_this_unit() -> ProblemError:
     """Return the problem of a key that is not valid for the unit."""
     detail = "this key is valid for some units only; request one of them"
     return ProblemError(403, "Not allowed", detail)
-
-
-def not_this_site() -> ProblemError:
-    """Return the problem of a request from another site."""
-    detail = "requests from pages of another site are refused"
-    return ProblemError(403, "Not from this site", detail)
 
 
 CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
@@ -114,13 +84,16 @@ class Gate:
     Parameters
     ----------
     declared
-        Returns what each operation needs.
+        Returns the requirements of each operation.
     """
 
     def __init__(
-        self, app: ASGIApp, declared: Callable[[], Mapping[str, Declared]], desk: AccessDesk
+        self,
+        app: ASGIApp,
+        declared: Callable[[], Mapping[str, Declared]],
+        authenticator: Authenticator,
     ) -> None:
-        self._app, self._declared, self._desk = app, declared, desk
+        self._app, self._declared, self._desk = app, declared, authenticator
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward an admitted request."""
@@ -158,9 +131,10 @@ def _require_own_page(scope: Scope, caller: Caller) -> None:
     """Refuse changes requested by a page of another origin."""
     if scope["method"] in SAFE or caller.shown.kind is Kind.KEY:
         return
-    must_say = caller.shown.kind is not Kind.NOTHING
-    if is_foreign(scope["scheme"], scope["headers"], must_say):
-        raise not_this_site()
+    requires_origin = caller.shown.kind is not Kind.NOTHING
+    if is_foreign(scope["scheme"], scope["headers"], requires_origin):
+        detail = "requests from pages of another site are refused"
+        raise ProblemError(403, "Not from this site", detail)
 
 
 def caller_of(request: Request) -> Caller:
@@ -170,7 +144,7 @@ def caller_of(request: Request) -> Caller:
 
 
 async def require_declared(request: Request) -> None:
-    """Require what a route declares; a dependency of all routes.
+    """Check the permission that a route declares; a dependency of all routes.
 
     Raises
     ------
@@ -185,9 +159,12 @@ async def require_declared(request: Request) -> None:
     if identity is None:
         raise not_logged_in()
     if identity.must_change_password and operation != CHANGE_PASSWORD:
-        raise must_change_password()
+        detail = "an administrator set your password; change it first"
+        raise ProblemError(403, "Change your password", detail)
     if not identity.role.may(needed.permission):
-        raise not_allowed() if identity.is_proven else not_logged_in()
+        if identity.is_proven:
+            raise ProblemError(403, "Not allowed", "your role does not allow this")
+        raise not_logged_in()
     unit = _unit_of(request.path_params)
     if needed.reach is Reach.ASKED:
         unit = _unit_asked(request)

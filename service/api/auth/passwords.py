@@ -136,7 +136,7 @@ class TooManyLoginsError(Exception):
     """Too many passwords wait to be hashed."""
 
 
-class AccessWork:
+class AccessThreads:
     """Threads for reads of the store, for hashing, and for writing times of use."""
 
     def __init__(self) -> None:
@@ -147,11 +147,11 @@ class AccessWork:
         self._notes = ThreadPoolExecutor(1, "notes")
         self._note_places = BoundedSemaphore(MAX_NOTES)
 
-    async def looked_up(self, look: Callable[[], T]) -> T:
+    async def run(self, look: Callable[[], T]) -> T:
         """Run a short read of the store in a thread."""
         return await asyncio.wrap_future(self._lookups.submit(copy_context().run, look))
 
-    async def hashed(self, work: Callable[[], T], is_known: bool = True) -> T:
+    async def run_hashing(self, work: Callable[[], T], is_known: bool = True) -> T:
         """Run a function that hashes a password in a thread.
 
         Parameters

@@ -2,9 +2,8 @@
 
 from collections.abc import Sequence
 
-from acquisition.clock import Clock
 from core.units import DAY_NS
-from service.api.auth.passwords import AccessWork, Hashing, new_password
+from service.api.auth.passwords import Hashing, new_password
 from service.store.access.identities import (
     MAX_DAYS,
     ApiKey,
@@ -15,14 +14,14 @@ from service.store.access.identities import (
     new_key,
     new_token,
 )
-from service.store.access.port import AccessRefusedError, AccessStore, Account
+from service.store.access.port import AccessRefusedError, AccessStore
 
 NS_PER_S = 1_000_000_000
 SET_UP_S = 3600.0
 """Validity of the set-up token, s."""
 
 
-class People:
+class AccountService:
     """Changes accounts. It blocks while hashing: call it from a thread.
 
     Parameters
@@ -123,92 +122,3 @@ def create_key(
     key = ApiKey(id_, account_name(name), digest(shown), role, open_units, now_ns, expires_ns)
     store.keys.add(key)
     return key, shown
-
-
-class AccessRegistry:
-    """Accounts and keys for the event loop; changes are stored on return.
-
-    Parameters
-    ----------
-    work
-        Threads that do the work.
-    """
-
-    def __init__(self, store: AccessStore, people: People, work: AccessWork, clock: Clock) -> None:
-        self._store, self._people, self._work, self._clock = store, people, work, clock
-
-    async def add(self, name: str, role: Role, password: str) -> str:
-        """Add an account whose password must be changed at the first login; return its name.
-
-        Raises
-        ------
-        NameRefusedError, PasswordRefusedError, AccessRefusedError, TooManyLoginsError
-            If one is not accepted, the name is taken, or there are too many concurrent logins.
-        """
-        now_ns = self._clock.now_ns()
-        return await self._work.hashed(
-            lambda: self._people.add(name, role, password, now_ns, must_change=True)
-        )
-
-    async def set_password(self, name: str, password: str, must_change: bool) -> None:
-        """Change a password; all sessions of the account end.
-
-        Parameters
-        ----------
-        must_change
-            Whether it must be changed at the next login, because an administrator sets it.
-
-        Raises
-        ------
-        PasswordRefusedError, AccessRefusedError, TooManyLoginsError
-            If it is not accepted, the account is unknown, or there are too many concurrent logins.
-        """
-        now_ns = self._clock.now_ns()
-        await self._work.hashed(
-            lambda: self._people.set_password(name, password, now_ns, must_change)
-        )
-
-    async def accounts(self) -> Sequence[Account]:
-        """Return all accounts by name."""
-        return await self._work.looked_up(self._store.accounts.all)
-
-    async def account(self, name: str) -> Account | None:
-        """Return an account; None if there is none of that name."""
-        return await self._work.looked_up(lambda: self._store.accounts.get(name))
-
-    async def set_role(self, name: str, role: Role) -> None:
-        """Change a role; raise `AccessRefusedError` without the account or for the last admin."""
-        now_ns = self._clock.now_ns()
-        await self._work.looked_up(lambda: self._store.accounts.set_role(name, role, now_ns))
-
-    async def remove(self, name: str) -> None:
-        """Remove an account; raise `AccessRefusedError` if that is not possible."""
-        now_ns = self._clock.now_ns()
-        await self._work.looked_up(lambda: self._store.accounts.remove(name, now_ns))
-
-    async def keys(self) -> Sequence[ApiKey]:
-        """Return all keys ever created, oldest first."""
-        return await self._work.looked_up(self._store.keys.all)
-
-    async def create_key(
-        self, name: str, role: Role, units: Sequence[str], days: int
-    ) -> tuple[ApiKey, str]:
-        """Create a key; return the stored part and the key itself.
-
-        Raises
-        ------
-        NameRefusedError, AccessRefusedError
-            If the name is not accepted, or the key is not possible.
-        """
-        now_ns = self._clock.now_ns()
-        return await self._work.looked_up(
-            lambda: create_key(self._store, name, role, units, days, now_ns)
-        )
-
-    async def revoke_key(self, id_: str) -> bool:
-        """Revoke a key permanently; return whether it exists."""
-        now_ns = self._clock.now_ns()
-        is_there = await self._work.looked_up(lambda: self._store.keys.get(id_)) is not None
-        if is_there:
-            await self._work.looked_up(lambda: self._store.keys.revoke(id_, now_ns))
-        return is_there

@@ -8,7 +8,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from acquisition.clock import Clock
 from service.api.auth.gate import SAFE
-from service.api.load import Allowance
+from service.api.load import TokenBucket
 from service.store.access.audit_entries import Acting, Deed, Source, acting, acting_as
 from service.store.audit_port import AuditStore
 from service.store.port import StoreError
@@ -33,7 +33,7 @@ class Refusals:
 
     def __init__(self, audit: AuditStore, clock: Clock) -> None:
         self._audit, self._clock = audit, clock
-        self._allowance = Allowance(N_AT_ONCE, SECONDS_EACH, clock.monotonic_s())
+        self._allowance = TokenBucket(N_AT_ONCE, SECONDS_EACH, clock.monotonic_s())
         self.n_more = 0
 
     async def note(self, deed: Deed, status: int) -> None:

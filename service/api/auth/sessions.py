@@ -2,6 +2,7 @@
 
 import asyncio
 from contextlib import suppress
+from math import ceil
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Request, Response
@@ -12,16 +13,16 @@ from service.api.auth.accounts import LoginName, Password, RoleName, refusals_as
 from service.api.auth.authenticator import (
     COOKIE,
     PLAIN_COOKIE,
-    AccessDesk,
+    Authenticator,
     Caller,
     Kind,
     LoggedIn,
     NotLoggedIn,
 )
 from service.api.auth.declared import OPEN, Reach, needs
-from service.api.auth.gate import caller_of, identity_of, must_wait, wrong_login
+from service.api.auth.gate import BEARER_ONLY, caller_of, identity_of
 from service.api.context import Context
-from service.api.problems import ProblemError, described_problems
+from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
 from service.store.access.audit_entries import Deed, acting, name_actor
 from service.store.access.identities import Identity, Means, Permission, Role
@@ -104,38 +105,35 @@ async def record(audit: AuditStore, clock: Clock, action: str, name: str) -> Non
     await asyncio.to_thread(audit.record, [deed])
 
 
-LOGIN_PROBLEMS = described_problems(
-    {
+LOGIN_PROBLEMS = problem_responses(
+    403,
+    422,
+    own={
         401: "The name or the password is wrong",
-        403: "Asked for by a page of another site",
-        422: "A wrong parameter",
         429: "Too many failed logins; Retry-After gives the wait",
-        503: "The store cannot be used, or too many log in at the same time",
-    }
+        503: "The store cannot be used, or too many concurrent logins",
+    },
 )
 
-PASSWORD_PROBLEMS = {
-    **LOGIN_PROBLEMS,
-    **described_problems({409: "The caller has no password"}),
-}
+PASSWORD_PROBLEMS = LOGIN_PROBLEMS | problem_responses(own={409: "The caller has no password"})
 
-SET_UP_PROBLEMS = described_problems(
-    {
+SET_UP_PROBLEMS = problem_responses(
+    503,
+    own={
         403: "The token is wrong or has been used, or there is an account already",
         422: "A wrong parameter, or a name or password that is not accepted",
-        503: "The store cannot be used",
-    }
+    },
 )
 
 
-def session_router(context: Context, desk: AccessDesk) -> APIRouter:
+def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
     """Return the routes of sessions."""
     router = APIRouter(prefix="/api/v1", tags=["access"])
 
     @router.get("/session", summary="The caller", dependencies=[OPEN])
     async def session(request: Request) -> SessionModel:
         """Show whether a login is needed, the caller, and its permissions."""
-        return await session_model(caller_of(request), desk)
+        return await session_model(caller_of(request), authenticator)
 
     @router.post(
         "/session",
@@ -146,16 +144,16 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
     )
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
         """Start a session, kept in a cookie; an earlier session of the browser ends."""
-        let_in = await _log_in(desk, request, asked.name, asked.password)
-        await _end(desk, caller_of(request))
-        await _record_login(context, desk, let_in)
-        return await _begun(desk, request, response, let_in)
+        logged_in = await _log_in(authenticator, request, asked.name, asked.password)
+        await _end(authenticator, caller_of(request))
+        await _record_login(context, authenticator, logged_in)
+        return await _begun(authenticator, request, response, logged_in)
 
     @router.delete("/session", summary="Log out", status_code=204, dependencies=[OPEN])
     async def log_out(request: Request, response: Response) -> None:
         """End the session, if there is one."""
         caller = caller_of(request)
-        await _end(desk, caller)
+        await _end(authenticator, caller)
         if caller.identity is not None and caller.identity.means is Means.SESSION:
             await record(context.store.audit, context.clock, ENDED, caller.identity.name)
         response.delete_cookie(COOKIE, secure=True, httponly=True, samesite="strict")
@@ -173,12 +171,15 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
     ) -> SessionModel:
         """Change the password; all sessions of the account end, and this browser gets a new one."""
         identity = _person(identity_of(request))
-        await _log_in(desk, request, identity.name, asked.password)
+        await _log_in(authenticator, request, identity.name, asked.password)
+        new = identity.name, asked.new_password
         with refusals_as_problems("new_password"):
-            await desk.registry.set_password(identity.name, asked.new_password, must_change=False)
-        let_in = await _log_in(desk, request, identity.name, asked.new_password)
-        await _record_login(context, desk, let_in)
-        return await _begun(desk, request, response, let_in)
+            await authenticator.work.run_hashing(
+                lambda: authenticator.people.set_password(*new, authenticator.clock.now_ns())
+            )
+        logged_in = await _log_in(authenticator, request, identity.name, asked.new_password)
+        await _record_login(context, authenticator, logged_in)
+        return await _begun(authenticator, request, response, logged_in)
 
     @router.post(
         "/set-up",
@@ -190,42 +191,53 @@ def session_router(context: Context, desk: AccessDesk) -> APIRouter:
     async def set_up(request: Request, asked: SetUpModel) -> SessionModel:
         """Create the first account, an admin, with the token printed by the service."""
         with refusals_as_problems():
-            is_made = await desk.set_up(asked.token, asked.name, asked.password)
+            is_made = await authenticator.set_up(asked.token, asked.name, asked.password)
         if not is_made:
             detail = "the token is wrong or used up, or there is an account already"
             raise ProblemError(403, "Not set up", detail)
-        return await session_model(caller_of(request), desk)
+        return await session_model(caller_of(request), authenticator)
 
     return router
 
 
-async def _log_in(desk: AccessDesk, request: Request, name: str, password: str) -> LoggedIn:
+async def _log_in(
+    authenticator: Authenticator, request: Request, name: str, password: str
+) -> LoggedIn:
     peer = request.client.host if request.client else ""
     with refusals_as_problems():
-        found = await desk.log_in(name, password, peer)
+        found = await authenticator.log_in(name, password, peer)
     if isinstance(found, NotLoggedIn):
-        raise must_wait(found.wait_s) if found.wait_s else wrong_login()
+        if not found.wait_s:
+            detail = "the name or the password is wrong"
+            raise ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
+        wait = {"Retry-After": str(max(1, ceil(found.wait_s)))}
+        detail = "too many failed logins; wait before the next one"
+        raise ProblemError(429, "Wait", detail, headers=wait)
     return found
 
 
-async def _record_login(context: Context, desk: AccessDesk, let_in: LoggedIn) -> None:
+async def _record_login(
+    context: Context, authenticator: Authenticator, logged_in: LoggedIn
+) -> None:
     """Record a login in the audit trail; end the session if that fails."""
     try:
-        await record(context.store.audit, context.clock, BEGUN, let_in.identity.name)
+        await record(context.store.audit, context.clock, BEGUN, logged_in.identity.name)
     except StoreError:
         with suppress(StoreError):
-            await desk.log_out(let_in.token)
+            await authenticator.log_out(logged_in.token)
         raise
 
 
 async def _begun(
-    desk: AccessDesk, request: Request, response: Response, let_in: LoggedIn
+    authenticator: Authenticator, request: Request, response: Response, logged_in: LoggedIn
 ) -> SessionModel:
     is_secure = _is_secure(request)
     name = COOKIE if is_secure else PLAIN_COOKIE
-    response.set_cookie(name, let_in.token, secure=is_secure, httponly=True, samesite="strict")
+    response.set_cookie(name, logged_in.token, secure=is_secure, httponly=True, samesite="strict")
     caller = caller_of(request)
-    return await session_model(Caller(let_in.identity, caller.shown, caller.must_log_in), desk)
+    return await session_model(
+        Caller(logged_in.identity, caller.shown, caller.must_log_in), authenticator
+    )
 
 
 def _is_secure(request: Request) -> bool:
@@ -233,9 +245,9 @@ def _is_secure(request: Request) -> bool:
     return "https" in (request.url.scheme, request.headers.get("origin", "").partition(":")[0])
 
 
-async def _end(desk: AccessDesk, caller: Caller) -> None:
+async def _end(authenticator: Authenticator, caller: Caller) -> None:
     if caller.shown.kind is Kind.SESSION:
-        await desk.log_out(caller.shown.secret)
+        await authenticator.log_out(caller.shown.secret)
 
 
 def _person(identity: Identity) -> Identity:
@@ -245,11 +257,11 @@ def _person(identity: Identity) -> Identity:
     return identity
 
 
-async def session_model(caller: Caller, desk: AccessDesk) -> SessionModel:
-    """The caller and its permissions."""
+async def session_model(caller: Caller, authenticator: Authenticator) -> SessionModel:
+    """Return the caller and its permissions."""
     identity = caller.identity
     may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
-    needs_set_up = not may_all and not await desk.has_accounts()
+    needs_set_up = not may_all and not await authenticator.has_accounts()
     return SessionModel(
         login_required=caller.must_log_in,
         set_up_needed=needs_set_up,

@@ -1,4 +1,4 @@
-"""What the HTTP server listens on: a port, a socket file, TLS."""
+"""Sockets of the HTTP server: port, socket file, TLS."""
 
 import os
 import socket
@@ -52,7 +52,7 @@ def socket_file(path: Path) -> Iterator[socket.socket]:
     PortInUseError
         If it cannot be created, is no socket, or is in use.
     """
-    _make_way(path)
+    _remove_stale(path)
     with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as listener:
         try:
             before = os.umask(0o777 & ~MODE)
@@ -69,7 +69,7 @@ def socket_file(path: Path) -> Iterator[socket.socket]:
             path.unlink(missing_ok=True)
 
 
-def _make_way(path: Path) -> None:
+def _remove_stale(path: Path) -> None:
     """Remove the socket file of a service that was killed."""
     try:
         mode = path.lstat().st_mode
@@ -85,7 +85,7 @@ def _make_way(path: Path) -> None:
         except OSError as error:
             raise PortInUseError(f"cannot listen on {path}: {error.strerror}") from error
         else:
-            raise PortInUseError(f"cannot listen on {path}: another program does")
+            raise PortInUseError(f"cannot listen on {path}: it is used by another program")
 
 
 class CertificateError(Exception):
@@ -111,7 +111,7 @@ def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
     except (ssl.SSLError, ValueError) as error:
         why = getattr(error, "reason", None) or str(error)
         raise CertificateError(
-            f"service.tls: {certificate} and {key} are no certificate and its key: {why}"
+            f"service.tls: {certificate} and {key} are not a certificate and its key: {why}"
         ) from error
     return context
 

@@ -2,7 +2,7 @@
 
 import asyncio
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from ipaddress import ip_address
 
 from starlette.datastructures import MutableHeaders
@@ -86,27 +86,23 @@ def _name(host: str) -> str:
     return found[1].strip("[]").rstrip(".").lower() if found else ""
 
 
-ALWAYS = (
-    (b"x-content-type-options", b"nosniff"),
-    (b"referrer-policy", b"no-referrer"),
-    (b"cross-origin-opener-policy", b"same-origin"),
-    (b"cross-origin-resource-policy", b"same-origin"),
-    (b"permissions-policy", b"camera=(), geolocation=(), microphone=(), payment=(), usb=()"),
+SECURITY_HEADERS = (
+    ("x-content-type-options", "nosniff"),
+    ("referrer-policy", "no-referrer"),
+    ("cross-origin-opener-policy", "same-origin"),
+    ("cross-origin-resource-policy", "same-origin"),
+    ("permissions-policy", "camera=(), geolocation=(), microphone=(), payment=(), usb=()"),
+    ("content-security-policy", "default-src 'none'; base-uri 'none'; frame-ancestors 'none'"),
+    ("cache-control", "no-store"),
 )
-"""Headers of every answer."""
-
-API_ONLY = (
-    (b"content-security-policy", b"default-src 'none'; base-uri 'none'; frame-ancestors 'none'"),
-    (b"cache-control", b"no-store"),
-)
-"""Headers of answers without their own, which dashboard and evidence report have."""
+"""Headers of every answer; dashboard and evidence report have their own values of some."""
 
 
-class SecurityHeaders:
-    """ASGI middleware that adds missing security headers."""
+class AddedHeaders:
+    """ASGI middleware that adds missing headers to all answers."""
 
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
+    def __init__(self, app: ASGIApp, headers: Sequence[tuple[str, str]]) -> None:
+        self._app, self._headers = app, headers
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request and add headers to the answer."""
@@ -114,8 +110,8 @@ class SecurityHeaders:
         async def completed(message: Message) -> None:
             if message["type"] == "http.response.start":
                 headers = MutableHeaders(scope=message)
-                for name, value in (*ALWAYS, *API_ONLY):
-                    headers.setdefault(name.decode(), value.decode())
+                for name, value in self._headers:
+                    headers.setdefault(name, value)
             await send(message)
 
         await self._app(scope, receive, completed)
@@ -197,12 +193,12 @@ class WholeBodies:
         if refusal is not None:
             await refusal.send(scope, send)
             return
-        await self._app(scope, _given(body, receive), send)
+        await self._app(scope, _replayed(body, receive), send)
 
     async def _body(self, scope: Scope, receive: Receive) -> bytes:
         limit = 1024 * self._limits.max_body_kb
         if any(
-            _says_more(value, limit)
+            _declares_more(value, limit)
             for name, value in scope["headers"]
             if name == b"content-length"
         ):
@@ -226,13 +222,13 @@ class WholeBodies:
         return TOO_DEEP if is_deeper_than(self._limits.max_json_depth, body) else None
 
 
-def _says_more(length: bytes, limit: int) -> bool:
+def _declares_more(length: bytes, limit: int) -> bool:
     digits = length.strip().lstrip(b"0")
     # int() of very long numbers is slow, and fails from 4300 digits
     return len(digits) > 18 or int(digits or b"0") > limit
 
 
-def _given(body: bytes, receive: Receive) -> Receive:
+def _replayed(body: bytes, receive: Receive) -> Receive:
     """Return a receiver of the body, then of the messages of the connection."""
     whole: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 
@@ -309,4 +305,4 @@ def guarded(answers: BoundedAnswers, limits: HttpLimitSettings, hosts: Iterable[
     Bodies are read before requests are counted, so that slow senders take no place.
     """
     bodies = WholeBodies(answers, limits)
-    return HeadRequests(SecurityHeaders(KnownHosts(bodies, hosts)))
+    return HeadRequests(AddedHeaders(KnownHosts(bodies, hosts), SECURITY_HEADERS))

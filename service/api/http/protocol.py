@@ -1,6 +1,7 @@
-"""Uvicorn's HTTP/1.1 protocol with deadlines, sizes and counts."""
+"""HTTP/1.1 protocol of uvicorn with limits on time, size and number of connections."""
 
 import asyncio
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 from enum import Enum, auto
 from typing import Any, cast
@@ -12,8 +13,7 @@ from uvicorn._types import ASGI3Application
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 from uvicorn.server import ServerState
 
-from service.api.http.connections import Connections
-from service.api.http.middleware import ALWAYS, API_ONLY, BoundedAnswers, guarded
+from service.api.http.middleware import SECURITY_HEADERS, BoundedAnswers, guarded
 from service.api.http.refusals import (
     FULL,
     HEAD_TOO_LARGE,
@@ -23,6 +23,93 @@ from service.api.http.refusals import (
     Refusal,
 )
 from service.settings.processes import HttpLimitSettings
+
+MAX_UNSENT_BYTES = 64 * 1024 * 1024
+"""Maximum total of unsent bytes; above it the largest answers are aborted."""
+
+MAX_PAUSE_S = 1.0
+"""Longest pause between sweeps that counts towards deadlines, s."""
+
+
+class Connections:
+    """The open connections of a server.
+
+    Parameters
+    ----------
+    now_s
+        Monotonic time, s.
+    """
+
+    def __init__(self, limits: HttpLimitSettings, now_s: Callable[[], float]) -> None:
+        self.limits, self.now_s = limits, now_s
+        self._of_peer: defaultdict[str, set[GuardedProtocol]] = defaultdict(set)
+        self._n_open = self.n_accepted = 0
+        self._swept_s = now_s()
+
+    def __len__(self) -> int:
+        return self._n_open
+
+    def admit(self, connection: "GuardedProtocol") -> bool:
+        """Add a connection; return False if there is no room for it."""
+        neighbours = self._of_peer[connection.peer]
+        if len(neighbours) >= self.limits.max_connections_per_peer:
+            has_room = _make_room(neighbours)
+        elif self._n_open >= self.limits.max_connections:
+            has_room = _make_room(self.all())
+        else:
+            has_room = True
+        # closing connections count until they are closed
+        neighbours.add(connection)
+        self._n_open += 1
+        self.n_accepted += 1
+        return has_room
+
+    def leave(self, connection: "GuardedProtocol") -> None:
+        """Remove a closed connection."""
+        neighbours = self._of_peer[connection.peer]
+        neighbours.remove(connection)
+        self._n_open -= 1
+        if not neighbours:
+            del self._of_peer[connection.peer]
+
+    def sweep(self) -> None:
+        """Close connections past a deadline; called periodically."""
+        now_s = self.now_s()
+        stalled_s = max(0.0, now_s - self._swept_s - MAX_PAUSE_S)
+        self._swept_s = now_s
+        for connection in self.all():
+            connection.extend_deadlines(stalled_s)
+            connection.check(now_s)
+        self._relieve()
+
+    def abort_all(self) -> None:
+        """Abort all connections."""
+        for connection in self.all():
+            connection.abort()
+
+    def all(self) -> set["GuardedProtocol"]:
+        """Return the open connections."""
+        return set().union(*self._of_peer.values())
+
+    def _relieve(self) -> None:
+        unsent = {each: n for each in self.all() if (n := each.n_unsent())}
+        total = sum(unsent.values())
+        for each in sorted(unsent, key=unsent.__getitem__, reverse=True):
+            if total <= MAX_UNSENT_BYTES:
+                return
+            total -= unsent[each]
+            each.abort()
+
+
+def _make_room(connections: set["GuardedProtocol"]) -> bool:
+    """Close the connection that waits longest, preferring those without a request."""
+    waiting = [(since, each) for each in connections if (since := each.waiting_since())]
+    if not waiting:
+        return False
+    _, longest = min(waiting, key=lambda pair: pair[0])
+    longest.close_idle()
+    return True
+
 
 STOP_S = 2
 """Time after which uvicorn cancels remaining requests, with tracebacks, s."""
@@ -101,7 +188,7 @@ class GuardedProtocol(HttpToolsProtocol):
         self._unsent_since_s: float | None = None
         self._n_head = self._n_wire = self._n_body = self._n_unsent = 0
         self._refusal: Refusal = NOT_HTTP
-        self._has_asked = self._is_deaf = False
+        self._has_sent_request = self._ignores_input = False
         self._running: RequestResponseCycle | None = None
 
     # callbacks of the transport
@@ -116,14 +203,14 @@ class GuardedProtocol(HttpToolsProtocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Remove the connection."""
         super().connection_lost(exc)
-        self._is_deaf = True
+        self._ignores_input = True
         self._drop_answers()
         self._all.leave(self)
 
     def data_received(self, data: bytes) -> None:
         """Parse bytes; malformed or oversized requests end the connection."""
         self._unset_keepalive_if_required()
-        if self._is_deaf:
+        if self._ignores_input:
             return
         try:
             self.parser.feed_data(data)
@@ -182,7 +269,7 @@ class GuardedProtocol(HttpToolsProtocol):
     def on_message_complete(self) -> None:
         """Finish a request."""
         super().on_message_complete()
-        self._has_asked = True
+        self._has_sent_request = True
         self._enter(Phase.NOTHING)
 
     def on_response_complete(self) -> None:
@@ -206,33 +293,33 @@ class GuardedProtocol(HttpToolsProtocol):
             pass  # already closing
         elif self.flow.read_paused and self._phase is not Phase.NOTHING:
             self._since_s = now_s  # reading is paused
-        elif now_s - self._since_s > self._patience_s():
+        elif now_s - self._since_s > self._time_limit_s():
             self._end(TOO_SLOW if self._phase is not Phase.NOTHING and self._n_wire else None)
 
-    def excuse(self, seconds: float) -> None:
+    def extend_deadlines(self, seconds: float) -> None:
         """Exclude a time in which the server was paused from the deadlines."""
         self._since_s += seconds
         if self._unsent_since_s is not None:
             self._unsent_since_s += seconds
 
-    def waits_since(self) -> tuple[bool, float] | None:
+    def waiting_since(self) -> tuple[bool, float] | None:
         """Return whether it ever sent a request, and the start of its wait; None if busy."""
         is_answered = self._phase is Phase.NOTHING and self._is_answering()
         if is_answered or self.transport.is_closing():
             return None
-        return self._has_asked, self._since_s
+        return self._has_sent_request, self._since_s
 
     def n_unsent(self) -> int:
         """Return the number of unsent bytes."""
         return self.transport.get_write_buffer_size()
 
-    def give_way(self) -> None:
+    def close_idle(self) -> None:
         """Close the connection in favour of another."""
         self._end(None)
 
     def abort(self) -> None:
         """Abort the connection."""
-        self._is_deaf = True
+        self._ignores_input = True
         self._drop_answers()
         self.transport.abort()
 
@@ -248,7 +335,7 @@ class GuardedProtocol(HttpToolsProtocol):
     def _enter(self, phase: Phase) -> None:
         self._phase, self._since_s = phase, self._all.now_s()
 
-    def _patience_s(self) -> float:
+    def _time_limit_s(self) -> float:
         if self._phase is Phase.HEAD:
             return self._limits.head_s
         if self._phase is Phase.BODY:
@@ -288,7 +375,7 @@ class GuardedProtocol(HttpToolsProtocol):
             self._end(self._refusal)
 
     def _answer_and_close(self) -> None:
-        self._is_deaf = True
+        self._ignores_input = True
         if self._is_answering():
             self.cycle.keep_alive = False
         else:
@@ -296,9 +383,9 @@ class GuardedProtocol(HttpToolsProtocol):
 
     def _end(self, refusal: Refusal | None) -> None:
         """Close the connection, with a problem document if possible."""
-        self._is_deaf = True
-        if refusal is not None and self._may_speak():
-            self.transport.write(refusal.on_the_wire([*ALWAYS, *API_ONLY]))
+        self._ignores_input = True
+        if refusal is not None and self._may_answer():
+            self.transport.write(refusal.as_http(SECURITY_HEADERS))
         self._drop_answers()
         self.transport.close()
 
@@ -311,7 +398,7 @@ class GuardedProtocol(HttpToolsProtocol):
                 cycle.disconnected = True
                 cycle.message_event.set()
 
-    def _may_speak(self) -> bool:
+    def _may_answer(self) -> bool:
         """Whether the server may write the next answer on this connection."""
         if self.transport.is_closing():
             return False

@@ -12,12 +12,10 @@ MEDIA_TYPE = b"application/problem+json"
 MAX_INSTANCE = 256
 """Maximum number of characters of a path in an answer."""
 
-Headers = Sequence[tuple[bytes, bytes]]
-
 
 @dataclass(frozen=True)
 class Refusal:
-    """A status with the words that always go with it; nothing of the request is repeated."""
+    """A fixed problem; only the path of the request is repeated."""
 
     status: int
     title: str
@@ -25,7 +23,7 @@ class Refusal:
     retry_after_s: int | None = None
 
     def body(self, instance: str = "") -> bytes:
-        """The problem document."""
+        """Return the problem document."""
         problem = {
             "type": "about:blank",
             "title": self.title,
@@ -37,22 +35,23 @@ class Refusal:
         return json.dumps(problem).encode()
 
     def headers(self, n_bytes: int) -> list[tuple[bytes, bytes]]:
-        """What goes with a document of this length."""
+        """Return the headers of a document of this length."""
         headers = [(b"content-type", MEDIA_TYPE), (b"content-length", b"%d" % n_bytes)]
         if self.retry_after_s is not None:
             headers.append((b"retry-after", b"%d" % self.retry_after_s))
         return headers
 
-    def on_the_wire(self, more: Headers) -> bytes:
-        """The whole answer, for a connection that is closed after it."""
+    def as_http(self, more: Sequence[tuple[str, str]]) -> bytes:
+        """Return the whole answer; the connection is closed after it."""
         body = self.body()
         line = b"HTTP/1.1 %d %s\r\n" % (self.status, HTTPStatus(self.status).phrase.encode())
-        headers = [*self.headers(len(body)), *more, (b"connection", b"close")]
+        added = [(name.encode(), value.encode()) for name, value in more]
+        headers = [*self.headers(len(body)), *added, (b"connection", b"close")]
         return line + b"".join(b"%s: %s\r\n" % header for header in headers) + b"\r\n" + body
 
     async def send(self, scope: Scope, send: Send) -> None:
-        """Answer a request with it."""
-        # what a path may hold beyond ASCII is escaped by JSON
+        """Send the answer to a request."""
+        # JSON escapes characters of the path beyond ASCII
         body = self.body(scope["path"])
         headers = self.headers(len(body))
         await send({"type": "http.response.start", "status": self.status, "headers": headers})

@@ -7,11 +7,10 @@ from contextlib import contextmanager
 
 import uvicorn
 
-from service.api.http.connections import Connections
-from service.api.http.protocol import STOP_S, GuardedConfig, GuardedProtocol
+from service.api.http.protocol import STOP_S, Connections, GuardedConfig, GuardedProtocol
 from service.runtime.heartbeats import UNHEARD, Pulse
 
-PATIENCE_S = 1.0
+SHUTDOWN_S = 1.0
 """Time for open requests when the server stops, s."""
 
 SWEEP_TICKS = 5
@@ -74,7 +73,7 @@ class GuardedServer(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop in time; clients that do not read their answers are disconnected."""
         # before uvicorn cancels tasks, which logs a traceback for each
-        patience = asyncio.get_running_loop().call_later(PATIENCE_S, self._give_up)
+        patience = asyncio.get_running_loop().call_later(SHUTDOWN_S, self._give_up)
         try:
             await super().shutdown(sockets)
         finally:

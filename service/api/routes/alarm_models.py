@@ -4,15 +4,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState, Hold
+from core.alarms.alarm import Alarm, AlarmIdentity, AlarmState
 from core.alarms.kinds import FILM_KINDS
 from core.condition.cells import CellGrid, OperatingPoint
-from core.limits import AlarmLevel, Judgement
-from service.api.context import FilmBoard
+from core.limits import AlarmLevel
+from service.api.context import FilmState
 from service.api.values import (
-    STATE_NAMES,
     ApiModel,
+    ByName,
     CellModel,
+    DatedAnswer,
     FilmConditionModel,
     OperatingStateName,
     Time,
@@ -20,7 +21,6 @@ from service.api.values import (
     condition_model,
 )
 from service.live.alarm_list import AlarmList
-from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import AlarmKindName, value_unit
 from service.settings.storage import Origin
 from service.store.port import StoredEvent
@@ -83,7 +83,7 @@ class HoldModel(ApiModel):
 class RaisedAtModel(ApiModel):
     """Operating condition under which an occurrence of an alarm was raised."""
 
-    operating_state: OperatingStateName
+    operating_state: Annotated[OperatingStateName, ByName]
     """Operating state of the unit."""
 
     eccentricity_ratio: Annotated[float | None, Field(examples=[0.37])]
@@ -118,7 +118,7 @@ class AlarmModel(ApiModel):
     state: AlarmStateName
     """State in the life cycle of ISA-18.2."""
 
-    level: AlarmLevelName | None
+    level: Annotated[AlarmLevelName, ByName] | None
     """Priority; null if the alarm is not active."""
 
     is_active: bool
@@ -191,11 +191,8 @@ class AlarmCountModel(ApiModel):
     """Not active, condition unknown."""
 
 
-class AlarmListModel(ApiModel):
+class AlarmListModel(DatedAnswer):
     """Alarms that are not normal, and alarms whose condition is unknown."""
-
-    time: Time
-    """Present time."""
 
     origin: OriginName
     """Whether this is live or a replay."""
@@ -234,7 +231,7 @@ class AlarmEventModel(ApiModel):
     change: AlarmChangeName
     """Kind of change."""
 
-    level: AlarmLevelName | None
+    level: Annotated[AlarmLevelName, ByName] | None
     """Level after the event; for a return to normal, the level before it."""
 
     state_before: AlarmStateName
@@ -282,59 +279,43 @@ class AlarmEventsModel(ApiModel):
 
 
 def alarm_list_model(
-    engine: AlarmList, films: FilmBoard, origin: Origin, now_ns: int
+    engine: AlarmList, films: FilmState, origin: Origin, now_ns: int
 ) -> AlarmListModel:
     """Return the alarm list."""
     alarms = engine.alarms
     listed = [alarm for alarm in alarms if alarm.state is not AlarmState.NORMAL]
     unjudged = [a for a in alarms if a.state is AlarmState.NORMAL and not engine.is_judged(a)]
-    return AlarmListModel(
-        time=rfc3339(now_ns),
-        origin=origin.value,
-        count=alarm_count_model(engine),
+    return AlarmListModel.of(
+        time=now_ns,
+        origin=origin,
+        count=engine.count(),
         alarms=[alarm_model(engine, films, alarm) for alarm in sorted(listed, key=_urgency)],
         unjudged=[alarm_model(engine, films, alarm) for alarm in unjudged],
     )
 
 
-def alarm_count_model(engine: AlarmList) -> AlarmCountModel:
-    """Numbers of alarms."""
-    return AlarmCountModel(**vars(engine.count()))
-
-
-def alarm_model(engine: AlarmList, films: FilmBoard, alarm: Alarm) -> AlarmModel:
+def alarm_model(engine: AlarmList, films: FilmState, alarm: Alarm) -> AlarmModel:
     """Return the model of an alarm."""
     identity, condition = alarm.identity, alarm.condition
     is_judged = engine.is_judged(alarm)
     unseen = "not_connected" if condition.is_known else str(condition.reason)
-    return AlarmModel(
-        id=identity.id,
-        unit=identity.unit,
-        subject=identity.subject,
-        kind=identity.kind,
-        state=alarm.state.value,
-        level=_level(alarm.level),
+    judged = "within_limits" if condition.level is None else "active"
+    return AlarmModel.of(
+        alarm,
+        identity,
+        condition,
         is_active=alarm.level is not None,
-        is_acknowledged=alarm.is_acknowledged,
-        is_latched=alarm.is_latched,
         is_chattering=engine.is_chattering(alarm),
-        occurrence=alarm.occurrence,
-        raised=None if alarm.raised_ns is None else rfc3339(alarm.raised_ns),
         raised_at=_raised_at(alarm.raised_at, grid_of(films)),
-        condition=_condition(condition) if is_judged else "unknown",
-        condition_reason=str(condition.reason) if is_judged else unseen,
-        value=condition.value,
-        limit=condition.limit,
+        condition=judged if is_judged else "unknown",
+        condition_reason=condition.reason if is_judged else unseen,
         value_unit=value_unit(identity.kind),
         film=_film(films, identity),
-        suppressed_by=alarm.suppressed_by,
-        shelf=_hold(alarm.shelf),
-        outage=_hold(alarm.outage),
     )
 
 
-def _film(films: FilmBoard, identity: AlarmIdentity) -> FilmConditionModel | None:
-    """Condition of the newest reading of a film, if the alarm is about one."""
+def _film(films: FilmState, identity: AlarmIdentity) -> FilmConditionModel | None:
+    """Return the condition of the newest reading of a film; None for other alarms."""
     if identity.kind not in FILM_KINDS:
         return None
     news, rules = films.newest(identity.unit, identity.subject), films.rules(identity.unit)
@@ -343,43 +324,20 @@ def _film(films: FilmBoard, identity: AlarmIdentity) -> FilmConditionModel | Non
     return condition_model(news.reading.time_ns, news.reading.condition, rules.grid)
 
 
-def alarm_events_model(
-    events: list[StoredEvent], origin: Origin, grid: CellGrid, *, there_is_more: bool
-) -> AlarmEventsModel:
-    """Return a page of alarm events."""
-    return AlarmEventsModel(
-        origin=origin.value,
-        events=[event_model(stored, grid) for stored in events],
-        next_before=events[-1].id if there_is_more else None,
-    )
-
-
-def grid_of(films: FilmBoard) -> CellGrid:
-    """Condition cells of all units."""
+def grid_of(films: FilmState) -> CellGrid:
+    """Return the grid of condition cells, the same for all units."""
     return films.settings.baseline.settings().grid
 
 
 def event_model(stored: StoredEvent, grid: CellGrid) -> AlarmEventModel:
     """Return the model of an alarm event."""
     event, identity = stored.event, stored.event.identity
-    return AlarmEventModel(
-        id=stored.id,
+    return AlarmEventModel.of(
+        stored,
+        event,
+        identity,
         alarm=identity.id,
-        unit=identity.unit,
-        subject=identity.subject,
-        kind=identity.kind,
-        number=event.number,
-        change=event.change.value,
-        level=_level(event.level),
-        state_before=event.state_before.value,
-        state_after=event.state_after.value,
-        time=rfc3339(event.time_ns),
-        occurrence=event.occurrence,
-        value=event.value,
-        limit=event.limit,
         value_unit=value_unit(identity.kind),
-        actor=event.actor,
-        reason=str(event.reason),
         raised_at=_raised_at(event.raised_at, grid),
     )
 
@@ -387,32 +345,7 @@ def event_model(stored: StoredEvent, grid: CellGrid) -> AlarmEventModel:
 def _raised_at(point: OperatingPoint | None, grid: CellGrid) -> RaisedAtModel | None:
     if point is None:
         return None
-    return RaisedAtModel(
-        operating_state=STATE_NAMES[point.state],
-        eccentricity_ratio=point.eccentricity_ratio,
-        attitude_deg=point.attitude_deg,
-        oil_temperature_c=point.oil_temperature_c,
-        cell=cell_of(point, grid),
-    )
-
-
-def _condition(condition: Judgement) -> ConditionName:
-    return "within_limits" if condition.level is None else "active"
-
-
-def _level(level: AlarmLevel | None) -> AlarmLevelName | None:
-    return None if level is None else LEVEL_NAMES[level]
-
-
-def _hold(hold: Hold | None) -> HoldModel | None:
-    if hold is None:
-        return None
-    return HoldModel(
-        actor=hold.actor,
-        reason=hold.reason,
-        since=rfc3339(hold.since_ns),
-        until=None if hold.until_ns is None else rfc3339(hold.until_ns),
-    )
+    return RaisedAtModel.of(point, operating_state=point.state, cell=cell_of(point, grid))
 
 
 def _urgency(alarm: Alarm) -> tuple[bool, bool, int, int]:

@@ -1,20 +1,20 @@
-"""How often alarms come."""
+"""Alarm rates."""
 
 import asyncio
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Annotated
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter
 from pydantic import Field
 
-from core.alarms.alarm import PLANT
+from core.alarms.alarm import PLANT, AlarmEvent
 from core.alarms.statistics import DAY_NS, AlarmFigures, ChatterRule, figures_of, stale_alarms
 from core.limits import AlarmLevel
-from service.api.auth.declared import Reach, needs
-from service.api.context import Context, FilmBoard
-from service.api.parameters import Moment, ns_from_datetime, require_order
-from service.api.problems import ProblemError, described_problems
+from service.api.auth.declared import Reach, subject_router
+from service.api.context import Context
+from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, require_order, time_query
+from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarm_models import (
     LEVEL_NAMES,
     AlarmIdText,
@@ -23,9 +23,6 @@ from service.api.routes.alarm_models import (
     alarm_model,
 )
 from service.api.values import ApiModel, Time
-from service.live.alarm_list import AlarmList
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
 from service.store.port import AlarmQuery, Store
 
 UnitKey = Annotated[str, Field(examples=["U1"])]
@@ -104,25 +101,12 @@ MAX_RATED = 100_000
 """Maximum number of events counted in one request."""
 
 
-@dataclass(frozen=True)
-class Counted:
-    """Figures of a time range.
+def counted(
+    store: Store, wanted: AlarmQuery, units: Sequence[str], rule: ChatterRule
+) -> dict[str, object]:
+    """Count stored events; return fields of the answer.
 
-    Parameters
-    ----------
-    start_ns, end_ns
-        Range that was counted; it starts later than requested if there were too many events.
-    """
-
-    start_ns: int
-    end_ns: int
-    is_complete: bool
-    all: AlarmFigures
-    units: Mapping[str, AlarmFigures]
-
-
-def counted(store: Store, wanted: AlarmQuery, units: Sequence[str], rule: ChatterRule) -> Counted:
-    """Count stored events; a hundred thousand take seconds, so call it in a thread.
+    A hundred thousand events take seconds: call it in a thread.
 
     Parameters
     ----------
@@ -144,81 +128,44 @@ def counted(store: Store, wanted: AlarmQuery, units: Sequence[str], rule: Chatte
         start_ns = min(events[0].time_ns + 1, end_ns - 1)
     found = {event.identity.unit for event in events}
     names = [*units, *([PLANT] if PLANT in found and PLANT not in units else [])]
-    return Counted(
-        start_ns,
-        end_ns,
-        is_complete,
-        figures_of(events, start_ns, end_ns, rule),
-        {
-            unit: figures_of((e for e in events if e.identity.unit == unit), start_ns, end_ns, rule)
-            for unit in names
-        },
-    )
 
+    def figures(some: Iterable[AlarmEvent]) -> AlarmFiguresModel:
+        return _figures_model(figures_of(some, start_ns, end_ns, rule))
 
-def alarm_rates_model(
-    engine: AlarmList, films: FilmBoard, found: Counted, shown: Collection[str], now_ns: int
-) -> AlarmRatesModel:
-    """Return figures, and the stale alarms of the shown units."""
-    stale = [a for a in stale_alarms(engine.alarms, now_ns) if a.identity.unit in shown]
-    return AlarmRatesModel(
-        start=rfc3339(found.start_ns),
-        end=rfc3339(found.end_ns),
-        is_complete=found.is_complete,
-        all=_figures_model(found.all),
-        units={unit: _figures_model(figures) for unit, figures in found.units.items()},
-        stale=[alarm_model(engine, films, alarm) for alarm in stale],
-    )
+    return {
+        "start": start_ns,
+        "end": end_ns,
+        "is_complete": is_complete,
+        "all": figures(events),
+        "units": {n: figures(e for e in events if e.identity.unit == n) for n in names},
+    }
 
 
 def _figures_model(figures: AlarmFigures) -> AlarmFiguresModel:
-    return AlarmFiguresModel(
-        n_alarms=figures.n_alarms,
-        per_day=figures.per_day,
-        per_10_min=figures.per_10_min,
-        most_in_10_min=figures.most_in_10_min,
-        share_in_flood=figures.share_in_flood,
-        n_by_level={LEVEL_NAMES[level]: figures.n_by_level[level] for level in AlarmLevel},
-        share_by_level={
-            LEVEL_NAMES[level]: figures.n_by_level[level] / max(figures.n_alarms, 1)
-            for level in AlarmLevel
-        },
-        most_frequent=[FrequentModel(**vars(entry)) for entry in figures.most_frequent],
-        chattering=dict(figures.chattering),
-        n_fleeting=figures.n_fleeting,
-    )
+    n_by_level = {LEVEL_NAMES[level]: figures.n_by_level[level] for level in AlarmLevel}
+    n_alarms = max(figures.n_alarms, 1)
+    share_by_level = {name: n / n_alarms for name, n in n_by_level.items()}
+    return AlarmFiguresModel.of(figures, n_by_level=n_by_level, share_by_level=share_by_level)
 
 
 DEFAULT_DAYS, MAX_DAYS = 7, 400
 
-RATE_PROBLEMS = described_problems(
-    {404: "Unknown unit", 422: "A wrong parameter", 503: "The store cannot be read"}
-)
+START = "Start of the range; default: seven days before its end.", "2026-11-14T09:00:00Z"
+END = "End of the range; default: now.", "2026-11-21T09:00:00Z"
 
 
 def alarm_rate_router(context: Context) -> APIRouter:
     """Return the route of alarm rates."""
-    router = APIRouter(
-        prefix="/api/v1/alarms", tags=["alarms"], dependencies=[needs(Permission.READ, Reach.ASKED)]
-    )
+    router = subject_router("/alarms", "alarms", reach=Reach.ASKED)
+    engine, films = context.alarms, context.films
 
-    @router.get("/rates", summary="How often alarms come", responses=RATE_PROBLEMS)
+    @router.get(
+        "/rates", summary="How often alarms come", responses=problem_responses(404, 422, 503)
+    )
     async def rates(
-        unit: Annotated[
-            str | None,
-            Query(max_length=32, description="Only this unit.", examples=["U1"]),
-        ] = None,
-        start: Annotated[
-            Moment | None,
-            Query(
-                description="Start of the range; default: seven days before its end.",
-                examples=["2026-11-14T09:00:00Z"],
-            ),
-        ] = None,
-        end: Annotated[
-            Moment | None,
-            Query(description="End of the range; default: now.", examples=["2026-11-21T09:00:00Z"]),
-        ] = None,
+        unit: OnlyUnit = None,
+        start: Annotated[Moment | None, time_query(*START)] = None,
+        end: Annotated[Moment | None, time_query(*END)] = None,
     ) -> AlarmRatesModel:
         """Count alarms per ten minutes and per day; name frequent, chattering and stale alarms.
 
@@ -233,10 +180,10 @@ def alarm_rate_router(context: Context) -> APIRouter:
             context.unit(unit)
         units = list(context.units) if unit is None else [unit]
         wanted = AlarmQuery(unit=unit, start_ns=start_ns, end_ns=end_ns)
-        rule = context.alarms.chatter_rule
-        found = await asyncio.to_thread(counted, context.store, wanted, units, rule)
+        found = await asyncio.to_thread(counted, context.store, wanted, units, engine.chatter_rule)
         shown = {*units, PLANT} if unit is None else {unit}
-        return alarm_rates_model(context.alarms, context.films, found, shown, now_ns)
+        stale = [a for a in stale_alarms(engine.alarms, now_ns) if a.identity.unit in shown]
+        return AlarmRatesModel.of(stale=[alarm_model(engine, films, a) for a in stale], **found)
 
     return router
 

@@ -1,4 +1,4 @@
-"""The list of alarms, their events, and what operators do to them."""
+"""Alarm list, alarm events, and operations on alarms."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,44 +20,38 @@ from core.alarms.operation import (
 )
 from core.condition.cells import CellGrid
 from core.units import ns_from_s
-from service.api.answers import SharedAnswer, rendered, worked
-from service.api.auth.declared import Reach, needs
+from service.api.answers import SharedAnswer, in_thread, rendered
+from service.api.auth.declared import Reach, needs, subject_router
 from service.api.auth.gate import actor_or, identity_of
 from service.api.context import Context
-from service.api.load import Allowance
+from service.api.load import TokenBucket
 from service.api.parameters import (
-    EndTime,
-    FirstTime,
+    Attitude,
+    Eccentricity,
+    OilTemperature,
+    OnlyUnit,
+    OptionalTimeRange,
     States,
-    attitude_range,
-    eccentricity_range,
-    ns_from_datetime,
-    oil_temperature_range,
-    require_order,
+    before_number,
+    only,
 )
-from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.problems import ProblemError, problem_responses
 from service.api.routes.alarm_models import (
     AlarmEventModel,
     AlarmEventsModel,
     AlarmListModel,
     AlarmModel,
-    alarm_events_model,
+    RaisedAtModel,
     alarm_list_model,
     alarm_model,
     event_model,
     grid_of,
 )
-from service.api.tables import Column, ColumnKind, Format, table_content, table_response
-from service.api.values import (
-    ActorModel,
-    NoteText,
-    ReasonText,
-    states_named,
-)
+from service.api.tables import Column, Format, kind_of, table_content, table_response
+from service.api.values import ActorModel, ApiModel, NoteText, ReasonText, states_named
 from service.settings.alarm_kinds import AlarmKindName
 from service.store.access.identities import Permission
 from service.store.port import AlarmQuery, StoredEvent
-from service.store.value_range import ValueRange
 
 
 class AcknowledgeModel(ActorModel):
@@ -94,23 +88,13 @@ class OutageModel(ActorModel):
     """Reason, 1 to 500 printable characters."""
 
 
-COLUMN_KINDS: dict[str, ColumnKind] = {
-    "id": "count",
-    "number": "count",
-    "occurrence": "count",
-    "value": "number",
-    "limit": "number",
+RAISED_AT = {
+    "operating_state": None,
+    "eccentricity_ratio": "1",
+    "attitude_deg": "deg",
+    "oil_temperature_c": "°C",
 }
-"""Columns that are not text."""
-
-
-RAISED_AT: dict[str, tuple[ColumnKind, str | None]] = {
-    "operating_state": ("text", None),
-    "eccentricity_ratio": ("number", "1"),
-    "attitude_deg": ("number", "deg"),
-    "oil_temperature_c": ("number", "°C"),
-}
-"""Columns of the operating condition when an occurrence was raised, with their units."""
+"""Units of the columns of the operating condition when an occurrence was raised."""
 
 
 def event_table(events: Sequence[StoredEvent], grid: CellGrid) -> list[Column]:
@@ -121,16 +105,16 @@ def event_table(events: Sequence[StoredEvent], grid: CellGrid) -> list[Column]:
     points = [row.raised_at for row in rows]
     return [
         times,
-        *(_column(name, rows) for name in flat),
-        *(
-            Column(name, kind, [point and getattr(point, name) for point in points], unit)
-            for name, (kind, unit) in RAISED_AT.items()
-        ),
+        *(_column(AlarmEventModel, name, rows) for name in flat),
+        *(_column(RaisedAtModel, name, points, unit) for name, unit in RAISED_AT.items()),
     ]
 
 
-def _column(name: str, rows: Sequence[AlarmEventModel]) -> Column:
-    return Column(name, COLUMN_KINDS.get(name, "text"), [getattr(row, name) for row in rows])
+def _column(
+    model: type[ApiModel], name: str, rows: Sequence[ApiModel | None], unit: str | None = None
+) -> Column:
+    kind = kind_of(model.model_fields[name].annotation)
+    return Column(name, kind, [row and getattr(row, name) for row in rows], unit)
 
 
 MAX_EVENTS = 1000
@@ -153,29 +137,16 @@ AlarmId = Annotated[
 OUTAGE = [needs(Permission.CHANGE_MEASURING)]
 """An alarm out of service sends no messages."""
 
-EVENT_PROBLEMS = described_problems({422: "A wrong parameter", 503: "The store cannot be read"})
-
-ACTION_PROBLEMS = described_problems(
-    {
-        403: "Not allowed, or asked for by a page of another site",
-        404: "Unknown alarm",
-        409: "Does not fit the alarm as it is now",
-        422: "A wrong parameter",
-        503: "Not done, or not on the disk yet",
-    }
-)
-
-COMMENT_PROBLEMS = ACTION_PROBLEMS | described_problems(
-    {429: "Too many comments; Retry-After says how long to wait"}
+UNKNOWN = {404: "Unknown alarm"}
+ACTION_PROBLEMS = problem_responses(403, 409, 422, 503, own=UNKNOWN)
+COMMENT_PROBLEMS = ACTION_PROBLEMS | problem_responses(
+    own={429: "Too many comments; Retry-After gives the wait"}
 )
 
 
 def alarm_router(context: Context) -> APIRouter:
-    """Return the routes that show alarms."""
-    router = APIRouter(
-        prefix="/api/v1/alarms", tags=["alarms"], dependencies=[needs(Permission.READ)]
-    )
-
+    """Return the routes that show alarms; include them after other routes below their path."""
+    router = subject_router("/alarms", "alarms")
     engine, films, origin, clock = context.alarms, context.films, context.origin, context.clock
     listed = SharedAnswer(
         lambda: alarm_list_model(engine, films, origin, clock.now_ns()),
@@ -192,7 +163,7 @@ def alarm_router(context: Context) -> APIRouter:
         "/events",
         summary="History of all alarms",
         response_model=AlarmEventsModel,
-        responses={**EVENT_PROBLEMS, **table_content("History of all alarms")},
+        responses={**problem_responses(422, 503), **table_content("History of all alarms")},
         dependencies=[needs(Permission.READ, Reach.ASKED)],
     )
     async def events(
@@ -207,27 +178,36 @@ def alarm_router(context: Context) -> APIRouter:
         """
         one_more = replace(query, limit=query.limit + 1)
         grid = grid_of(films)
-        found = await worked(lambda: context.store.alarm_events(one_more))
+        found = await in_thread(lambda: context.store.alarm_events(one_more))
         page, is_more = list(found[: query.limit]), len(found) > query.limit
         if wanted == "json":
+            next_before = page[-1].id if is_more else None
             return await rendered(
-                lambda: alarm_events_model(page, context.origin, grid, there_is_more=is_more)
+                lambda: AlarmEventsModel.of(
+                    context,
+                    events=[event_model(stored, grid) for stored in page],
+                    next_before=next_before,
+                )
             )
-        columns = await worked(lambda: event_table(page, grid))
+        columns = await in_thread(lambda: event_table(page, grid))
         cursor = str(page[-1].id) if is_more else None
         return table_response(wanted, columns, "alarm-events", cursor)
+
+    @router.get("/{alarm}", summary="One alarm", responses=problem_responses(own=UNKNOWN))
+    async def one(alarm: AlarmId) -> AlarmModel:
+        """Show one alarm, also a normal one, with the value compared with its limit."""
+        try:
+            return alarm_model(engine, films, engine.alarm(alarm))
+        except LookupError as error:
+            raise _unknown(alarm) from error
 
     return router
 
 
 def operation_router(context: Context) -> APIRouter:
     """Return the routes that change alarms; each answers with the stored alarm."""
-    router = APIRouter(
-        prefix="/api/v1/alarms/{alarm}",
-        tags=["alarms"],
-        dependencies=[needs(Permission.ACT_ON_ALARMS)],
-    )
-    allowances: dict[str, Allowance] = {}
+    router = subject_router("/alarms/{alarm}", "alarms", Permission.ACT_ON_ALARMS)
+    allowances: dict[str, TokenBucket] = {}
 
     @router.post("/acknowledge", summary="Acknowledge", responses=ACTION_PROBLEMS)
     async def acknowledge(alarm: AlarmId, asked: AcknowledgeModel) -> AlarmModel:
@@ -279,7 +259,7 @@ def operation_router(context: Context) -> APIRouter:
     async def comment(request: Request, alarm: AlarmId, asked: CommentModel) -> AlarmModel:
         """Add a comment to the events of an alarm; its state does not change."""
         now_s = context.clock.monotonic_s()
-        new = Allowance(N_COMMENTS, S_PER_COMMENT, now_s)
+        new = TokenBucket(N_COMMENTS, S_PER_COMMENT, now_s)
         if not allowances.setdefault(identity_of(request).actor, new).take(now_s):
             detail = f"after {N_COMMENTS} comments, one is accepted every {S_PER_COMMENT:g} s"
             wait = {"Retry-After": f"{S_PER_COMMENT:.0f}"}
@@ -289,66 +269,30 @@ def operation_router(context: Context) -> APIRouter:
     return router
 
 
-def alarm_by_id_router(context: Context) -> APIRouter:
-    """Return the route of one alarm; include it after routes that its path would match."""
-    router = APIRouter(
-        prefix="/api/v1/alarms", tags=["alarms"], dependencies=[needs(Permission.READ)]
-    )
-
-    @router.get("/{alarm}", summary="One alarm", responses=problem_responses(404))
-    async def one(alarm: AlarmId) -> AlarmModel:
-        """Show one alarm, also a normal one, with the value compared with its limit."""
-        try:
-            return alarm_model(context.alarms, context.films, context.alarms.alarm(alarm))
-        except LookupError as error:
-            raise ProblemError(404, "Unknown alarm", f"there is no alarm {alarm!r}") from error
-
-    return router
-
-
 async def event_query(
-    eccentricity: Annotated[ValueRange, Depends(eccentricity_range)],
-    oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
-    attitude: Annotated[ValueRange, Depends(attitude_range)],
-    unit: Annotated[
-        str | None, Query(max_length=32, description="Only this unit.", examples=["U1"])
-    ] = None,
-    alarm: Annotated[
-        str | None,
-        Query(
-            max_length=128,
-            description="Only this alarm.",
-            examples=["U1:ujb_shaft_x:channel_not_ok"],
-        ),
-    ] = None,
-    kind: Annotated[
-        AlarmKindName | None,
-        Query(description="Only this kind.", examples=["channel_not_ok"]),
-    ] = None,
-    start: FirstTime = None,
-    end: EndTime = None,
-    before: Annotated[
-        int | None,
-        Query(ge=1, le=10**15, description="Only events older than this id.", examples=[117]),
-    ] = None,
+    eccentricity: Eccentricity,
+    oil_temperature: OilTemperature,
+    attitude: Attitude,
+    times: OptionalTimeRange,
+    unit: OnlyUnit = None,
+    alarm: Annotated[str | None, only("alarm", "U1:ujb_shaft_x:channel_not_ok", 128)] = None,
+    kind: Annotated[AlarmKindName | None, only("kind", "channel_not_ok")] = None,
+    before: Annotated[int | None, before_number("Only events older than this id.")] = None,
     limit: Annotated[
         int, Query(ge=1, le=MAX_EVENTS, description="Most events in the answer.")
     ] = 100,
     state: States = None,
 ) -> AlarmQuery:
     """Return the checked query for events."""
-    everything = AlarmQuery()
-    start_ns = ns_from_datetime(start, "start") if start else everything.start_ns
-    end_ns = ns_from_datetime(end, "end") if end else everything.end_ns
-    require_order(start_ns, end_ns)
+    start_ns, end_ns = times
     return AlarmQuery(
-        before=everything.before if before is None else before,
+        before=AlarmQuery.before if before is None else before,
         limit=limit,
         alarm=alarm,
         unit=unit,
         kind=kind,
         start_ns=max(start_ns, 0),
-        end_ns=min(max(end_ns, 0), everything.end_ns),
+        end_ns=min(max(end_ns, 0), AlarmQuery.end_ns),
         states=states_named(state),
         eccentricity_ratio=eccentricity,
         oil_temperature_c=oil_temperature,
@@ -361,7 +305,11 @@ async def _done(context: Context, id_: str, action: Action) -> AlarmModel:
     try:
         alarm = await context.operators.operate(id_, action)
     except LookupError as error:
-        raise ProblemError(404, "Unknown alarm", f"there is no alarm {id_!r}") from error
+        raise _unknown(id_) from error
     except ActionRefusedError as error:
         raise ProblemError(409, "Does not fit", f"alarm {id_}: {error}") from error
     return alarm_model(context.alarms, context.films, alarm)
+
+
+def _unknown(alarm: str) -> ProblemError:
+    return ProblemError(404, "Unknown alarm", f"there is no alarm {alarm!r}")

@@ -7,14 +7,13 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Depends, Query, Response
 from pydantic import Field
 
-from service.api.answers import rendered, worked
-from service.api.auth.declared import needs
+from service.api.answers import in_thread, rendered
+from service.api.auth.declared import subject_router
 from service.api.context import Context
-from service.api.parameters import EndTime, FirstTime, ns_from_datetime, require_order
-from service.api.problems import described_problems
+from service.api.parameters import OptionalTimeRange, before_number, only
+from service.api.problems import problem_responses
 from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import ApiModel, Time
-from service.runtime.times import rfc3339
 from service.store.access.audit_entries import MAX_NAME, AuditEntry
 from service.store.access.identities import Permission
 from service.store.audit_port import AuditQuery
@@ -93,20 +92,16 @@ def audit_table(entries: Sequence[AuditEntry]) -> list[Column]:
 
 MAX_ENTRIES = 1000
 
-PROBLEMS = described_problems({422: "A wrong parameter", 503: "The store cannot be read"})
-
 
 def audit_router(context: Context) -> APIRouter:
     """Return the route of the audit trail."""
-    router = APIRouter(
-        prefix="/api/v1/audit", tags=["audit"], dependencies=[needs(Permission.READ_AUDIT)]
-    )
+    router = subject_router("/audit", "audit", Permission.READ_AUDIT)
 
     @router.get(
         "",
         summary="Audit trail",
         response_model=AuditModel,
-        responses={**PROBLEMS, **table_content("Audit trail")},
+        responses={**problem_responses(422, 503), **table_content("Audit trail")},
     )
     async def audit(query: Annotated[AuditQuery, Depends(audit_query)], wanted: Format) -> Response:
         """List entries with actor, action, object and state, newest first, in pages.
@@ -114,79 +109,55 @@ def audit_router(context: Context) -> APIRouter:
         As CSV or Parquet: one row per entry, states before and after as JSON.
         """
         one_more = AuditQuery(**{**vars(query), "limit": query.limit + 1})
-        found = await worked(lambda: context.store.audit.entries(one_more))
+        found = await in_thread(lambda: context.store.audit.entries(one_more))
         page = list(found[: query.limit])
         next_before = page[-1].number if len(found) > query.limit else None
         if wanted == "json":
-            head_error = context.store.audit.head_error
-            return await rendered(lambda: _answer(page, next_before, head_error))
+            return await rendered(
+                lambda: AuditModel.of(
+                    context.store.audit,
+                    entries=[_model(entry) for entry in page],
+                    next_before=next_before,
+                )
+            )
         cursor = None if next_before is None else str(next_before)
         return table_response(wanted, audit_table(page), "audit", cursor)
 
     return router
 
 
-def _answer(
-    page: Sequence[AuditEntry], next_before: int | None, head_error: str | None
-) -> AuditModel:
-    entries = [_model(entry) for entry in page]
-    return AuditModel(entries=entries, next_before=next_before, head_error=head_error)
-
-
 async def audit_query(
-    actor: Annotated[
-        str | None, Query(max_length=MAX_NAME, description="Only this actor.", examples=["A. Name"])
+    times: OptionalTimeRange,
+    actor: Annotated[str | None, only("actor", "A. Name", MAX_NAME)] = None,
+    action: Annotated[str | None, only("action", "alarm.shelved", MAX_NAME)] = None,
+    object: Annotated[  # noqa: A002  the name that callers know
+        str | None, only("object", "U1:ujb_shaft_x:channel_not_ok", MAX_NAME)
     ] = None,
-    action: Annotated[
-        str | None,
-        Query(max_length=MAX_NAME, description="Only this action.", examples=["alarm.shelved"]),
-    ] = None,
-    object: Annotated[  # noqa: A002
-        str | None,
-        Query(
-            max_length=MAX_NAME,
-            description="Only this object.",
-            examples=["U1:ujb_shaft_x:channel_not_ok"],
-        ),
-    ] = None,
-    start: FirstTime = None,
-    end: EndTime = None,
-    before: Annotated[
-        int | None,
-        Query(ge=1, le=10**15, description="Only entries older than this number.", examples=[117]),
-    ] = None,
+    before: Annotated[int | None, before_number("Only entries older than this number.")] = None,
     limit: Annotated[
         int, Query(ge=1, le=MAX_ENTRIES, description="Most entries in the answer.")
     ] = 100,
 ) -> AuditQuery:
-    """Check which entries are wanted."""
-    everything = AuditQuery()
-    start_ns = ns_from_datetime(start, "start") if start else everything.start_ns
-    end_ns = ns_from_datetime(end, "end") if end else everything.end_ns
-    require_order(start_ns, end_ns)
+    """Return the checked query for entries."""
+    start_ns, end_ns = times
     return AuditQuery(
-        before=everything.before if before is None else before,
+        before=AuditQuery.before if before is None else before,
         limit=limit,
         actor=actor,
         action=action,
         object=object,
-        start_ns=max(start_ns, everything.start_ns),
-        end_ns=min(end_ns, everything.end_ns),
+        start_ns=max(start_ns, AuditQuery.start_ns),
+        end_ns=min(end_ns, AuditQuery.end_ns),
     )
 
 
 def _model(entry: AuditEntry) -> AuditEntryModel:
-    shown: dict[str, Any] = vars(entry) | {
-        "before": _document(entry.before),
-        "after": _document(entry.after),
-        "time": rfc3339(entry.time_ns),
-    }
-    del shown["time_ns"]
-    return AuditEntryModel.model_validate(shown)
+    before, after = _document(entry.before), _document(entry.after)
+    return AuditEntryModel.of(entry, before=before, after=after)
 
 
 def _document(text: str | None) -> dict[str, Any] | None:
-    """A stored document; what is none, as the text that it is."""
+    """Return a stored document; invalid JSON is returned as text."""
     if text is None:
         return None
     try:
@@ -197,4 +168,4 @@ def _document(text: str | None) -> dict[str, Any] | None:
 
 
 def _refuse(constant: str) -> None:
-    raise ValueError(f"{constant} is no number")
+    raise ValueError(f"{constant} is not a JSON number")

@@ -9,6 +9,7 @@ from service.api.parameters import written_as_date
 from service.api.values import (
     ActorModel,
     ApiModel,
+    BearingAnswer,
     EstimatorName,
     ReasonText,
     Time,
@@ -125,14 +126,8 @@ class LearningModel(ApiModel):
     """Counts of the last days."""
 
 
-class BaselinesModel(ApiModel):
+class BaselinesModel(BearingAnswer):
     """All baselines of a bearing, and the steps taken with them."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
 
     estimator: EstimatorName | None
     """Estimator whose stiffness is watched; null if the bearing is not watched."""
@@ -182,10 +177,10 @@ class BaselineCellsModel(ApiModel):
     """Upper bound, likewise."""
 
     eccentricity_ratio: list[float]
-    """Middle of what the cell has seen."""
+    """Middle of the readings in the cell."""
 
     oil_temperature_c: list[float]
-    """Likewise, °C."""
+    """Middle of the readings in the cell, °C."""
 
     n_readings: list[int]
     """Readings used; 0 in a cell between others that has no readings."""
@@ -236,14 +231,8 @@ class BaselineDirectionModel(ApiModel):
     """Scatter by time scale, shortest first."""
 
 
-class BaselineModel(ApiModel):
+class BaselineModel(BearingAnswer):
     """One baseline with its cells."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
 
     about: BaselineVersionModel
     """Origin and status."""

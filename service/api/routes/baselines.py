@@ -1,7 +1,6 @@
 """Baselines of a bearing, and the requests by which engineers change them."""
 
 import asyncio
-from dataclasses import asdict
 from typing import Annotated, Any
 
 import numpy as np
@@ -10,13 +9,12 @@ from fastapi import APIRouter, Path, Response
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.cell_table import CellStatistics
 from core.condition.cells import CellGrid
-from core.machine.unit import Estimator
-from service.api.answers import rendered, worked
-from service.api.auth.declared import needs
+from service.api.answers import in_thread, rendered
+from service.api.auth.declared import subject_router
 from service.api.auth.gate import actor_or
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import ns_from_datetime
-from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.problems import ProblemError, problem_responses
 from service.api.routes.baseline_models import (
     BaselineActionModel,
     BaselineCellsModel,
@@ -29,10 +27,9 @@ from service.api.routes.baseline_models import (
     LearningModel,
     ReadingCountsModel,
     RenewModel,
-    TimeScatterModel,
 )
 from service.api.routes.films import watched_place
-from service.api.values import EstimatorName, bounds
+from service.api.values import bounds
 from service.live.commands import (
     Accept,
     BaselineAction,
@@ -42,7 +39,7 @@ from service.live.commands import (
     Renew,
     Thaw,
 )
-from service.live.learning_progress import RECENT_DAYS, LearningProgress, learning_progress
+from service.live.learning_progress import RECENT_DAYS, learning_progress
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
 from service.store.baselines import Versions, versions_after
@@ -55,15 +52,9 @@ def version_model(
 ) -> BaselineVersionModel:
     """Return the model of a baseline after all steps."""
     own = [step for step in steps if step.version == entry.version]
-    return BaselineVersionModel(
-        version=entry.version,
-        estimator=entry.estimator.value,
+    return BaselineVersionModel.of(
+        entry,
         status=_status(entry, versions, own),
-        author=entry.author,
-        created=rfc3339(entry.created_ns),
-        learned_from=rfc3339(entry.learned_from_ns),
-        learned_until=rfc3339(entry.learned_until_ns),
-        event=entry.event,
         remark=_remark(entry, own),
         is_frozen=versions.is_frozen and entry.version == versions.in_force,
     )
@@ -85,39 +76,12 @@ def _remark(entry: BaselineEntry, own: list[StoredStep]) -> str:
     return next((words for words in reasons if words != entry.event), "")
 
 
-def step_model(step: StoredStep) -> BaselineStepModel:
-    """Return the model of a step."""
-    return BaselineStepModel(
-        step=step.step.value,
-        version=step.version,
-        time=rfc3339(step.time_ns),
-        actor=step.actor,
-        reason=step.reason,
-        event_time=None if step.from_ns is None else rfc3339(step.from_ns),
-    )
-
-
-def learning_model(progress: LearningProgress, n_days_wanted: int) -> LearningModel:
-    """Return the progress of learning."""
-    since_ns, until_ns = progress.since_ns, progress.until_ns
-    return LearningModel(
-        since=None if since_ns is None else rfc3339(since_ns),
-        until=None if until_ns is None else rfc3339(until_ns),
-        is_over=progress.is_over,
-        n_readings=progress.n_readings,
-        n_days=progress.n_days,
-        n_days_wanted=n_days_wanted,
-        recent=ReadingCountsModel(days=RECENT_DAYS, **asdict(progress.recent)),
-    )
-
-
 def baseline_model(baseline: BearingBaseline, about: BaselineVersionModel) -> BaselineModel:
     """Return the model of a baseline with its cells."""
     x, y = (baseline.of(direction) for direction in ("x", "y"))
     grid = next((found.grid for found in (x, y) if found), None)
-    return BaselineModel(
-        unit=baseline.origin.unit,
-        bearing=baseline.origin.bearing,
+    return BaselineModel.of(
+        baseline.origin,
         about=about,
         eccentricity_width=grid.eccentricity_width if grid else None,
         oil_temperature_width_c=grid.temperature_width_c if grid else None,
@@ -127,16 +91,15 @@ def baseline_model(baseline: BearingBaseline, about: BaselineVersionModel) -> Ba
 
 
 def _direction(learned: QuantityBaseline) -> BaselineDirectionModel:
-    return BaselineDirectionModel(
+    return BaselineDirectionModel.of(
+        learned,
         cells=_cells(list(learned.table.cells), learned.grid),
         scatter_percent=100.0 * learned.scatter,
         u_random_percent=100.0 * learned.u_random,
-        rejected_share=learned.rejected_share,
-        time_scatter=[
-            TimeScatterModel(time_scale_h=time.time_scale_h, share=time.share)
-            for time in learned.time_scatter
-        ],
     )
+
+
+CELL_FIELDS = ("eccentricity_ratio", "oil_temperature_c", "n_readings", "n_days", "support")
 
 
 def _cells(cells: list[CellStatistics], grid: CellGrid) -> BaselineCellsModel:
@@ -145,21 +108,17 @@ def _cells(cells: list[CellStatistics], grid: CellGrid) -> BaselineCellsModel:
     attitude = (
         None if grid.attitude_width_deg is None else _bounds(cells, 2, grid.attitude_width_deg)
     )
-    return BaselineCellsModel(
+    return BaselineCellsModel.of(
         eccentricity_low=low_e,
         eccentricity_high=high_e,
         oil_temperature_low_c=low_c,
         oil_temperature_high_c=high_c,
         attitude_low_deg=attitude[0] if attitude else None,
         attitude_high_deg=attitude[1] if attitude else None,
-        eccentricity_ratio=[cell.eccentricity_ratio for cell in cells],
-        oil_temperature_c=[cell.oil_temperature_c for cell in cells],
-        n_readings=[cell.n_readings for cell in cells],
-        n_days=[cell.n_days for cell in cells],
         stiffness_n_per_m=np.exp([cell.location for cell in cells]).tolist(),
         scatter_percent=[100.0 * cell.scatter for cell in cells],
         surface_std_percent=[100.0 * cell.surface_std for cell in cells],
-        support=[cell.support.value for cell in cells],
+        **{name: [getattr(cell, name) for cell in cells] for name in CELL_FIELDS},
     )
 
 
@@ -170,24 +129,21 @@ def _bounds(
     return [low for low, _ in found], [high for _, high in found]
 
 
-def estimator_name(estimator: Estimator | None) -> EstimatorName | None:
-    """Return the name of an estimator."""
-    return None if estimator is None else estimator.value
-
-
 Version = Annotated[int, Path(ge=1, le=10**15, description="Version of a baseline.", examples=[3])]
 
 READING_PROBLEMS = problem_responses(404, 422, 503)
 
-ACTION_PROBLEMS = described_problems(
-    {
-        403: "Not allowed, or asked for by a page of another site",
+ACTION_PROBLEMS = problem_responses(
+    403,
+    422,
+    503,
+    own={
         404: "Unknown unit, bearing or version",
         409: "Does not fit the baselines as they are now, or the film is not watched",
-        422: "A wrong parameter",
-        503: "Not done: the store cannot be written",
-    }
+    },
 )
+
+PATH = "/units/{unit}/bearings/{bearing}/baselines"
 
 EXPORTED: dict[int | str, dict[str, Any]] = {
     200: {
@@ -204,11 +160,7 @@ EXPORTED: dict[int | str, dict[str, Any]] = {
 
 def baseline_router(context: Context) -> APIRouter:
     """Return the routes that show baselines."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings/{bearing}/baselines",
-        tags=["baselines"],
-        dependencies=[needs(Permission.READ)],
-    )
+    router = subject_router(PATH, "baselines")
 
     @router.get(
         "",
@@ -241,7 +193,7 @@ def baseline_router(context: Context) -> APIRouter:
     async def export(unit: UnitId, bearing: BearingId, version: Version) -> Response:
         """Export the whole baseline with its surface as a file that padwatch reads back exactly."""
         context.bearing(unit, bearing)
-        found = await worked(lambda: to_json(_stored(context, unit, bearing, version)))
+        found = await in_thread(lambda: to_json(_stored(context, unit, bearing, version)))
         name = f"{unit}-{bearing}-baseline-{version}.json"
         headers = {"Content-Disposition": f'attachment; filename="{name}"'}
         return Response(found, headers=headers, media_type="application/json")
@@ -251,11 +203,7 @@ def baseline_router(context: Context) -> APIRouter:
 
 def baseline_action_router(context: Context) -> APIRouter:
     """Return the routes that change baselines; each answers with the stored baselines."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings/{bearing}/baselines",
-        tags=["baselines"],
-        dependencies=[needs(Permission.CHANGE_MEASURING)],
-    )
+    router = subject_router(PATH, "baselines", Permission.CHANGE_MEASURING)
 
     @router.post("/{version}/accept", summary="Accept a baseline", responses=ACTION_PROBLEMS)
     async def accept(
@@ -321,18 +269,20 @@ def _baselines(context: Context, unit: str, bearing: str) -> BaselinesModel:
         if place
         else None
     )
-    renewed_ns, n_days = versions.renewed_ns, settings.baseline.min_learning_days
-    return BaselinesModel(
+    learning = progress and LearningModel.of(
+        progress,
+        n_days_wanted=settings.baseline.min_learning_days,
+        recent=ReadingCountsModel.of(progress.recent, days=RECENT_DAYS),
+    )
+    return BaselinesModel.of(
+        versions,
         unit=unit,
         bearing=bearing,
-        estimator=estimator_name(place.estimator if place else None),
-        in_force=versions.in_force,
-        is_frozen=versions.is_frozen,
-        renewed=None if renewed_ns is None else rfc3339(renewed_ns),
+        estimator=place and place.estimator,
         acceptance=settings.acceptance,
-        learning=learning_model(progress, n_days) if progress else None,
+        learning=learning,
         versions=[version_model(entry, versions, steps) for entry in entries],
-        steps=[step_model(step) for step in reversed(steps)],
+        steps=[BaselineStepModel.of(s, event_time=s.from_ns) for s in reversed(steps)],
     )
 
 

@@ -5,17 +5,17 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Response
 from pydantic import Field
 
-from core.machine.unit import Bearing
 from core.monitor.assessment import Assessment
 from core.monitor.catalogue import BY_NAME
 from core.stiffness.estimators import ESTIMATORS
-from core.uncertainty import Budget
 from service.api.answers import rendered
-from service.api.auth.declared import needs
-from service.api.context import BearingId, Context, LiveLook, QuantityName, UnitId
+from service.api.auth.declared import subject_router
+from service.api.context import BearingId, Context, LiveState, QuantityName, UnitId
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import (
+    PLACES,
     ApiModel,
+    BearingAnswer,
     EstimatorName,
     QualityModel,
     ReadingModel,
@@ -24,13 +24,10 @@ from service.api.values import (
     Time,
     UncertaintyModel,
     WindowModel,
-    quality_model,
     reading_model,
     window_model,
 )
 from service.live.live_view import CurrentBearing
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
 from service.store.gap_reference import GapReference
 
 MicrometrePair = Annotated[
@@ -55,6 +52,10 @@ class ReferenceModel(ApiModel):
 
     note: Note | None
     """Note of the author, if any."""
+
+
+PLANT_FILE = ReferenceModel(source="plant_file", set=None, author=None, note=None)
+"""Origin of gaps from the plant file."""
 
 
 class BearingModel(ApiModel):
@@ -85,14 +86,8 @@ class BearingModel(ApiModel):
     """Channel ids of shaft_x, shaft_y, bearing_x and bearing_y."""
 
 
-class LatestModel(ApiModel):
+class LatestModel(BearingAnswer):
     """A bearing now. Readings that are not current are null with the reason."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
 
     time: Time | None
     """End of the samples of the newest result, also if it is not current."""
@@ -136,22 +131,22 @@ class BudgetLineModel(ApiModel):
     """One contribution to the uncertainty of a result."""
 
     name: Annotated[str, Field(examples=["bracket stiffness"])]
-    """What contributes."""
+    """Source of uncertainty."""
 
     kind: Literal["random", "systematic"]
-    """Whether it differs from one result to the next, or stays."""
+    """Random if it differs from result to result, systematic if it stays the same."""
 
     distribution: Literal["normal", "uniform"]
-    """What is known about it besides its width."""
+    """Assumed distribution."""
 
     width: float
-    """Standard uncertainty if normal, half-width if uniform, in the unit of what contributes."""
+    """Standard uncertainty if normal, half-width if uniform, in the unit of the source."""
 
     sensitivity: float
-    """Change of the result per unit of what contributes."""
+    """Change of the result per unit of the source."""
 
     contribution: float
-    """Standard uncertainty of the result by this alone."""
+    """Standard uncertainty of the result due to this source alone."""
 
 
 class BudgetModel(ApiModel):
@@ -176,105 +171,36 @@ class BudgetModel(ApiModel):
     """Contributions, largest first."""
 
 
-def bearing_model(unit: str, bearing: Bearing, reference: GapReference | None) -> BearingModel:
-    """Return the model of a bearing.
-
-    Parameters
-    ----------
-    reference
-        Stored reference, if one is in force.
-    """
-    opposite = bearing.opposite_reference_um
-    return BearingModel(
-        unit=unit,
-        id=bearing.id,
-        bracket_stiffness_n_per_m=bearing.bracket_stiffness_n_per_m,
-        clearance_um=bearing.clearance_um,
-        gap_reference_um=list(bearing.gap_reference_um),
-        opposite_reference_um=None if opposite is None else list(opposite),
-        reference=reference_model(reference),
-        channels={
-            "shaft_x": bearing.shaft_x,
-            "shaft_y": bearing.shaft_y,
-            "bearing_x": bearing.bearing_x,
-            "bearing_y": bearing.bearing_y,
-        },
-    )
-
-
 def reference_model(reference: GapReference | None) -> ReferenceModel:
     """Return the origin of a reference; None stands for the plant file."""
     if reference is None:
-        return ReferenceModel(source="plant_file", set=None, author=None, note=None)
-    return ReferenceModel(
-        source=reference.source.value,
-        set=rfc3339(reference.set_ns),
-        author=reference.author,
-        note=reference.note or None,
-    )
+        return PLANT_FILE
+    return ReferenceModel.of(reference, note=reference.note or None)
 
 
-def budget_model(name: str, time_ns: int, budget: Budget) -> BudgetModel:
-    """Return the model of a budget, largest contribution first."""
-    low, high = budget.interval
-    ordered = sorted(budget.lines, key=lambda line: line.contribution, reverse=True)
-    return BudgetModel(
-        quantity=name,
-        unit=BY_NAME[name].unit,
-        time=rfc3339(time_ns),
-        value=budget.value,
-        uncertainty=UncertaintyModel(
-            random=budget.random, systematic=budget.systematic, low_95=low, high_95=high
-        ),
-        lines=[
-            BudgetLineModel(
-                name=line.name,
-                kind=line.kind.value,
-                distribution=line.distribution.value,
-                width=line.width,
-                sensitivity=line.sensitivity,
-                contribution=line.contribution,
-            )
-            for line in ordered
-        ],
-    )
-
-
-def latest_model(live: LiveLook, unit: str, bearing: str) -> LatestModel:
+def latest_model(live: LiveState, unit: str, bearing: str) -> LatestModel:
     """Return the newest result of a bearing; values that are not current are null."""
     current = live.current(unit, bearing)
     newest = current.assessment
-    return LatestModel(
+    shown = newest if current.is_current else None
+    return LatestModel.of(
+        current,
         unit=unit,
         bearing=bearing,
-        time=rfc3339(newest.time_ns) if newest else None,
-        age_s=current.age_s,
-        quality=quality_model(current.quality),
-        speed_source=newest.speed_source.value if newest else None,
-        window=window_model(newest.window) if newest else None,
-        estimators=_estimators(current),
-        runout=_runout(current),
-        clipped_share=dict(newest.clipped_share) if newest and current.is_current else {},
+        time=newest and newest.time_ns,
+        speed_source=newest and newest.speed_source,
+        window=newest and window_model(newest.window),
+        estimators=estimator_names(shown) if shown else {"xx": None, "yy": None},
+        runout=runout_names(shown) if shown else {"shaft_x": None, "shaft_y": None},
+        clipped_share=shown.clipped_share if shown else {},
         readings={name: reading_model(name, r) for name, r in current.readings.items()},
     )
-
-
-def _estimators(current: CurrentBearing) -> dict[str, EstimatorName | None]:
-    if current.assessment is None or not current.is_current:
-        return {"xx": None, "yy": None}
-    return estimator_names(current.assessment)
 
 
 def estimator_names(assessment: Assessment) -> dict[str, EstimatorName | None]:
     """Return the estimator of the preferred stiffness by axes."""
     chosen = assessment.estimators
     return {axes: estimator.value if estimator else None for axes, estimator in chosen.items()}
-
-
-def _runout(current: CurrentBearing) -> dict[str, RunoutName | None]:
-    if current.assessment is None or not current.is_current:
-        return {"shaft_x": None, "shaft_y": None}
-    return runout_names(current.assessment)
 
 
 def runout_names(assessment: Assessment) -> dict[str, RunoutName | None]:
@@ -284,11 +210,7 @@ def runout_names(assessment: Assessment) -> dict[str, RunoutName | None]:
 
 def bearing_router(context: Context) -> APIRouter:
     """Return the routes of one bearing."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings",
-        tags=["bearing"],
-        dependencies=[needs(Permission.READ)],
-    )
+    router = subject_router("/units/{unit}/bearings", "bearing")
     unknown, no_result = problem_responses(404), problem_responses(404, 409)
 
     @router.get("", summary="All bearings of a unit", responses=unknown)
@@ -329,10 +251,14 @@ def bearing_router(context: Context) -> APIRouter:
 
 
 def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:
-    context.bearing(unit, bearing)
-    references = context.references
-    watched = references.bearing(unit, bearing)
-    return bearing_model(unit, watched, references.of(unit, bearing))
+    settings, in_force = context.bearing(unit, bearing), context.references.bearing(unit, bearing)
+    return BearingModel.of(
+        in_force,
+        settings,
+        unit=unit,
+        reference=reference_model(context.references.of(unit, bearing)),
+        channels={place: getattr(in_force, place) for place in PLACES},
+    )
 
 
 def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
@@ -346,7 +272,18 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
         estimator = assessment.estimators[axes]
         source = ESTIMATORS[estimator].stiffness.format(axes=axes) if estimator else quantity
     budget = assessment.budgets.get(source)
-    return None if budget is None else budget_model(quantity, assessment.time_ns, budget)
+    if budget is None:
+        return None
+    low, high = budget.interval
+    lines = sorted(budget.lines, key=lambda line: line.contribution, reverse=True)
+    return BudgetModel.of(
+        budget,
+        quantity=quantity,
+        unit=BY_NAME[quantity].unit,
+        time=assessment.time_ns,
+        uncertainty=UncertaintyModel.of(budget, low_95=low, high_95=high),
+        lines=[BudgetLineModel.of(line) for line in lines],
+    )
 
 
 def no_result(unit: str, bearing: str) -> ProblemError:

@@ -9,21 +9,20 @@ from pydantic import Field
 
 from core.arrays import SampleArray
 from core.machine.channel import Measurand
-from core.quality import Level, Quality, Reading, Reason, bad, missing, worst
+from core.quality import Level, Quality, Reason, bad, missing, worst
 from core.samples.blocks import SampleBlock
 from service.api.answers import rendered
-from service.api.auth.declared import needs
-from service.api.context import Context, LiveLook, UnitId
-from service.api.problems import ProblemError, described_problems, problem_responses
-from service.api.values import ApiModel, QualityModel, Time, listed, quality_model
+from service.api.auth.declared import subject_router
+from service.api.context import Context, LiveState, UnitId
+from service.api.parameters import duration
+from service.api.problems import ProblemError, problem_responses
+from service.api.values import ApiModel, QualityModel, SampleRange, Time, listed
 from service.live.live_view import HELD_S
 from service.live.samples import SampleWindow, newest_blocks, sample_window
-from service.runtime.times import rfc3339
 from service.settings.bearings import CHANNEL_KEYS, GAP_KEYS, OPTIONAL_CHANNEL_KEYS
 from service.settings.channels import ChannelSettings, SlowChannelSettings
 from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.units import UnitSettings
-from service.store.access.identities import Permission
 
 TransducerName = Literal[
     "proximity_probe", "displacement", "velocity", "accelerometer", "key_phase"
@@ -155,7 +154,7 @@ class ChannelSamplesModel(ApiModel):
     """One sample per index; null where it is missing or the channel was bad."""
 
 
-class WaveformModel(ApiModel):
+class WaveformModel(SampleRange):
     """Newest samples of some channels of a unit."""
 
     unit: str
@@ -166,15 +165,6 @@ class WaveformModel(ApiModel):
 
     age_s: float
     """Age of the newest sample, s; it grows while the link is lost."""
-
-    epoch: int
-    """Changes when the device restarts its count."""
-
-    first_index: int
-    """Index of the first sample."""
-
-    rate_hz: float
-    """Samples per second."""
 
     n_samples: int
     """Samples of each channel."""
@@ -199,16 +189,16 @@ UNIT_USES = ("speed_channel", "power_channel", "key_phase")
 """Keys of a unit that name channels."""
 
 
-def channels_model(live: LiveLook, settings: UnitSettings) -> ChannelsModel:
+def channels_model(live: LiveState, settings: UnitSettings) -> ChannelsModel:
     """Return all channels of a unit with the state of its newest block."""
     newest, why_not = live.newest_block(settings.id), live.why_no_samples(settings.id)
     shown = newest if why_not is None else None
     why = why_not or Reason.WAITING_FOR_DATA
     uses = _uses(settings)
-    return ChannelsModel(
+    return ChannelsModel.of(
         unit=settings.id,
         rate_hz=settings.sampling_hz,
-        time=None if newest is None else rfc3339(newest.stop_ns),
+        time=newest and newest.stop_ns,
         age_s=live.data_age_s(settings.id),
         waveform=[
             _waveform(settings, channel, uses.get(channel.id, []), shown, why)
@@ -237,23 +227,12 @@ def _waveform(
 ) -> WaveformChannelModel:
     rows = rows_of(settings, channel.id)
     quality = bad(why) if block is None else worst(block.channel_quality[row] for row in rows)
-    return WaveformChannelModel(
-        id=channel.id,
-        transducer=channel.transducer.value,
+    return WaveformChannelModel.of(
+        channel,
         unit=UNITS[channel.measurand],
-        sensitivity=channel.sensitivity,
-        sensitivity_unit=channel.sensitivity_unit,
-        full_scale_v=channel.full_scale_v,
-        ok_min_v=channel.ok_min_v,
-        ok_max_v=channel.ok_max_v,
-        unit_per_count=channel.unit_per_count,
-        ok_min=channel.ok_min,
-        ok_max=channel.ok_max,
-        gain_uncertainty=channel.gain_uncertainty,
         direction=channel.sign,
-        probe=channel.probe,
         used_by=used_by,
-        quality=quality_model(quality),
+        quality=quality,
         **_extent(settings, block, rows, quality),
     )
 
@@ -273,20 +252,9 @@ def _extent(
 def _slow(
     channel: SlowChannelSettings, used_by: list[str], block: SampleBlock | None, why: Reason
 ) -> SlowChannelModel:
-    reading = missing(why) if block is None else _reading(block, channel.id)
-    return SlowChannelModel(
-        id=channel.id,
-        unit=channel.unit,
-        minimum=channel.minimum,
-        maximum=channel.maximum,
-        used_by=used_by,
-        value=reading.value,
-        quality=quality_model(reading.quality),
-    )
-
-
-def _reading(block: SampleBlock, channel: str) -> Reading:
-    return block.slow.get(channel) or missing(Reason.NOT_MEASURED)
+    why = why if block is None else Reason.NOT_MEASURED
+    reading = (None if block is None else block.slow.get(channel.id)) or missing(why)
+    return SlowChannelModel.of(channel, reading, used_by=used_by)
 
 
 def _uses(settings: UnitSettings) -> dict[str, list[str]]:
@@ -305,38 +273,31 @@ def waveform_model(
 ) -> WaveformModel:
     """Return the model of samples."""
     units = {each.id: UNITS[each.measurand] for each in settings.channel}
-    return WaveformModel(
+    return WaveformModel.of(
+        window,
         unit=settings.id,
-        time=rfc3339(window.start_ns),
+        time=window.start_ns,
         age_s=age_s,
-        epoch=window.epoch,
-        first_index=window.first_index,
-        rate_hz=window.rate_hz,
         n_samples=window.samples[channels[0]].size,
         channels={
-            id_: ChannelSamplesModel(
-                unit=units[id_],
-                quality=quality_model(window.quality[id_]),
-                sample=listed(window.samples[id_]),
+            id_: ChannelSamplesModel.of(
+                unit=units[id_], quality=window.quality[id_], sample=listed(window.samples[id_])
             )
             for id_ in channels
         },
     )
 
 
+NO_SAMPLES = {409: "There are no samples"}
+NEWEST = "Duration of the newest samples; limited to those in memory."
+
 MAX_NUMBERS = 200_000
 """Maximum number of samples in one answer, all channels together."""
-
-PROBLEMS = described_problems(
-    {404: "Unknown unit", 409: "There are no samples", 422: "A wrong parameter"}
-)
 
 
 def channel_router(context: Context) -> APIRouter:
     """Return the routes of channels."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}", tags=["plant"], dependencies=[needs(Permission.READ)]
-    )
+    router = subject_router("/units/{unit}", "plant")
 
     @router.get("/channels", summary="Channels", responses=problem_responses(404))
     async def channels(unit: UnitId) -> ChannelsModel:
@@ -346,7 +307,12 @@ def channel_router(context: Context) -> APIRouter:
         """
         return channels_model(context.live, context.unit(unit))
 
-    @router.get("/waveform", summary="Waveform", responses=PROBLEMS, response_model=WaveformModel)
+    @router.get(
+        "/waveform",
+        summary="Waveform",
+        responses=problem_responses(404, 422, own=NO_SAMPLES),
+        response_model=WaveformModel,
+    )
     async def waveform(
         unit: UnitId,
         channel: Annotated[
@@ -357,15 +323,7 @@ def channel_router(context: Context) -> APIRouter:
                 examples=[["ujb_shaft_x", "ujb_shaft_y"]],
             ),
         ] = None,
-        seconds: Annotated[
-            float,
-            Query(
-                gt=0.0,
-                le=HELD_S,
-                allow_inf_nan=False,
-                description="Duration of the newest samples; limited to those in memory.",
-            ),
-        ] = 2.0,
+        seconds: Annotated[float, duration(HELD_S, NEWEST)] = 2.0,
     ) -> Response:
         """Return the newest samples of a unit from memory, in engineering units.
 
@@ -373,9 +331,7 @@ def channel_router(context: Context) -> APIRouter:
         """
         settings = context.unit(unit)
         chosen = _chosen(settings, channel)
-        blocks, age_s = context.live.blocks(unit), context.live.data_age_s(unit)
-        if not blocks or age_s is None:
-            raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")
+        blocks, age_s = held_blocks(context.live, unit)
         n_samples = _n_samples(seconds, blocks[-1].rate_hz, len(chosen))
         rows = {each: rows_of(settings, each)[0] for each in chosen}
 
@@ -389,10 +345,23 @@ def channel_router(context: Context) -> APIRouter:
     return router
 
 
-def _chosen(settings: UnitSettings, channels: list[str] | None) -> list[str]:
+def require_samples(settings: UnitSettings) -> None:
+    """Raise a problem of status 409 for a unit whose source gives no samples."""
     if isinstance(settings.source, ModbusVectorSettings):
         detail = f"unit {settings.id!r} is read from a rack that gives amplitudes, not samples"
         raise ProblemError(409, "No samples", detail)
+
+
+def held_blocks(live: LiveState, unit: str) -> tuple[Sequence[SampleBlock], float]:
+    """Return the blocks of a unit in memory and their age; raise a problem without samples."""
+    blocks, age_s = live.blocks(unit), live.data_age_s(unit)
+    if not blocks or age_s is None:
+        raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")
+    return blocks, age_s
+
+
+def _chosen(settings: UnitSettings, channels: list[str] | None) -> list[str]:
+    require_samples(settings)
     known = [channel.id for channel in settings.channel]
     for each in channels or ():
         if each not in known:

@@ -1,21 +1,21 @@
 """Readings of a film over time, with the condition of each."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Query, Response
 
-from core.baseline.history import CodeArray, ReadingOutcome
+from core.baseline.history import ReadingOutcome
 from core.change.decision import Verdict
 from core.condition.operating_state import OperatingState
 from core.units import NS_PER_S
-from service.api.answers import rendered, worked
-from service.api.auth.declared import needs
+from service.api.answers import in_thread, rendered
+from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.parameters import States, TimeRange, eccentricity_range, oil_temperature_range
-from service.api.problems import described_problems
+from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
+from service.api.problems import problem_responses
 from service.api.routes.films import (
     LevelHeldName,
     VerdictName,
@@ -23,21 +23,19 @@ from service.api.routes.films import (
     verdict_name,
     watched_place,
 )
-from service.api.tables import Column, ColumnKind, Format, table_content, table_response
+from service.api.tables import Column, Format, kind_of, table_content, table_response
 from service.api.values import (
     STATE_NAMES,
     ApiModel,
+    BearingHistory,
     EstimatorName,
     OperatingStateName,
     Time,
     listed,
     states_named,
 )
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
 from service.store.film_port import FilmHistory, FilmQuery
 from service.store.port import QueryTooLargeError
-from service.store.value_range import ValueRange
 
 EvidenceName = Literal["measured", "insufficient_excitation", "bad_quality"]
 
@@ -75,23 +73,11 @@ class FilmSeriesModel(ApiModel):
     """Deviation of the reading alone, %; null if it was not compared."""
 
 
-class FilmReadingsModel(ApiModel):
+class FilmReadingsModel(BearingHistory):
     """Readings of a film with their operating conditions, oldest first."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
 
     estimator: EstimatorName
     """Estimator of the stiffness."""
-
-    start: Time
-    """Start of the requested range."""
-
-    end: Time
-    """End of the requested range."""
 
     n_found: int
     """Readings in this range that match; more than given here if they were thinned."""
@@ -160,14 +146,10 @@ def film_readings_model(query: FilmQuery, found: FilmHistory, rows: Rows) -> Fil
     """
     history, first = found.history, int(rows[0]) if rows.size else 0
     x, y = (_series(found, direction, rows) for direction in range(2))
-    return FilmReadingsModel(
-        unit=query.unit,
-        bearing=query.bearing,
-        estimator=query.estimator.value,
-        start=rfc3339(query.start_ns),
-        end=rfc3339(query.end_ns),
+    return FilmReadingsModel.of(
+        query,
         n_found=len(found),
-        next_end=rfc3339(int(history.time_ns[first])) if first else None,
+        next_end=int(history.time_ns[first]) if first else None,
         time=(history.time_ns[rows] / NS_PER_S).tolist(),
         provenance=["simulated" if one else "measured" for one in found.is_simulated[rows]],
         operating_state=[STATE_NAMES[OperatingState(code)] for code in found.state[rows]],
@@ -197,14 +179,10 @@ def _series(found: FilmHistory, direction: int, rows: Rows) -> FilmSeriesModel:
         bearing_um_pk=listed(column(history.bearing_um_pk)),
         evidence=[EVIDENCE_NAMES[ReadingOutcome(code)] for code in column(history.outcome)],
         verdict=[verdict_name(Verdict(code)) for code in column(found.verdict)],
-        level=_levels(column(found.level)),
+        level=[level_name(int(code) or None) for code in column(found.level)],
         change_percent=listed(100.0 * np.expm1(column(found.change))),
         deviation_percent=listed(100.0 * np.expm1(column(found.deviation))),
     )
-
-
-def _levels(codes: CodeArray) -> list[Any]:
-    return [level_name(int(code) or None) for code in codes]
 
 
 UNITS = {
@@ -219,29 +197,11 @@ UNITS = {
 }
 """Units by the suffix of a name."""
 
-SHARED: dict[str, ColumnKind] = {
-    "provenance": "text",
-    "operating_state": "text",
-    "is_settled": "flag",
-    "speed_rpm": "number",
-    "power_mw": "number",
-    "eccentricity_ratio": "number",
-    "attitude_deg": "number",
-    "oil_temperature_c": "number",
-    "baseline_version": "count",
-}
-
-OWN: dict[str, ColumnKind] = {
-    "stiffness_n_per_m": "number",
-    "u_random_n_per_m": "number",
-    "shaft_um_pk": "number",
-    "bearing_um_pk": "number",
-    "evidence": "text",
-    "verdict": "text",
-    "level": "text",
-    "change_percent": "number",
-    "deviation_percent": "number",
-}
+CONDITION = (
+    *("provenance", "operating_state", "is_settled", "speed_rpm", "power_mw"),
+    *("eccentricity_ratio", "attitude_deg", "oil_temperature_c", "baseline_version"),
+)
+"""Columns that both directions share."""
 
 
 def film_table(model: FilmReadingsModel, found: FilmHistory, rows: list[int]) -> list[Column]:
@@ -253,17 +213,19 @@ def film_table(model: FilmReadingsModel, found: FilmHistory, rows: list[int]) ->
         Rows of the history that the model shows.
     """
     times = found.history.time_ns[rows].tolist()
-    shared = [Column(n, kind, getattr(model, n), _unit(n)) for n, kind in SHARED.items()]
-    return [Column("time_utc", "time", times), *shared, *_side("x", model.x), *_side("y", model.y)]
+    return [
+        Column("time_utc", "time", times),
+        *_columns(model, CONDITION),
+        *_columns(model.x, FilmSeriesModel.model_fields, "x_"),
+        *_columns(model.y, FilmSeriesModel.model_fields, "y_"),
+    ]
 
 
-def _side(direction: str, series: FilmSeriesModel) -> Iterator[Column]:
-    for name, kind in OWN.items():
-        yield Column(f"{direction}_{name}", kind, getattr(series, name), _unit(name))
-
-
-def _unit(name: str) -> str | None:
-    return next((unit for end, unit in UNITS.items() if name.endswith(end)), None)
+def _columns(model: ApiModel, names: Iterable[str], prefix: str = "") -> Iterator[Column]:
+    for name in names:
+        unit = next((unit for end, unit in UNITS.items() if name.endswith(end)), None)
+        kind = kind_of(type(model).model_fields[name].annotation)
+        yield Column(prefix + name, kind, getattr(model, name), unit)
 
 
 MAX_POINTS = 20_000
@@ -272,23 +234,12 @@ MAX_READ = 120_000
 """Maximum number of readings read by one request: over two years of one every ten minutes."""
 
 
-READING_PROBLEMS = described_problems(
-    {
-        404: "Unknown unit or bearing",
-        409: "The film is not watched",
-        422: "A wrong parameter",
-        503: "The store cannot be read",
-    }
-)
+READING_PROBLEMS = problem_responses(404, 422, 503, own={409: "The film is not watched"})
 
 
 def film_history_router(context: Context) -> APIRouter:
     """Return the route of the readings of a film."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings/{bearing}/film",
-        tags=["film"],
-        dependencies=[needs(Permission.READ)],
-    )
+    router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 
     @router.get(
         "/readings",
@@ -301,8 +252,8 @@ def film_history_router(context: Context) -> APIRouter:
         bearing: BearingId,
         times: TimeRange,
         wanted: Format,
-        eccentricity: Annotated[ValueRange, Depends(eccentricity_range)],
-        oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
+        eccentricity: Eccentricity,
+        oil_temperature: OilTemperature,
         state: States = None,
         max_points: Annotated[
             int, Query(ge=2, le=MAX_POINTS, description="Maximum number of readings.")
@@ -334,7 +285,10 @@ def film_history_router(context: Context) -> APIRouter:
         )
 
         def read() -> tuple[FilmReadingsModel, FilmHistory, list[int]]:
-            found = _history(context, query)
+            found = context.store.films.history(query)
+            if len(found) > MAX_READ:
+                detail = f"the range has more than {MAX_READ} readings; request a shorter range"
+                raise QueryTooLargeError(detail)
             rows = rows_shown(len(found), max_points, thin)
             return film_readings_model(query, found, rows), found, rows.tolist()
 
@@ -343,13 +297,6 @@ def film_history_router(context: Context) -> APIRouter:
 
         if wanted == "json":
             return await rendered(lambda: read()[0])
-        return table_response(wanted, await worked(read_columns), f"film-{unit}-{bearing}")
+        return table_response(wanted, await in_thread(read_columns), f"film-{unit}-{bearing}")
 
     return router
-
-
-def _history(context: Context, query: FilmQuery) -> FilmHistory:
-    found = context.store.films.history(query)
-    if len(found) > MAX_READ:
-        raise QueryTooLargeError(f"more than {MAX_READ} readings in this range: ask for less")
-    return found

@@ -14,14 +14,20 @@ from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmReading
 from core.change.settings import FilmRules
 from service.api.answers import rendered
-from service.api.auth.declared import needs
+from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.problems import ProblemError, problem_responses
-from service.api.values import ApiModel, EstimatorName, FilmConditionModel, Time, condition_model
+from service.api.values import (
+    ApiModel,
+    BearingAnswer,
+    ByName,
+    EstimatorName,
+    FilmConditionModel,
+    Time,
+    condition_model,
+)
 from service.live.commands import FilmPlace
 from service.live.live_view import CurrentBearing
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
 
 VerdictName = Literal[
     "normal",
@@ -106,7 +112,7 @@ class FilmCauseModel(ApiModel):
 class FilmDirectionModel(ApiModel):
     """State of a film in one direction."""
 
-    verdict: VerdictName
+    verdict: Annotated[VerdictName, ByName]
     """Verdict on the newest reading. Only "normal", "alert" and "danger" judge the film; the others
     give the reason why not: too little evidence yet ("gathering_evidence"), no baseline for this
     condition ("no_baseline"), too little motion ("insufficient_excitation"), a doubtful value
@@ -143,14 +149,8 @@ class FilmLimitsModel(ApiModel):
     """Absolute change of ln of stiffness for danger."""
 
 
-class FilmModel(ApiModel):
+class FilmModel(BearingAnswer):
     """Film of a bearing now."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
 
     is_watched: bool
     """Whether stiffness is compared with a baseline."""
@@ -221,18 +221,15 @@ CURRENT_PERIODS = 2.5
 NORMAL_95 = 1.96
 """Half-width of the 95 % interval of a normal distribution, in standard deviations."""
 
-NONE_IN_FORCE = "none_in_force"
 NOT_LEARNED, ATTITUDE_NOT_LEARNED = "condition_not_learned", "attitude_not_learned"
 
 
 @dataclass(frozen=True)
 class WatchedFilm:
-    """A watched film with its newest reading.
+    """A watched film with the findings of its newest reading.
 
     Parameters
     ----------
-    news
-        Newest reading with its findings.
     why_not_current
         Why the reading is not current; None if it is.
     """
@@ -253,31 +250,29 @@ def why_unwatched(context: Context, unit: str, bearing: str) -> str | None:
 
 
 def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
-    """Film of a bearing now."""
+    """Return the film of a bearing now."""
     seen, place = _seen(context, unit, bearing), context.films.place(unit, bearing)
     x, y = _directions(seen) if seen else (None, None)
     limits = seen.rules.change if seen else None
-    return FilmModel(
+    return FilmModel.of(
         unit=unit,
         bearing=bearing,
         is_watched=seen is not None,
         why_not=why_unwatched(context, unit, bearing),
-        estimator=place.estimator.value if place else None,
-        time=rfc3339(seen.news.reading.time_ns) if seen and seen.news else None,
+        estimator=place and place.estimator,
+        time=seen.news.reading.time_ns if seen and seen.news else None,
         is_current=seen is not None and seen.why_not_current is None,
-        next_reading=_next_reading(seen) if seen else None,
-        condition=_condition(seen) if seen else None,
-        baseline_version=_version(seen.baseline) if seen else None,
-        limits=FilmLimitsModel(alert=limits.alert_change, danger=limits.danger_change)
-        if limits
-        else None,
+        next_reading=seen and _next_reading_ns(seen),
+        condition=seen and _condition(seen),
+        baseline_version=seen and _version(seen.baseline),
+        limits=limits and FilmLimitsModel(alert=limits.alert_change, danger=limits.danger_change),
         x=x,
         y=y,
     )
 
 
 def film_brief(context: Context, unit: str, bearing: str) -> FilmBriefModel:
-    """Summary of the film of a bearing."""
+    """Return the summary of the film of a bearing."""
     seen = _seen(context, unit, bearing)
     x, y = (_word(found) for found in _directions(seen)) if seen else (None, None)
     return FilmBriefModel(bearing=bearing, why_not=why_unwatched(context, unit, bearing), x=x, y=y)
@@ -314,12 +309,12 @@ def _why_not_current(
     return None if news.findings[0].baseline_version == version else "baseline_changed"
 
 
-def _next_reading(seen: WatchedFilm) -> str | None:
+def _next_reading_ns(seen: WatchedFilm) -> int | None:
     """Return the start of the first reading slot after the newest result."""
     newest, period_ns = seen.current.assessment, seen.rules.reading_ns
     if newest is None or not seen.current.is_current:
         return None
-    return rfc3339((newest.time_ns // period_ns + 1) * period_ns)
+    return (newest.time_ns // period_ns + 1) * period_ns
 
 
 def _condition(seen: WatchedFilm) -> FilmConditionModel | None:
@@ -340,35 +335,20 @@ def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionMod
 
 def _unread(reason: str, level: LevelHeldName | None) -> FilmDirectionModel:
     """Return the state without a current reading: only the level in force."""
-    return FilmDirectionModel(
-        verdict="no_reading",
-        reason=reason,
-        level=level,
-        change=None,
-        deviation=None,
-        stiffness_n_per_m=None,
-        cause=None,
-    )
+    unknown = dict.fromkeys(("change", "deviation", "stiffness_n_per_m", "cause"))
+    return FilmDirectionModel.of(verdict="no_reading", reason=reason, level=level, **unknown)
 
 
 def _direction(seen: WatchedFilm, news: FilmNews, row: int) -> FilmDirectionModel:
     finding, ln_k = news.findings[row], news.reading.values[row].ln_k
-    attribution = finding.attribution
-    return FilmDirectionModel(
-        verdict=verdict_name(finding.verdict),
+    return FilmDirectionModel.of(
+        verdict=finding.verdict,
         reason=_reason(seen, news.reading, finding, row),
         level=level_name(finding.level),
         change=_change(finding, news.decisions[row], seen.rules),
         deviation=_deviation(finding),
         stiffness_n_per_m=None if math.isnan(ln_k) else math.exp(ln_k),
-        cause=FilmCauseModel(
-            cause=attribution.cause.value,
-            reason=attribution.reason,
-            film_share=attribution.film_share,
-            film_share_std=attribution.film_share_std,
-        )
-        if attribution
-        else None,
+        cause=finding.attribution,
     )
 
 
@@ -376,7 +356,7 @@ def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: 
     match finding.verdict:
         case Verdict.NO_BASELINE:
             learned = seen.baseline.of(DIRECTIONS[row]) if seen.baseline else None
-            return NONE_IN_FORCE if learned is None else _unseen(learned, reading)
+            return "none_in_force" if learned is None else _unseen(learned, reading)
         case Verdict.TRANSIENT:
             return "not_settled"
         case _:
@@ -384,7 +364,7 @@ def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: 
 
 
 def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
-    """Return what was not learned: the cell, or only the attitude angle within it."""
+    """Return the reason: the cell was not learned, or only its attitude angle."""
     is_seen = learned.table.find(learned.grid.cells(reading.conditions))[0] >= 0
     return ATTITUDE_NOT_LEARNED if is_seen else NOT_LEARNED
 
@@ -395,16 +375,16 @@ def _change(finding: FilmFinding, decision: Decision, rules: FilmRules) -> FilmC
         return None
     low, high = interval_percent(change, std)
     counted_ns = decision.last_counted_ns
-    return FilmChangeModel(
+    return FilmChangeModel.of(
+        finding,
         percent=percent_of(change),
         low_95=low,
         high_95=high,
         ln=change,
         ln_std=std,
-        time_scale_h=time_scale_h,
         significance=abs(change) / std,
         significance_wanted=rules.change.significance_threshold(time_scale_h),
-        as_of=None if counted_ns is None else rfc3339(round(counted_ns / rules.time_lapse)),
+        as_of=None if counted_ns is None else round(counted_ns / rules.time_lapse),
     )
 
 
@@ -447,11 +427,7 @@ def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
 
 def film_router(context: Context) -> APIRouter:
     """Return the route of the film now."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings/{bearing}/film",
-        tags=["film"],
-        dependencies=[needs(Permission.READ)],
-    )
+    router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 
     @router.get(
         "", summary="A film now", response_model=FilmModel, responses=problem_responses(404)
@@ -459,7 +435,7 @@ def film_router(context: Context) -> APIRouter:
     async def film(unit: UnitId, bearing: BearingId) -> Response:
         """Show verdict, change with its uncertainty, cause and condition, by direction.
 
-        A film that cannot be judged is never reported as normal: the verdict says why not.
+        A film that cannot be judged is never reported as normal: the verdict gives the reason.
         """
         context.bearing(unit, bearing)
         return await rendered(lambda: film_model(context, unit, bearing))

@@ -1,7 +1,6 @@
 """Motion of a shaft in its bearing, sample by sample."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
@@ -13,34 +12,34 @@ from core.arrays import FloatArray
 from core.machine.unit import Bearing
 from core.monitor.assessment import OrbitTrace
 from core.samples.blocks import SampleBlock
-from service.api.answers import Renderings, rendered, worked
-from service.api.auth.declared import needs
+from service.api.answers import Renderings, rendered
+from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.parameters import duration
+from service.api.problems import ProblemError, problem_responses
 from service.api.routes.bearings import no_result
+from service.api.routes.channels import NEWEST, NO_SAMPLES, held_blocks, require_samples
 from service.api.routes.recordings import (
     RecordingId,
     damaged_recording,
-    shelf_of,
-    unknown_recording,
+    entry_of,
+    library_of,
 )
-from service.api.values import ApiModel, Time, listed
+from service.api.values import ApiModel, BearingAnswer, SampleRange, Time, listed
 from service.live.live_view import HELD_S
 from service.live.samples import newest_blocks, sample_window
 from service.recordings.library import RecordingEntry
 from service.recordings.motion import (
     NoMotionError,
     Order1,
+    RecordedMotion,
     ShaftMotion,
     channels_for,
     motion_of,
     recorded_motion,
 )
-from service.runtime.times import rfc3339
 from service.settings.core_values import machine_of
-from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.units import UnitSettings
-from service.store.access.identities import Permission
 
 
 class EllipseModel(ApiModel):
@@ -75,14 +74,8 @@ class MotionOrder1Model(ApiModel):
     """Orbit."""
 
 
-class MotionModel(ApiModel):
+class MotionModel(SampleRange, BearingAnswer):
     """Motion of a shaft relative to its bearing, at the full sampling rate."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
 
     recording: Annotated[str | None, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]
     """Name of the recording; null for the newest samples."""
@@ -98,15 +91,6 @@ class MotionModel(ApiModel):
 
     age_s: float | None
     """Age of the newest samples, s; null for a recording."""
-
-    epoch: int
-    """Changes when the device restarts its count."""
-
-    first_index: int
-    """Index of the first sample."""
-
-    rate_hz: float
-    """Samples per second."""
 
     n_samples: int
     """Samples in each direction."""
@@ -164,55 +148,48 @@ SENSES: dict[int, Literal["x_to_y", "y_to_x", "straight"]] = {
 }
 
 
-@dataclass(frozen=True)
-class MotionOrigin:
-    """Origin of samples: memory, with their age, or a recording."""
-
-    age_s: float | None = None
-    recording: str | None = None
-    offset_s: float | None = None
-    total_s: float | None = None
-
-
 def motion_model(
-    unit: str, bearing: Bearing, motion: ShaftMotion, origin: MotionOrigin
+    unit: str,
+    bearing: Bearing,
+    motion: ShaftMotion,
+    age_s: float | None = None,
+    recording: str | None = None,
+    recorded: RecordedMotion | None = None,
 ) -> MotionModel:
-    """Return the model of a motion and its origin."""
-    window, marks = motion.window, motion.marks
-    return MotionModel(
+    """Return the model of a motion.
+
+    Parameters
+    ----------
+    age_s
+        Age of samples from memory.
+    recording, recorded
+        Recording of the samples and their place in it.
+    """
+    marks = motion.marks
+    return MotionModel.of(
+        motion,
+        motion.window,
         unit=unit,
         bearing=bearing.id,
-        recording=origin.recording,
-        start=rfc3339(window.start_ns),
-        offset_s=origin.offset_s,
-        total_s=origin.total_s,
-        age_s=origin.age_s,
-        epoch=window.epoch,
-        first_index=window.first_index,
-        rate_hz=window.rate_hz,
+        recording=recording,
+        offset_s=recorded and recorded.offset_s,
+        total_s=recorded and recorded.total_s,
+        age_s=age_s,
         n_samples=motion.x_um.size,
         shaft_x_um=_rounded(motion.x_um),
         shaft_y_um=_rounded(motion.y_um),
-        centre_um=None if motion.centre_um is None else list(motion.centre_um),
         clearance_um=bearing.clearance_um,
-        speed_rpm=motion.speed_rpm,
         order1=None if motion.order1 is None else _order1(motion.order1),
         mark=None if marks is None else np.round(marks, DECIMALS).tolist(),
     )
 
 
 def _order1(found: Order1) -> MotionOrder1Model:
-    ellipse = found.ellipse
-    return MotionOrder1Model(
-        frequency_hz=found.frequency_hz,
+    return MotionOrder1Model.of(
+        found,
         shaft_x_um=_rounded(found.x_um),
         shaft_y_um=_rounded(found.y_um),
-        ellipse=EllipseModel(
-            major_um_pk=ellipse.major_um_pk,
-            minor_um_pk=ellipse.minor_um_pk,
-            angle_deg=ellipse.angle_deg,
-            sense=SENSES[ellipse.sense],
-        ),
+        ellipse=EllipseModel.of(found.ellipse, sense=SENSES[found.ellipse.sense]),
     )
 
 
@@ -222,9 +199,9 @@ def _rounded(values_um: FloatArray) -> list[float | None]:
 
 def orbit_model(orbit: OrbitTrace) -> OrbitModel:
     """Return the model of an orbit."""
-    return OrbitModel(
-        time=rfc3339(orbit.start_ns),
-        rate_hz=orbit.rate_hz,
+    return OrbitModel.of(
+        orbit,
+        time=orbit.start_ns,
         duration_s=orbit.shaft_x_um.size / orbit.rate_hz,
         shaft_x_um=orbit.shaft_x_um.tolist(),
         shaft_y_um=orbit.shaft_y_um.tolist(),
@@ -236,26 +213,19 @@ MAX_SAMPLES = 60_000
 
 MAX_SECONDS = 600.0
 
-LIVE_PROBLEMS = described_problems(
-    {404: "Unknown unit or bearing", 409: "There are no samples", 422: "A wrong parameter"}
-)
-RECORDING_PROBLEMS = described_problems(
-    {
+RECORDING_PROBLEMS = problem_responses(
+    410,
+    422,
+    own={
         404: "Unknown recording or bearing",
         409: "It has no samples of that bearing, or none at that time",
-        422: "A wrong parameter",
-        410: "Damaged on the disk",
-    }
+    },
 )
 
 
 def motion_router(context: Context) -> APIRouter:
     """Return the routes of the newest motion."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings",
-        tags=["bearing"],
-        dependencies=[needs(Permission.READ)],
-    )
+    router = subject_router("/units/{unit}/bearings", "bearing")
     orbits = Renderings()
 
     @router.get(
@@ -275,44 +245,28 @@ def motion_router(context: Context) -> APIRouter:
     @router.get(
         "/{bearing}/motion",
         summary="Motion of the shaft",
-        responses=LIVE_PROBLEMS,
+        responses=problem_responses(404, 422, own=NO_SAMPLES),
         response_model=MotionModel,
     )
     async def motion(
         unit: UnitId,
         bearing: BearingId,
-        seconds: Annotated[
-            float,
-            Query(
-                gt=0.0,
-                le=HELD_S,
-                allow_inf_nan=False,
-                description="Duration of the newest samples; limited to those in memory.",
-                examples=[5.0],
-            ),
-        ] = 5.0,
+        seconds: Annotated[float, duration(HELD_S, NEWEST, examples=[5.0])] = 5.0,
     ) -> Response:
         """Return the newest motion of a shaft in its bearing: all of it, and 1× alone."""
         context.bearing(unit, bearing)
         settings, watched = context.unit(unit), context.references.bearing(unit, bearing)
-        if isinstance(settings.source, ModbusVectorSettings):
-            detail = f"unit {unit!r} is read from a rack that gives amplitudes, not samples"
-            raise ProblemError(409, "No samples", detail)
-        blocks, age_s = context.live.blocks(unit), context.live.data_age_s(unit)
-        if not blocks or age_s is None:
-            raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")
+        require_samples(settings)
+        blocks, age_s = held_blocks(context.live, unit)
         _require_few(seconds, blocks[-1].rate_hz)
-        origin = MotionOrigin(age_s=age_s)
-        return await rendered(lambda: _newest(settings, watched, blocks, seconds, origin))
+        return await rendered(lambda: _newest(settings, watched, blocks, seconds, age_s))
 
     return router
 
 
 def recorded_motion_router(context: Context) -> APIRouter:
     """Return the route of the motion in recordings."""
-    router = APIRouter(
-        prefix="/api/v1/recordings", tags=["recordings"], dependencies=[needs(Permission.READ)]
-    )
+    router = subject_router("/recordings", "recordings")
 
     @router.get(
         "/{recording}/motion",
@@ -335,18 +289,13 @@ def recorded_motion_router(context: Context) -> APIRouter:
                 examples=[30.0],
             ),
         ] = 0.0,
-        seconds: Annotated[
-            float,
-            Query(gt=0.0, le=MAX_SECONDS, allow_inf_nan=False, description="Duration."),
-        ] = 10.0,
+        seconds: Annotated[float, duration(MAX_SECONDS, "Duration.")] = 10.0,
     ) -> Response:
         """Return the motion of a shaft in its bearing at a time of a recording.
 
         The calibration of the recording applies. The answer ends before a restart of the device.
         """
-        kept = await worked(lambda: shelf_of(context).one(recording))
-        if kept is None:
-            raise unknown_recording(recording)
+        kept = await entry_of(context, recording)
         unit = _unit_of(context, kept)
         context.bearing(unit, bearing)
         watched = context.references.bearing(unit, bearing)
@@ -368,7 +317,7 @@ def _newest(
     bearing: Bearing,
     blocks: Sequence[SampleBlock],
     seconds: float,
-    origin: MotionOrigin,
+    age_s: float,
 ) -> MotionModel:
     machine = machine_of(settings)
     ids = [channel.id for channel in machine.channels]
@@ -376,18 +325,17 @@ def _newest(
     n_wanted = max(1, round(seconds * blocks[-1].rate_hz))
     held, first_index, n_samples = newest_blocks(blocks, n_wanted)
     found = motion_of(sample_window(held, rows, first_index, n_samples), machine, bearing)
-    return motion_model(settings.id, bearing, found, origin)
+    return motion_model(settings.id, bearing, found, age_s)
 
 
 def _recorded(
     context: Context, name: str, bearing: Bearing, start_s: float, seconds: float
 ) -> MotionModel:
-    recording = shelf_of(context).opened(name)
+    recording = library_of(context).opened(name)
     unit = recording.manifest.unit
     machine = machine_of(context.unit(unit))
     found = recorded_motion(recording, machine, bearing, start_s, seconds)
-    origin = MotionOrigin(recording=name, offset_s=found.offset_s, total_s=found.total_s)
-    return motion_model(unit, bearing, found.motion, origin)
+    return motion_model(unit, bearing, found.motion, recording=name, recorded=found)
 
 
 def _unit_of(context: Context, kept: RecordingEntry) -> str:

@@ -6,14 +6,12 @@ from fastapi import APIRouter, Response
 from pydantic import Field
 
 from service.api.answers import rendered_now
-from service.api.auth.declared import Reach, needs
+from service.api.auth.declared import Reach, subject_router
 from service.api.context import Context
 from service.api.problems import problem_responses
-from service.api.values import ApiModel, Time
+from service.api.values import ApiModel, DatedAnswer, Time
 from service.notifications.sender import ReceiverView, SenderStatus
-from service.runtime.times import rfc3339
 from service.settings.notifications import ChannelKind
-from service.store.access.identities import Permission
 from service.store.outbox import Backlog, LetterState, StoredLetter
 
 SenderStateName = Literal[
@@ -83,14 +81,11 @@ class ReceiverModel(ApiModel):
     """Time of the last delivery."""
 
 
-class DeliveryModel(ApiModel):
+class DeliveryModel(DatedAnswer):
     """All receivers."""
 
     origin: Literal["live", "replay"]
     """A replay sends no messages."""
-
-    time: Time
-    """Present time."""
 
     n_waiting: int
     """Waiting messages of all receivers."""
@@ -107,9 +102,7 @@ NO_BACKLOG = Backlog("", 0, None, 0, None, None)
 
 def delivery_router(context: Context) -> APIRouter:
     """Return the route of deliveries."""
-    router = APIRouter(
-        prefix="/api/v1", tags=["alarms"], dependencies=[needs(Permission.READ, Reach.NO_UNIT)]
-    )
+    router = subject_router("", "alarms", reach=Reach.NO_UNIT)
 
     @router.get(
         "/delivery",
@@ -119,16 +112,16 @@ def delivery_router(context: Context) -> APIRouter:
     )
     async def delivery() -> Response:
         """List all receivers of webhooks and mail: backlog, failures, undelivered messages."""
-        receivers = [_receiver(view) for view in await context.deliveries.look()]
+        receivers = [_receiver(view) for view in await context.receivers()]
         return await rendered_now(lambda: _delivery(context, receivers))
 
     return router
 
 
 def _delivery(context: Context, receivers: list[ReceiverModel]) -> DeliveryModel:
-    return DeliveryModel(
-        origin=context.origin.value,
-        time=rfc3339(context.clock.now_ns()),
+    return DeliveryModel.of(
+        context,
+        time=context.clock.now_ns(),
         n_waiting=sum(receiver.n_waiting for receiver in receivers),
         n_failing=sum(receiver.is_failing for receiver in receivers),
         receivers=receivers,
@@ -138,34 +131,22 @@ def _delivery(context: Context, receivers: list[ReceiverModel]) -> DeliveryModel
 def _receiver(view: ReceiverView) -> ReceiverModel:
     receiver, backlog = view.receiver, view.backlog or NO_BACKLOG
     status = view.status or SenderStatus()
-    return ReceiverModel(
+    return ReceiverModel.of(
+        status,
+        backlog,
         id=view.name,
-        kind=receiver.settings.kind if receiver else None,
-        address=receiver.channel.address if receiver else None,
-        state=status.state.value if view.status else "not_in_the_plant_file",
+        kind=receiver and receiver.settings.kind,
+        address=receiver and receiver.channel.address,
+        state=status.state if view.status else "not_in_the_plant_file",
         is_failing=status.n_failures > 0,
-        n_failures=status.n_failures,
-        failing_since=_time(status.failing_since_ns),
-        reason=status.reason,
-        next_attempt=_time(status.next_attempt_ns),
-        n_waiting=backlog.n_waiting,
-        waiting_since=_time(backlog.oldest_ns),
-        n_dead=backlog.n_dead,
+        waiting_since=backlog.oldest_ns,
         last_dead=_dead(backlog.last_dead),
-        last_delivered=_time(backlog.delivered_ns),
+        last_delivered=backlog.delivered_ns,
     )
 
 
 def _dead(letter: StoredLetter | None) -> DeadLetterModel | None:
     if letter is None or letter.done_ns is None:
         return None
-    return DeadLetterModel(
-        event_id=letter.event_id,
-        outcome="refused" if letter.state is LetterState.REFUSED else "expired",
-        reason=letter.answer,
-        time=rfc3339(letter.done_ns),
-    )
-
-
-def _time(time_ns: int | None) -> str | None:
-    return None if time_ns is None else rfc3339(time_ns)
+    outcome = "refused" if letter.state is LetterState.REFUSED else "expired"
+    return DeadLetterModel.of(letter, outcome=outcome, reason=letter.answer, time=letter.done_ns)

@@ -5,19 +5,17 @@ from dataclasses import dataclass
 from threading import Lock
 from typing import Literal
 
-from fastapi import APIRouter, Request, Response
+from fastapi import APIRouter, Response
 
-from service.api.answers import digest_of, is_known, tag_of, worked
-from service.api.auth.declared import needs
+from service.api.answers import digest_of, in_thread, tag_of
+from service.api.auth.declared import subject_router
 from service.api.context import Context
-from service.api.routes.alarm_models import AlarmCountModel, alarm_count_model
+from service.api.routes.alarm_models import AlarmCountModel
 from service.api.routes.bearings import LatestModel, latest_model
 from service.api.routes.films import FilmBriefModel, film_brief
-from service.api.routes.plant import SourceModel, source_model
-from service.api.values import ApiModel, Time
+from service.api.routes.plant import BasicUnitModel, source_model
+from service.api.values import ApiModel, DatedAnswer
 from service.live.live_view import UnitStatus
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
 
 
 class EvidenceStatusModel(ApiModel):
@@ -70,20 +68,8 @@ class CapturesModel(ApiModel):
     """Recordings finished since the service started."""
 
 
-class UnitOverviewModel(ApiModel):
+class UnitOverviewModel(BasicUnitModel):
     """A unit with all its bearings."""
-
-    id: str
-    """Stable identifier."""
-
-    name: str
-    """Display name."""
-
-    rated_speed_rpm: float
-    """Rated running speed."""
-
-    source: SourceModel
-    """State of its source."""
 
     bearings: list[LatestModel]
     """Its guide bearings now."""
@@ -92,14 +78,11 @@ class UnitOverviewModel(ApiModel):
     """Summaries of their films, in the same order."""
 
 
-class OverviewModel(ApiModel):
+class OverviewModel(DatedAnswer):
     """Overview of the plant for a control room."""
 
     plant: PlantModel
     """Name and origin."""
-
-    time: Time
-    """Present time."""
 
     refresh_s: float
     """Period of results, s."""
@@ -198,14 +181,12 @@ class Overview:
         self._rendering = Lock()
         self._answer: Answer | None = None
 
-    async def answer(self, if_none_match: str | None) -> Response:
-        """Return the overview, or status 304 if the client has it."""
+    async def answer(self) -> Response:
+        """Return the overview."""
         revision, now_s = self._revision(), self._context.clock.monotonic_s()
         kept = self._answer
         if kept is None or kept.revision != revision or now_s - kept.made_s >= SHARED_S:
             kept = self._answer = await self._make(revision, now_s)
-        if is_known(kept.tag, if_none_match):
-            return Response(status_code=304, headers={"ETag": kept.tag})
         return Response(kept.body, media_type="application/json", headers={"ETag": kept.tag})
 
     def _revision(self) -> tuple[object, ...]:
@@ -218,7 +199,7 @@ class Overview:
         states = {unit: self._state(unit) for unit in self._context.units}
         head = self._head()
         if any(self._is_old(unit, state) for unit, state in states.items()):
-            await worked(lambda: self._renew(states))
+            await in_thread(lambda: self._renew(states))
         parts = [self._parts[unit] for unit in states]
         without_time = head.model_copy(update={"time": ""}).model_dump_json().encode()
         tag = tag_of(digest_of(without_time), *(part.digest for part in parts))
@@ -251,10 +232,8 @@ class Overview:
     def _part(self, unit: str, state: UnitState) -> UnitPart:
         context, settings = self._context, self._context.units[unit]
         source = source_model(context.live, unit).model_copy(update={"data_age_s": None})
-        model = UnitOverviewModel(
-            id=unit,
-            name=settings.name,
-            rated_speed_rpm=settings.rated_speed_rpm,
+        model = UnitOverviewModel.of(
+            settings,
             source=source,
             bearings=[self._ageless(unit, bearing.id) for bearing in settings.bearing],
             films=[film_brief(context, unit, bearing.id) for bearing in settings.bearing],
@@ -276,18 +255,13 @@ class Overview:
     def _head(self) -> OverviewModel:
         """Return the overview without units."""
         context = self._context
-        return OverviewModel(
-            plant=PlantModel(name=context.plant_name, origin=context.origin.value),
-            time=rfc3339(context.clock.now_ns()),
-            refresh_s=context.refresh_s,
-            store=StoreModel(error=context.live.store_error, n_unstored=context.live.n_unstored),
-            alarms=alarm_count_model(context.alarms),
-            captures=CapturesModel(
-                error=context.captures.error,
-                n_running=context.captures.n_running,
-                n_written=context.captures.n_written,
-            ),
-            evidence=_evidence(context),
+        return OverviewModel.of(
+            context,
+            plant=PlantModel.of(context, name=context.plant_name),
+            time=context.clock.now_ns(),
+            store=StoreModel.of(context.live, error=context.live.store_error),
+            alarms=context.alarms.count(),
+            evidence=context.evidence and context.evidence(),
             units=[],
         )
 
@@ -299,26 +273,14 @@ def _around_ages(content: bytes) -> list[bytes]:
     return [source + DATA_AGE, *(piece + AGE for piece in before), last]
 
 
-def _evidence(context: Context) -> EvidenceStatusModel | None:
-    if context.evidence is None:
-        return None
-    status = context.evidence()
-    return EvidenceStatusModel(
-        error=status.error,
-        n_waiting=status.n_waiting,
-        n_written=status.n_written,
-        n_lost=status.n_lost,
-    )
-
-
 def overview_router(context: Context) -> APIRouter:
     """Return the route of the overview."""
-    router = APIRouter(prefix="/api/v1", tags=["plant"], dependencies=[needs(Permission.READ)])
+    router = subject_router("", "plant")
     shown = Overview(context)
 
     @router.get("/overview", summary="Everything at a glance", response_model=OverviewModel)
-    async def overview(request: Request) -> Response:
+    async def overview() -> Response:
         """Show all units with all bearings; values that are not current are null."""
-        return await shown.answer(request.headers.get("if-none-match"))
+        return await shown.answer()
 
     return router

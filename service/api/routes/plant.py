@@ -10,14 +10,11 @@ from pydantic import Field
 from core.monitor.catalogue import CATALOGUE
 from core.samples.gaps import Gap
 from core.units import ns_from_s
-from service.api.auth.declared import Reach, needs
-from service.api.context import Context, LiveLook, UnitId
+from service.api.auth.declared import Reach, needs, subject_router
+from service.api.context import Context, LiveState, UnitId
 from service.api.parameters import TimeRange
-from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, Time
-from service.live.live_view import UnitStatus
-from service.runtime.metrics import HistogramState
-from service.runtime.times import rfc3339
 from service.settings.loading import plant_file_schema
 from service.settings.units import UnitSettings
 from service.store.access.identities import Permission
@@ -129,37 +126,21 @@ class SourceHealthModel(SourceModel):
     """CAN frames rejected since the service started, by reason."""
 
 
-def source_model(live: LiveLook, unit: str) -> SourceModel:
+def source_model(live: LiveState, unit: str) -> SourceModel:
     """Return the state of the source of a unit."""
     status = live.status(unit)
-    account = status.account
-    last = status.last_sample_ns
-    return SourceModel(
-        state=status.state.value,
-        reason=status.reason,
-        since=None if status.since_ns is None else rfc3339(status.since_ns),
-        data_age_s=live.data_age_s(unit),
-        last_sample_time=None if last is None else rfc3339(last),
-        n_offered=account.n_offered,
-        n_stored=account.n_stored,
-        n_flagged=account.n_flagged,
-        n_gap=account.n_gap,
-        n_repeated=account.n_repeated,
-        n_restarts=account.n_restarts,
-        rejected=dict(account.rejected),
-        clock=_clock_model(status),
-    )
-
-
-def _clock_model(status: UnitStatus) -> DeviceClockModel | None:
-    if status.clock is None:
-        return None
-    return DeviceClockModel(
-        offset_s=status.clock.offset_s,
-        drift_ppm=status.clock.drift_ppm,
+    clock = status.clock and DeviceClockModel.of(
+        status.clock,
+        status,
         drift_uncertainty_ppm=status.clock.u_drift_ppm,
         n_stamp_faults=status.clock.n_faults,
-        stamp_fault=None if status.stamp_fault is None else status.stamp_fault.value,
+    )
+    return SourceModel.of(
+        status,
+        status.account,
+        data_age_s=live.data_age_s(unit),
+        last_sample_time=status.last_sample_ns,
+        clock=clock,
     )
 
 
@@ -186,7 +167,7 @@ class GapModel(ApiModel):
     times, and otherwise exact."""
 
 
-class UnitModel(ApiModel):
+class BasicUnitModel(ApiModel):
     """A unit and the state of its source."""
 
     id: str
@@ -198,15 +179,19 @@ class UnitModel(ApiModel):
     rated_speed_rpm: float
     """Rated running speed."""
 
-    bearing_ids: list[str]
-    """Identifiers of its guide bearings."""
-
     source: SourceModel
     """State of its source."""
 
 
+class UnitModel(BasicUnitModel):
+    """A unit and the state of its source."""
+
+    bearing_ids: list[str]
+    """Identifiers of its guide bearings."""
+
+
 class QuantityModel(ApiModel):
-    """A quantity that trends can be asked for."""
+    """A quantity of results and trends."""
 
     name: str
     """Name in readings and trends."""
@@ -216,108 +201,6 @@ class QuantityModel(ApiModel):
 
     label: str
     """Description in words."""
-
-
-def plant_router(context: Context) -> APIRouter:
-    """Return the routes of units and quantities."""
-    router = APIRouter(prefix="/api/v1", tags=["plant"], dependencies=[needs(Permission.READ)])
-
-    @router.get("/units", summary="All units")
-    async def units() -> list[UnitModel]:
-        """List all units with the state of their sources."""
-        return [_unit(context, unit) for unit in context.units]
-
-    @router.get("/units/{unit}", summary="One unit", responses=problem_responses(404))
-    async def one_unit(unit: UnitId) -> UnitModel:
-        """A unit and the state of its source."""
-        return _unit(context, context.unit(unit).id)
-
-    @router.get(
-        "/quantities",
-        summary="The catalogue of quantities",
-        dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
-    )
-    async def quantities() -> list[QuantityModel]:
-        """List name, unit and meaning of all quantities of a bearing."""
-        return [QuantityModel(name=q.name, unit=q.unit, label=q.label) for q in CATALOGUE]
-
-    return router
-
-
-def _unit(context: Context, unit: str) -> UnitModel:
-    settings = context.units[unit]
-    return UnitModel(
-        id=unit,
-        name=settings.name,
-        rated_speed_rpm=settings.rated_speed_rpm,
-        bearing_ids=[bearing.id for bearing in settings.bearing],
-        source=source_model(context.live, unit),
-    )
-
-
-def source_router(context: Context) -> APIRouter:
-    """Return the route of sources."""
-    router = APIRouter(
-        prefix="/api/v1/sources", tags=["plant"], dependencies=[needs(Permission.READ)]
-    )
-
-    @router.get("", summary="Health of each source")
-    async def sources() -> list[SourceHealthModel]:
-        """List state and reason, failed attempts, account of samples, and device clock."""
-        return [_health(context, unit) for unit in context.units.values()]
-
-    return router
-
-
-def _health(context: Context, settings: UnitSettings) -> SourceHealthModel:
-    arriving, source = source_model(context.live, settings.id), context.sources.get(settings.id)
-    return SourceHealthModel(
-        **arriving.model_dump(),
-        unit=settings.id,
-        kind=settings.source.kind,
-        n_failed=context.live.status(settings.id).n_failed,
-        rate_hz=settings.sampling_hz,
-        poll_period_s=getattr(settings.source, "poll_period_s", None),
-        polls=None if source is None else _polls(source.polls.state()),
-        refused_frames={} if source is None else dict(source.refused_frames),
-    )
-
-
-def _polls(state: HistogramState) -> PollsModel | None:
-    if state.newest_s is None:
-        return None
-    n_polls = state.n_up_to[-1]
-    return PollsModel(n=n_polls, newest_s=state.newest_s, mean_s=state.sum_s / n_polls)
-
-
-def gap_router(context: Context) -> APIRouter:
-    """Return the route of gaps."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}", tags=["plant"], dependencies=[needs(Permission.READ)]
-    )
-
-    @router.get("/gaps", summary="Gaps", responses=problem_responses(404, 422, 503))
-    async def gaps(unit: UnitId, times: TimeRange) -> list[GapModel]:
-        """List gaps in the samples of a unit, including stops of the service, by their end."""
-        found = await asyncio.to_thread(context.store.gaps, context.unit(unit).id, *times)
-        rate_hz = context.unit(unit).sampling_hz
-        return [_gap_model(gap, rate_hz) for gap in found]
-
-    return router
-
-
-def _gap_model(gap: Gap, rate_hz: float) -> GapModel:
-    start_ns = gap.start_ns
-    if start_ns is None:
-        start_ns = gap.stop_ns - ns_from_s(gap.n_samples / rate_hz)
-    return GapModel(
-        epoch=gap.epoch,
-        first_index=gap.first_index,
-        n_samples=gap.n_samples,
-        start=rfc3339(start_ns),
-        end=rfc3339(gap.stop_ns),
-        is_estimated=gap.is_estimated,
-    )
 
 
 class ConfigurationModel(ApiModel):
@@ -343,16 +226,47 @@ SCHEMA = "/api/v1/configuration/schema"
 
 SCHEMA_TYPE = "application/schema+json"
 
-ABSENT = described_problems({404: "The service keeps no configuration"})
 
+def plant_router(context: Context) -> APIRouter:
+    """Return the routes of units, their sources and gaps, quantities, and the configuration."""
+    router = subject_router("", "plant")
 
-def configuration_router(context: Context) -> APIRouter:
-    """Return the routes of the configuration."""
-    router = APIRouter(
-        prefix="/api/v1/configuration", tags=["plant"], dependencies=[needs(Permission.READ)]
+    @router.get("/units", summary="All units")
+    async def units() -> list[UnitModel]:
+        """List all units with the state of their sources."""
+        return [_unit(context, unit) for unit in context.units]
+
+    @router.get("/units/{unit}", summary="One unit", responses=problem_responses(404))
+    async def one_unit(unit: UnitId) -> UnitModel:
+        """Show a unit and the state of its source."""
+        return _unit(context, context.unit(unit).id)
+
+    @router.get(
+        "/quantities",
+        summary="The catalogue of quantities",
+        dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
     )
+    async def quantities() -> list[QuantityModel]:
+        """List name, unit and meaning of all quantities of a bearing."""
+        return [QuantityModel.of(quantity) for quantity in CATALOGUE]
 
-    @router.get("", summary="Configuration", responses=ABSENT)
+    @router.get("/sources", summary="Health of each source")
+    async def sources() -> list[SourceHealthModel]:
+        """List state and reason, failed attempts, account of samples, and device clock."""
+        return [_health(context, unit) for unit in context.units.values()]
+
+    @router.get("/units/{unit}/gaps", summary="Gaps", responses=problem_responses(404, 422, 503))
+    async def gaps(unit: UnitId, times: TimeRange) -> list[GapModel]:
+        """List gaps in the samples of a unit, including stops of the service, by their end."""
+        found = await asyncio.to_thread(context.store.gaps, context.unit(unit).id, *times)
+        rate_hz = context.unit(unit).sampling_hz
+        return [_gap_model(gap, rate_hz) for gap in found]
+
+    @router.get(
+        "/configuration",
+        summary="Configuration",
+        responses=problem_responses(own={404: "The service keeps no configuration"}),
+    )
     async def configuration() -> ConfigurationModel:
         """Show the plant file as read when the service started, without secrets.
 
@@ -371,7 +285,7 @@ def configuration_router(context: Context) -> APIRouter:
         )
 
     @router.get(
-        "/schema",
+        "/configuration/schema",
         dependencies=[needs(Permission.READ, Reach.NO_UNIT)],
         summary="JSON schema of plant files",
         response_class=Response,
@@ -382,6 +296,39 @@ def configuration_router(context: Context) -> APIRouter:
         return Response(json.dumps(plant_file_schema()), media_type=SCHEMA_TYPE)
 
     return router
+
+
+def _unit(context: Context, unit: str) -> UnitModel:
+    settings, source = context.units[unit], source_model(context.live, unit)
+    return UnitModel.of(settings, source=source, bearing_ids=[b.id for b in settings.bearing])
+
+
+def _health(context: Context, settings: UnitSettings) -> SourceHealthModel:
+    arriving, source = source_model(context.live, settings.id), context.sources.get(settings.id)
+    return SourceHealthModel.of(
+        arriving,
+        unit=settings.id,
+        kind=settings.source.kind,
+        n_failed=context.live.status(settings.id).n_failed,
+        rate_hz=settings.sampling_hz,
+        poll_period_s=getattr(settings.source, "poll_period_s", None),
+        polls=None if source is None else _polls(source.polls.state()),
+        refused_frames={} if source is None else source.refused_frames,
+    )
+
+
+def _polls(state: HistogramState) -> PollsModel | None:
+    if state.newest_s is None:
+        return None
+    n_polls = state.n_up_to[-1]
+    return PollsModel(n=n_polls, newest_s=state.newest_s, mean_s=state.sum_s / n_polls)
+
+
+def _gap_model(gap: Gap, rate_hz: float) -> GapModel:
+    start_ns = gap.start_ns
+    if start_ns is None:
+        start_ns = gap.stop_ns - ns_from_s(gap.n_samples / rate_hz)
+    return GapModel.of(gap, start=start_ns, end=gap.stop_ns)
 
 
 def _schema_content() -> dict[str, Any]:

@@ -9,36 +9,16 @@ from fastapi.responses import StreamingResponse
 from pydantic import Field
 
 from acquisition.errors import ConfigError
-from service.api.answers import rendered, worked
-from service.api.auth.declared import needs
+from service.api.answers import in_thread, rendered
+from service.api.auth.declared import subject_router
 from service.api.context import Context
 from service.api.downloads import TooManyDownloadsError
-from service.api.problems import ProblemError, described_problems
+from service.api.parameters import only
+from service.api.problems import ProblemError, problem_responses
 from service.api.routes.channels import UNITS, ChannelUnit
 from service.api.values import ApiModel, Time
 from service.recordings.library import RecordingEntry, RecordingLibrary
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
 from service.store.waveform_port import WaveformKind
-
-
-class RecordingAlarmModel(ApiModel):
-    """Event of an alarm that a recording was made for."""
-
-    alarm: Annotated[str, Field(examples=["U1:UJB:shaft_x"])]
-    """Identifier of the alarm."""
-
-    occurrence: int
-    """Occurrence of the alarm."""
-
-    change: Annotated[str, Field(examples=["raised"])]
-    """Kind of event."""
-
-    level: str | None
-    """Level of the alarm at that time."""
-
-    time: Time
-    """Time of the event."""
 
 
 class RunningRecordingModel(ApiModel):
@@ -49,6 +29,19 @@ class RunningRecordingModel(ApiModel):
 
     occurrence: int
     """Occurrence of the alarm."""
+
+
+class RecordingAlarmModel(RunningRecordingModel):
+    """Event of an alarm that a recording was made for."""
+
+    change: Annotated[str, Field(examples=["raised"])]
+    """Kind of event."""
+
+    level: str | None
+    """Level of the alarm at that time."""
+
+    time: Time
+    """Time of the event."""
 
 
 class RecordingModel(ApiModel):
@@ -180,18 +173,14 @@ class RecordingInfoModel(ApiModel):
 def recording_model(kept: RecordingEntry) -> RecordingModel:
     """Return the entry of a recording in the list."""
     manifest = kept.manifest
-    return RecordingModel(
+    described = ("unit", "start", "rate_hz", "n_samples")
+    return RecordingModel.of(
+        kept,
         id=kept.name,
-        kind=kept.kind.value,
         state="complete" if kept.fault is None else "damaged",
         reason=kept.fault,
-        unit=None if manifest is None else manifest.unit,
-        start=None if manifest is None else manifest.start,
-        duration_s=None if manifest is None else manifest.n_samples / manifest.rate_hz,
-        rate_hz=None if manifest is None else manifest.rate_hz,
-        n_samples=None if manifest is None else manifest.n_samples,
-        n_bytes=kept.n_bytes,
-        alarms=[RecordingAlarmModel(**each) for each in kept.alarms],
+        duration_s=manifest and manifest.n_samples / manifest.rate_hz,
+        **{name: manifest and getattr(manifest, name) for name in described},
     )
 
 
@@ -207,26 +196,17 @@ def recording_info(shelf: RecordingLibrary, kept: RecordingEntry) -> RecordingIn
     if manifest is None or kept.fault is not None:
         raise ConfigError(kept.fault or "its manifest cannot be read")
     summary = shelf.summary(kept.name)
-    return RecordingInfoModel(
+    return RecordingInfoModel.of(
+        summary,
+        manifest,
         recording=recording_model(kept),
-        made_by=manifest.made_by,
-        sample_type=manifest.sample_type,
-        end=rfc3339(summary.stop_ns),
-        n_gaps=summary.n_gaps,
-        n_gap_samples=summary.n_gap_samples,
-        rejected=dict(summary.rejected),
-        epochs=list(summary.epochs),
+        end=summary.stop_ns,
         channels=[
             RecordedChannelModel(
                 id=each.id, unit=UNITS[each.measurand], n_not_ok=summary.n_not_ok.get(each.id, 0)
             )
             for each in manifest.channels
         ],
-        slow_channels=[RecordedSlowModel(id=e.id, unit=e.unit) for e in manifest.slow_channels],
-        files={
-            name: RecordedFileModel(size=file.size, sha256=file.sha256)
-            for name, file in manifest.files.items()
-        },
     )
 
 
@@ -239,15 +219,10 @@ RecordingId = Annotated[
     ),
 ]
 
-LIST_PROBLEMS = described_problems({404: "No recordings are kept here", 422: "A wrong parameter"})
+LIST_PROBLEMS = problem_responses(422, own={404: "No recordings are kept here"})
 
-PROBLEMS = described_problems(
-    {
-        404: "Unknown recording",
-        422: "A wrong parameter",
-        410: "Damaged on the disk",
-        503: "Too many concurrent downloads",
-    }
+PROBLEMS = problem_responses(
+    410, 422, own={404: "Unknown recording", 503: "Too many concurrent downloads"}
 )
 
 Pieces = Generator[bytes, None, None]
@@ -257,16 +232,12 @@ log = structlog.get_logger()
 
 def recording_router(context: Context) -> APIRouter:
     """Return the routes of recordings."""
-    router = APIRouter(
-        prefix="/api/v1/recordings", tags=["recordings"], dependencies=[needs(Permission.READ)]
-    )
+    router = subject_router("/recordings", "recordings")
 
     @router.get("", summary="Recordings", responses=LIST_PROBLEMS)
     async def recordings(
-        unit: Annotated[str | None, Query(description="Only this unit.", examples=["U1"])] = None,
-        kind: Annotated[
-            WaveformKind | None, Query(description="Only this kind.", examples=["capture"])
-        ] = None,
+        unit: Annotated[str | None, only("unit", "U1")] = None,
+        kind: Annotated[WaveformKind | None, only("kind", "capture")] = None,
         limit: Annotated[
             int, Query(ge=1, le=500, description="Maximum number of recordings.")
         ] = 100,
@@ -274,7 +245,7 @@ def recording_router(context: Context) -> APIRouter:
         """List the newest recordings, and recordings around alarms in progress."""
         if unit is not None:
             context.unit(unit)
-        found = await worked(lambda: shelf_of(context).newest(limit, unit, kind))
+        found = await in_thread(lambda: library_of(context).newest(limit, unit, kind))
         running = sorted(context.captures.being_made)
         return RecordingsModel(
             recordings=[recording_model(kept) for kept in found],
@@ -292,12 +263,9 @@ def recording_router(context: Context) -> APIRouter:
     )
     async def one_recording(recording: RecordingId) -> Response:
         """Check a recording and describe its channels, gaps, rejected samples and files."""
-        shelf = shelf_of(context)
-        kept = await worked(lambda: shelf.one(recording))
-        if kept is None:
-            raise unknown_recording(recording)
+        kept = await entry_of(context, recording)
         try:
-            return await rendered(lambda: recording_info(shelf, kept))
+            return await rendered(lambda: recording_info(library_of(context), kept))
         except ConfigError as error:
             raise damaged_recording(recording, error) from error
 
@@ -312,7 +280,7 @@ def recording_router(context: Context) -> APIRouter:
 
         The manifest has their checksums.
         """
-        make = shelf_of(context).zip_pieces
+        make = library_of(context).zip_pieces
         return await _download(context, recording, make, "application/zip", "zip")
 
     @router.get(
@@ -327,7 +295,7 @@ def recording_router(context: Context) -> APIRouter:
         The format is that of `padwatch recording export`: missing samples have no rows, and cells
         of a bad channel are nan.
         """
-        make = shelf_of(context).csv_pieces
+        make = library_of(context).csv_pieces
         return await _download(context, recording, make, "text/csv", "csv")
 
     return router
@@ -336,11 +304,9 @@ def recording_router(context: Context) -> APIRouter:
 async def _download(
     context: Context, recording: str, make: Callable[[str], Pieces], media_type: str, suffix: str
 ) -> StreamingResponse:
-    shelf = shelf_of(context)
-    if await worked(lambda: shelf.one(recording)) is None:
-        raise unknown_recording(recording)
+    await entry_of(context, recording)
     try:
-        pieces = await context.downloads.download(await worked(lambda: make(recording)))
+        pieces = await context.downloads.download(await in_thread(lambda: make(recording)))
     except TooManyDownloadsError as error:
         raise ProblemError(503, "Busy", f"{error}; try again later") from error
     except (ConfigError, OSError) as error:
@@ -352,7 +318,7 @@ async def _download(
     return StreamingResponse(pieces, media_type=media_type, headers=headers)
 
 
-def shelf_of(context: Context) -> RecordingLibrary:
+def library_of(context: Context) -> RecordingLibrary:
     """Return the library of recordings; raise a problem of status 404 without one."""
     if context.recordings is None:
         words = "no recordings are kept here; see the process that analyses the unit"
@@ -360,9 +326,13 @@ def shelf_of(context: Context) -> RecordingLibrary:
     return RecordingLibrary(context.recordings, context.faults())
 
 
-def unknown_recording(recording: str) -> ProblemError:
-    """Return the problem of an unknown recording."""
-    return ProblemError(404, "Unknown recording", f"there is no recording {recording!r}")
+async def entry_of(context: Context, recording: str) -> RecordingEntry:
+    """Return a recording of the library; raise a problem of status 404 without it."""
+    library = library_of(context)
+    found = await in_thread(lambda: library.one(recording))
+    if found is None:
+        raise ProblemError(404, "Unknown recording", f"there is no recording {recording!r}")
+    return found
 
 
 def damaged_recording(recording: str, error: Exception) -> ProblemError:

@@ -6,21 +6,22 @@ from typing import Annotated, Literal
 from fastapi import APIRouter
 from pydantic import Field
 
-from service.api.auth.declared import needs
+from service.api.auth.declared import needs, subject_router
 from service.api.auth.gate import actor_or
 from service.api.context import BearingId, Context, UnitId
-from service.api.problems import ProblemError, described_problems, problem_responses
+from service.api.problems import ProblemError, problem_responses
 from service.api.routes.bearings import Author, MicrometrePair, Note
 from service.api.values import (
     ActorModel,
     ApiModel,
+    BearingAnswer,
+    ByName,
     NoteText,
     OperatingStateName,
     PlaceName,
     Time,
 )
 from service.measuring.references import VectorRefusedError, measured_vectors
-from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
 from service.store.gap_reference import GapReference
 from service.store.vector_reference_port import SetVectorReference
@@ -59,16 +60,10 @@ class VectorModel(ApiModel):
     compared."""
 
 
-class Order1ReferenceModel(ApiModel):
+class Order1ReferenceModel(BearingAnswer):
     """1× vectors of a healthy bearing."""
 
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
-
-    state: OperatingStateName
+    state: Annotated[OperatingStateName, ByName]
     """Operating state that it applies to."""
 
     vectors: dict[PlaceName, VectorModel]
@@ -92,41 +87,34 @@ class TakeReferenceModel(ActorModel):
 
 
 def set_reference_model(reference: GapReference) -> SetReferenceModel:
-    """A reference as it was set."""
-    opposite = reference.opposite_reference_um
-    return SetReferenceModel(
-        gap_reference_um=list(reference.gap_reference_um),
-        opposite_reference_um=None if opposite is None else list(opposite),
-        source=reference.source.value,
-        set=rfc3339(reference.set_ns),
-        author=reference.author,
-        note=reference.note or None,
-    )
+    """Return the model of a stored reference."""
+    return SetReferenceModel.of(reference, note=reference.note or None)
 
 
-TAKE_PROBLEMS = described_problems(
-    {
-        403: "Not allowed, or asked for by a page of another site",
-        404: "Unknown unit or bearing",
-        409: "The machine does not run in a condition for a reference",
-        422: "A wrong parameter",
-        503: "Not stored",
-    }
+TAKE_PROBLEMS = problem_responses(
+    403, 404, 422, 503, own={409: "The machine does not run in a condition for a reference"}
 )
 
 
-def order1_reference_router(context: Context) -> APIRouter:
-    """Return the routes of 1× reference vectors."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings/{bearing}",
-        tags=["bearing"],
-        dependencies=[needs(Permission.READ)],
-    )
+def reference_router(context: Context) -> APIRouter:
+    """Return the routes of shaft-centre references and 1× reference vectors."""
+    router = subject_router("/units/{unit}/bearings/{bearing}", "bearing")
+    reading = problem_responses(404, 503)
+
+    @router.get("/references", summary="References", responses=reading)
+    async def references(unit: UnitId, bearing: BearingId) -> list[SetReferenceModel]:
+        """List the references set for a bearing, newest first, at most a thousand.
+
+        The newest is in force a few seconds after it was set; without any, the plant file applies.
+        """
+        context.bearing(unit, bearing)
+        history = await asyncio.to_thread(context.store.reference_history, unit, bearing)
+        return [set_reference_model(reference) for reference in history]
 
     @router.get(
-        "/order1-references", summary="References of 1×", responses=problem_responses(404, 503)
+        "/order1-references", summary="References of 1×", responses=reading, name="references"
     )
-    async def references(unit: UnitId, bearing: BearingId) -> list[Order1ReferenceModel]:
+    async def order1_references(unit: UnitId, bearing: BearingId) -> list[Order1ReferenceModel]:
         """List the 1× references set for a bearing, newest first, at most a thousand.
 
         In each operating state the newest applies; without any, that of the plant file.
@@ -163,40 +151,4 @@ def order1_reference_router(context: Context) -> APIRouter:
 
 
 def _model(found: SetVectorReference) -> Order1ReferenceModel:
-    reference = found.reference
-    return Order1ReferenceModel.model_validate(
-        {
-            "unit": reference.unit,
-            "bearing": reference.bearing,
-            "state": reference.state.name.lower(),
-            "vectors": {
-                place: VectorModel(amplitude_um_pk=v.amplitude_um_pk, phase_deg=v.phase_deg)
-                for place, v in reference.vectors.items()
-            },
-            "set": rfc3339(found.set_ns),
-            "author": found.author,
-            "note": found.note or None,
-        }
-    )
-
-
-def reference_router(context: Context) -> APIRouter:
-    """Return the route of shaft-centre references."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings",
-        tags=["bearing"],
-        dependencies=[needs(Permission.READ)],
-    )
-    reading = problem_responses(404, 503)
-
-    @router.get("/{bearing}/references", summary="References", responses=reading)
-    async def references(unit: UnitId, bearing: BearingId) -> list[SetReferenceModel]:
-        """List the references set for a bearing, newest first, at most a thousand.
-
-        The newest is in force a few seconds after it was set; without any, the plant file applies.
-        """
-        context.bearing(unit, bearing)
-        history = await asyncio.to_thread(context.store.reference_history, unit, bearing)
-        return [set_reference_model(reference) for reference in history]
-
-    return router
+    return Order1ReferenceModel.of(found, found.reference, note=found.note or None)

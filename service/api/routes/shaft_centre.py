@@ -1,18 +1,16 @@
 """Line of the shaft centre in its bearing."""
 
-from typing import Annotated
-
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Response
 
 from core.units import ns_from_s
-from service.api.answers import rendered, worked
-from service.api.auth.declared import needs
+from service.api.answers import in_thread, rendered
+from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.parameters import States, TimeRange, oil_temperature_range
+from service.api.parameters import OilTemperature, States, TimeRange
 from service.api.problems import problem_responses
 from service.api.routes.trends import (
     HOLE_HOPS,
-    MAX_POINTS,
+    MaxPoints,
     bucket_s,
     simulated_until,
     times_s,
@@ -20,12 +18,16 @@ from service.api.routes.trends import (
     trend_table,
 )
 from service.api.tables import Column, Format, table_content, table_response
-from service.api.values import LEVEL_NAMES, ApiModel, LevelName, Time, states_named
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
+from service.api.values import (
+    ApiModel,
+    BearingHistory,
+    LevelName,
+    Time,
+    level_names,
+    states_named,
+)
 from service.store.port import Trend, TrendQuery
 from service.store.series import U_RANDOM, U_SYSTEMATIC
-from service.store.value_range import ValueRange
 
 
 class CentreColumnModel(ApiModel):
@@ -44,20 +46,8 @@ class CentreColumnModel(ApiModel):
     """Worst quality; null without readings."""
 
 
-class CentreLineModel(ApiModel):
+class CentreLineModel(BearingHistory):
     """Line of the shaft centre in its bearing, oldest first, by column."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
-
-    start: Time
-    """Start of the requested range."""
-
-    end: Time
-    """End of the requested range."""
 
     clearance_um: float
     """Radius of the clearance circle, µm."""
@@ -95,11 +85,7 @@ COLUMNS = {
 
 def centre_router(context: Context) -> APIRouter:
     """Return the route of the shaft centre."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings",
-        tags=["bearing"],
-        dependencies=[needs(Permission.READ)],
-    )
+    router = subject_router("/units/{unit}/bearings", "bearing")
 
     @router.get(
         "/{bearing}/shaft-centre",
@@ -115,12 +101,9 @@ def centre_router(context: Context) -> APIRouter:
         bearing: BearingId,
         times: TimeRange,
         wanted: Format,
-        oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
+        oil_temperature: OilTemperature,
         state: States = None,
-        max_points: Annotated[
-            int,
-            Query(ge=2, le=MAX_POINTS, description="More readings are combined in buckets."),
-        ] = 1000,
+        max_points: MaxPoints = 1000,
     ) -> Response:
         """List the line of the shaft centre with its uncertainty, oldest first.
 
@@ -141,7 +124,7 @@ def centre_router(context: Context) -> APIRouter:
         if wanted == "json":
             clearance_um = context.references.bearing(unit, bearing).clearance_um
             return await rendered(lambda: _line(context, query, clearance_um))
-        columns = await worked(lambda: _table(context, query))
+        columns = await in_thread(lambda: _table(context, query))
         return table_response(wanted, columns, f"shaft-centre-{unit}-{bearing}")
 
     return router
@@ -150,11 +133,8 @@ def centre_router(context: Context) -> APIRouter:
 def _line(context: Context, query: TrendQuery, clearance_um: float) -> CentreLineModel:
     past_end_ns = context.store.films.past_end_ns(query.unit, query.bearing)
     trend = context.store.trend(query)
-    return CentreLineModel(
-        unit=query.unit,
-        bearing=query.bearing,
-        start=rfc3339(query.start_ns),
-        end=rfc3339(query.end_ns),
+    return CentreLineModel.of(
+        query,
         clearance_um=clearance_um,
         bucket_s=bucket_s(trend),
         simulated_until=simulated_until(query, past_end_ns),
@@ -174,5 +154,5 @@ def _column(trend: Trend, quantity: str) -> CentreColumnModel:
         mean=list(own.mean),
         u_random=list(trend.series[quantity + U_RANDOM].mean),
         u_systematic=list(trend.series[quantity + U_SYSTEMATIC].mean),
-        worst_level=[None if level is None else LEVEL_NAMES[level] for level in own.worst_level],
+        worst_level=level_names(own.worst_level),
     )

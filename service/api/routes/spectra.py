@@ -13,7 +13,7 @@ from core.monitor.assessment import Assessment
 from core.stiffness.order_line import marked_hz
 from core.units import NS_PER_S
 from service.api.answers import Renderings, rendered
-from service.api.auth.declared import needs
+from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
 from service.api.parameters import TimeRange
 from service.api.problems import ProblemError, problem_responses
@@ -23,14 +23,13 @@ from service.api.values import (
     PLACES,
     STATE_NAMES,
     ApiModel,
+    BearingHistory,
     LevelName,
     OperatingStateName,
     PlaceName,
     Time,
 )
-from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
-from service.store.spectra_port import Spectra, SpectraQuery, StoredSpectrum
+from service.store.spectra_port import SpectraQuery, StoredSpectrum
 
 
 class PlaceSpectraModel(ApiModel):
@@ -43,20 +42,8 @@ class PlaceSpectraModel(ApiModel):
     """One value per frequency for each time; null where the channel was not usable."""
 
 
-class SpectraModel(ApiModel):
+class SpectraModel(BearingHistory):
     """Averaged amplitude spectra of a bearing over time, oldest first."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
-
-    start: Time
-    """Start of the requested range."""
-
-    end: Time
-    """End of the requested range."""
 
     frequency_hz: Annotated[list[float], Field(examples=[[0.073, 0.146, 0.22]])]
     """Frequencies of the lines of all spectra."""
@@ -135,52 +122,14 @@ class SpectrumModel(ApiModel):
     """Frequencies of order1 (1×) and of the vortex."""
 
 
+OWN_FIELDS = ("duration_s", "speed_rpm", "power_mw", "order1_hz", "vortex_hz")
+"""Fields with one value of each stored spectrum."""
+
 MAX_NUMBERS = 2_000_000
-"""Amplitudes in one answer; 20 MB of it."""
+"""Maximum number of amplitudes in one answer, about 20 MB."""
 
 DECIMALS = 6
-"""Of amplitudes in µm; spectra are kept to less."""
-
-
-def spectra_model(
-    query: SpectraQuery,
-    found: Spectra,
-    places: Sequence[PlaceName],
-    max_frequency_hz: float | None,
-    past_end_ns: int | None,
-) -> SpectraModel:
-    """Return the spectra with the resolution of the newest one.
-
-    Raises
-    ------
-    ProblemError
-        If they are too large for one answer.
-    """
-    shown = [each for each in found.spectra if each.resolution == found.spectra[-1].resolution]
-    frequency_hz = _frequencies(shown, max_frequency_hz)
-    _require_few(len(shown), len(places) * frequency_hz.size)
-    return SpectraModel(
-        unit=query.unit,
-        bearing=query.bearing,
-        start=rfc3339(query.start_ns),
-        end=rfc3339(query.end_ns),
-        frequency_hz=frequency_hz.tolist(),
-        time=[each.time_ns / NS_PER_S for each in shown],
-        duration_s=[each.duration_s for each in shown],
-        speed_rpm=[each.speed_rpm for each in shown],
-        power_mw=[each.power_mw for each in shown],
-        operating_state=[STATE_NAMES[each.state] for each in shown],
-        level=[LEVEL_NAMES[each.quality.level] for each in shown],
-        reason=[each.quality.reason.value for each in shown],
-        order1_hz=[each.order1_hz for each in shown],
-        vortex_hz=[each.vortex_hz for each in shown],
-        channels={place: _place(shown, place, frequency_hz.size) for place in places},
-        n_found=found.n_found,
-        n_other_resolution=len(found.spectra) - len(shown),
-        damaged=[rfc3339(time_ns) for time_ns in found.damaged_ns],
-        first=None if found.first_ns is None else rfc3339(found.first_ns),
-        simulated_until=None if past_end_ns is None else rfc3339(past_end_ns),
-    )
+"""Decimals of amplitudes in µm; stored spectra are less precise."""
 
 
 def _frequencies(shown: Sequence[StoredSpectrum], max_frequency_hz: float | None) -> FloatArray:
@@ -212,8 +161,8 @@ def _place(shown: Sequence[StoredSpectrum], place: PlaceName, n_lines: int) -> P
 def spectrum_model(assessment: Assessment) -> SpectrumModel:
     """Return the amplitude spectra of an assessment."""
     spectrum, readings = assessment.spectrum, assessment.readings
-    return SpectrumModel(
-        time=rfc3339(assessment.time_ns),
+    return SpectrumModel.of(
+        time=assessment.time_ns,
         frequency_hz=spectrum.frequency_hz.tolist(),
         channels={
             name: SpectrumChannelModel(
@@ -235,11 +184,7 @@ log = structlog.get_logger()
 
 def spectra_router(context: Context) -> APIRouter:
     """Return the routes of spectra."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings",
-        tags=["bearing"],
-        dependencies=[needs(Permission.READ)],
-    )
+    router = subject_router("/units/{unit}/bearings", "bearing")
     newest = Renderings()
 
     @router.get(
@@ -303,5 +248,19 @@ def _read(
         log.error(
             "spectra are damaged", unit=query.unit, bearing=query.bearing, n=len(found.damaged_ns)
         )
-    past_end_ns = context.store.films.past_end_ns(query.unit, query.bearing)
-    return spectra_model(query, found, places, max_frequency_hz, past_end_ns)
+    shown = [each for each in found.spectra if each.resolution == found.spectra[-1].resolution]
+    frequency_hz = _frequencies(shown, max_frequency_hz)
+    _require_few(len(shown), len(places) * frequency_hz.size)
+    return SpectraModel.of(
+        query,
+        found,
+        frequency_hz=frequency_hz.tolist(),
+        time=[each.time_ns / NS_PER_S for each in shown],
+        operating_state=[STATE_NAMES[each.state] for each in shown],
+        level=[LEVEL_NAMES[each.quality.level] for each in shown],
+        reason=[each.quality.reason.value for each in shown],
+        **{name: [getattr(each, name) for each in shown] for name in OWN_FIELDS},
+        channels={place: _place(shown, place, frequency_hz.size) for place in places},
+        n_other_resolution=len(found.spectra) - len(shown),
+        simulated_until=context.store.films.past_end_ns(query.unit, query.bearing),
+    )

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingState
@@ -43,25 +43,26 @@ class TrendGroup:
 
 @dataclass(frozen=True)
 class _Axis:
-    """Axis of eccentricity or temperature, divided into bins."""
+    """Axis of eccentricity or temperature, divided into bins.
+
+    Parameters
+    ----------
+    quantity
+        Name of the quantity, and of its range in a query.
+    """
 
     quantity: str
     width: float
 
-    def requested(self, query: TrendQuery) -> ValueRange:
-        by_eccentricity = self.quantity == "eccentricity_ratio"
-        return query.eccentricity_ratio if by_eccentricity else query.oil_temperature_c
-
     def narrowed(self, query: TrendQuery, low: float, high: float) -> TrendQuery:
         """Return the query for one bin, which includes its lower but not its upper bound."""
-        requested, below = self.requested(query), math.nextafter(high, -math.inf)
+        requested, below = getattr(query, self.quantity), math.nextafter(high, -math.inf)
         within = ValueRange(
             low if requested.low is None else max(low, requested.low),
             below if requested.high is None else min(below, requested.high),
         )
-        if self.quantity == "eccentricity_ratio":
-            return replace(query, eccentricity_ratio=within)
-        return replace(query, oil_temperature_c=within)
+        changed: dict[str, Any] = {self.quantity: within}
+        return replace(query, **changed)
 
 
 def trend_groups(
@@ -75,16 +76,12 @@ def trend_groups(
         If there are more than `MAX_GROUPS`.
     """
     if by == "state":
-        found = list(_by_state(store, query))
+        found = _by_state(store, query)
+    elif by == "eccentricity":
+        found = _by_cell(store, query, _Axis("eccentricity_ratio", grid.eccentricity_width))
     else:
-        found = list(_by_cell(store, query, _axis(by, grid)))
+        found = _by_cell(store, query, _Axis("oil_temperature_c", grid.temperature_width_c))
     return [group for group in found if group.trend.time_ns]
-
-
-def _axis(by: GroupName, grid: CellGrid) -> _Axis:
-    if by == "eccentricity":
-        return _Axis("eccentricity_ratio", grid.eccentricity_width)
-    return _Axis("oil_temperature_c", grid.temperature_width_c)
 
 
 def _by_state(store: Store, query: TrendQuery) -> Iterator[TrendGroup]:
@@ -107,10 +104,8 @@ def _bins(store: Store, query: TrendQuery, axis: _Axis) -> list[int]:
     bins: set[int] = set()
     for low, high in zip(series.minimum, series.maximum, strict=True):
         if low is not None and high is not None:
-            first, last = (
-                math.floor(low / axis.width - BIN_TOLERANCE),
-                math.floor(high / axis.width + BIN_TOLERANCE),
-            )
+            first = math.floor(low / axis.width - BIN_TOLERANCE)
+            last = math.floor(high / axis.width + BIN_TOLERANCE)
             bins |= set(range(first, min(last, first + MAX_GROUPS) + 1))
     if len(bins) > MAX_GROUPS:
         raise TooManyGroupsError(f"more than {MAX_GROUPS} groups: request a narrower range")

@@ -4,25 +4,30 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Annotated, TypeVar
 
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Query, Response
 from pydantic import Field
 
 from core.condition.cells import CellGrid
 from core.monitor.catalogue import BY_NAME
 from core.units import NS_PER_S, ns_from_s
-from service.api.answers import rendered, worked
-from service.api.auth.declared import needs
+from service.api.answers import in_thread, rendered
+from service.api.auth.declared import subject_router
 from service.api.context import BearingId, Context, UnitId
-from service.api.parameters import States, TimeRange, eccentricity_range, oil_temperature_range
+from service.api.parameters import Eccentricity, OilTemperature, States, TimeRange
 from service.api.problems import ProblemError, problem_responses
 from service.api.routes.trend_groups import GroupName, TooManyGroupsError, TrendGroup, trend_groups
 from service.api.tables import Column, Format, table_content, table_response
-from service.api.values import LEVEL_NAMES, ApiModel, LevelName, Time, states_named
+from service.api.values import (
+    ApiModel,
+    BearingHistory,
+    LevelName,
+    Time,
+    level_names,
+    states_named,
+)
 from service.runtime.times import rfc3339
-from service.store.access.identities import Permission
 from service.store.port import Trend, TrendQuery, TrendSeries
 from service.store.series import U_RANDOM, U_SYSTEMATIC, columns_of
-from service.store.value_range import ValueRange
 
 T = TypeVar("T")
 
@@ -56,8 +61,7 @@ def _columns(name: str, parts: Sequence[Mapping[str, TrendSeries]]) -> Iterator[
         yield Column(f"{name}_{kind}", "number", values, unit)
     yield Column(f"{name}_count", "count", _joined(series.count for series in own))
     levels = _joined(series.worst_level for series in own)
-    words = [None if level is None else LEVEL_NAMES[level] for level in levels]
-    yield Column(f"{name}_worst_level", "text", words)
+    yield Column(f"{name}_worst_level", "text", level_names(levels))
     for suffix in (U_RANDOM, U_SYSTEMATIC):
         if all(name + suffix in part for part in parts) and parts:
             values = _joined(part[name + suffix].mean for part in parts)
@@ -96,7 +100,20 @@ class TrendSeriesModel(ApiModel):
     """Mean systematic standard uncertainty; null for quantities without."""
 
 
-class TrendGroupModel(ApiModel):
+class TrendColumns(ApiModel):
+    """Trends by column."""
+
+    bucket_s: float | None
+    """Width of the buckets, s; null for single readings."""
+
+    time: list[float]
+    """Seconds since 1970 UTC: of each reading, or of the start of each bucket."""
+
+    series: dict[str, TrendSeriesModel]
+    """Requested quantities by name."""
+
+
+class TrendGroupModel(TrendColumns):
     """Trends of the readings in one condition, by column."""
 
     name: Annotated[str, Field(examples=["full_load"])]
@@ -108,39 +125,9 @@ class TrendGroupModel(ApiModel):
     high: float | None
     """Upper bound, likewise."""
 
-    bucket_s: float | None
-    """Width of the buckets, s; null for single readings."""
 
-    time: list[float]
-    """Seconds since 1970 UTC: of each reading, or of the start of each bucket."""
-
-    series: dict[str, TrendSeriesModel]
-    """Requested quantities by name."""
-
-
-class TrendModel(ApiModel):
+class TrendModel(TrendColumns, BearingHistory):
     """Trends of one bearing, by column."""
-
-    unit: str
-    """Identifier of the unit."""
-
-    bearing: str
-    """Identifier of the bearing."""
-
-    start: Time
-    """Start of the requested range."""
-
-    end: Time
-    """End of the requested range."""
-
-    bucket_s: float | None
-    """Width of the buckets, s; null for single readings."""
-
-    time: list[float]
-    """Seconds since 1970 UTC: of each reading, or of the start of each bucket."""
-
-    series: dict[str, TrendSeriesModel]
-    """Requested quantities by name."""
 
     simulated_until: Time | None
     """End of the simulated readings; null if all in this range are measured."""
@@ -170,18 +157,13 @@ def trend_model(
     past_end_ns
         End of the simulated past of the bearing.
     """
-    return TrendModel(
-        unit=query.unit,
-        bearing=query.bearing,
-        start=rfc3339(query.start_ns),
-        end=rfc3339(query.end_ns),
-        bucket_s=bucket_s(trend),
+    return TrendModel.of(
+        query,
+        trend,
         simulated_until=simulated_until(query, past_end_ns),
-        coarse_until=None if trend.coarse_until_ns is None else rfc3339(trend.coarse_until_ns),
         next_cursor=None if trend.next_ns is None else str(trend.next_ns),
-        time=times_s(trend),
-        series=_series_models(trend),
         groups=None if groups is None else [_group_model(group) for group in groups],
+        **_columns_of(trend),
     )
 
 
@@ -193,14 +175,12 @@ def simulated_until(query: TrendQuery, past_end_ns: int | None) -> str | None:
 
 
 def _group_model(group: TrendGroup) -> TrendGroupModel:
-    return TrendGroupModel(
-        name=group.name,
-        low=group.low,
-        high=group.high,
-        bucket_s=bucket_s(group.trend),
-        time=times_s(group.trend),
-        series=_series_models(group.trend),
-    )
+    return TrendGroupModel.of(group, **_columns_of(group.trend))
+
+
+def _columns_of(trend: Trend) -> dict[str, object]:
+    series = {name: _series_model(name, trend.series) for name in trend.series if name in BY_NAME}
+    return {"bucket_s": bucket_s(trend), "time": times_s(trend), "series": series}
 
 
 def bucket_s(trend: Trend) -> float | None:
@@ -211,10 +191,6 @@ def bucket_s(trend: Trend) -> float | None:
 def times_s(trend: Trend) -> list[float]:
     """Return the times in seconds since 1970."""
     return [time_ns / NS_PER_S for time_ns in trend.time_ns]
-
-
-def _series_models(trend: Trend) -> dict[str, TrendSeriesModel]:
-    return {name: _series_model(name, trend.series) for name in trend.series if name in BY_NAME}
 
 
 def trend_columns(quantities: Iterable[str]) -> tuple[str, ...]:
@@ -231,13 +207,15 @@ def _series_model(name: str, columns: Mapping[str, TrendSeries]) -> TrendSeriesM
         max=list(series.maximum),
         mean=list(series.mean),
         count=list(series.count),
-        worst_level=[None if level is None else LEVEL_NAMES[level] for level in series.worst_level],
+        worst_level=level_names(series.worst_level),
         u_random=list(random.mean) if random else None,
         u_systematic=list(systematic.mean) if systematic else None,
     )
 
 
-MAX_POINTS = 5000
+MaxPoints = Annotated[
+    int, Query(ge=2, le=5000, description="More readings are combined in buckets.")
+]
 MAX_QUANTITIES = 40
 HOLE_HOPS = 2.5
 """Distance of results, in result periods, above which there is a gap between them."""
@@ -256,11 +234,7 @@ Cursor = Annotated[
 
 def trend_router(context: Context) -> APIRouter:
     """Return the route of trends."""
-    router = APIRouter(
-        prefix="/api/v1/units/{unit}/bearings",
-        tags=["bearing"],
-        dependencies=[needs(Permission.READ)],
-    )
+    router = subject_router("/units/{unit}/bearings", "bearing")
     reading = problem_responses(404, 422, 503)
 
     @router.get(
@@ -274,8 +248,8 @@ def trend_router(context: Context) -> APIRouter:
         bearing: BearingId,
         times: TimeRange,
         wanted: Format,
-        eccentricity: Annotated[ValueRange, Depends(eccentricity_range)],
-        oil_temperature: Annotated[ValueRange, Depends(oil_temperature_range)],
+        eccentricity: Eccentricity,
+        oil_temperature: OilTemperature,
         quantity: Annotated[
             list[str],
             Query(
@@ -294,10 +268,7 @@ def trend_router(context: Context) -> APIRouter:
                 examples=["state"],
             ),
         ] = None,
-        max_points: Annotated[
-            int,
-            Query(ge=2, le=MAX_POINTS, description="More readings are combined in buckets."),
-        ] = 1000,
+        max_points: MaxPoints = 1000,
         cursor: Cursor = None,
     ) -> Response:
         """List quantities over time: single readings, or buckets with extremes, mean and count.
@@ -323,8 +294,8 @@ def trend_router(context: Context) -> APIRouter:
         read = partial(_read, context, query, group_by, grid)
         if wanted == "json":
             return await rendered(lambda: trend_model(query, *read()))
-        whole, groups, past = await worked(read)
-        columns = await worked(lambda: trend_table(whole, groups, past))
+        whole, groups, past = await in_thread(read)
+        columns = await in_thread(lambda: trend_table(whole, groups, past))
         cursor = None if whole.next_ns is None else str(whole.next_ns)
         return table_response(wanted, columns, f"trends-{unit}-{bearing}", cursor)
 

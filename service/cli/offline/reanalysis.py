@@ -16,7 +16,6 @@ from service.api.values import (
     SpeedSourceName,
     Time,
     WindowModel,
-    quality_model,
     reading_model,
     window_model,
 )
@@ -60,7 +59,7 @@ def assessment_model(assessment: Assessment) -> AssessmentModel:
         unit=assessment.unit,
         bearing=assessment.bearing,
         time=rfc3339(assessment.time_ns),
-        quality=quality_model(assessment.quality),
+        quality=QualityModel.of(assessment.quality),
         speed_source=assessment.speed_source.value,
         runout=runout_names(assessment),
         window=window_model(assessment.window),

@@ -21,5 +21,5 @@ export function keyMark({ state, expires }, nowMs) {
 export const usedWords = ({ used }) => (used === null ? "never" : formatTime(Date.parse(used)));
 export const unitsWords = ({ units }) => (units.length === 0 ? "all" : units.join(", "));
 
-/** Units as somebody types them: `U1, U2`. */
+/** Units as typed: `U1, U2`. */
 export const unitsOf = (typed) => typed.split(/[\s,;]+/).filter(Boolean);

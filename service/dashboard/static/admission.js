@@ -1,4 +1,4 @@
-/** Which page opens for an address, for whoever is here. */
+/** Which page opens for an address, by login and permissions. */
 
 import { NO_PAGE, PAGES } from "./pages.js";
 import { forbiddenPage } from "./pages/forbidden.js";
@@ -15,7 +15,7 @@ const SET_UP_PAGE = { title: "set up", open: setUpPage };
 /**
  * The page to open, with the segments of its address.
  *
- * As long as nobody has logged in it is the door, and then the form for a password that somebody else has set, whatever
+ * Before a login it is the login page, and then the form for a password set by an administrator, whatever
  * the address: that stays, and leads on.
  */
 export function pageOf(hash) {

@@ -8,7 +8,7 @@ const subjectOf = (kind) => ALARM_KINDS[kind]?.subject;
 /** The bearing that an alarm is about; null if it is about none. */
 export const bearingOf = ({ subject, kind }) => (subjectOf(kind) === "bearing" ? subject : null);
 
-/** Address of the page that tells most about an alarm. */
+/** Address of the page with the most detail about an alarm. */
 export function alarmPlace({ unit, subject, kind }) {
   if (ALARM_KINDS[kind]?.rule === "films") return filmAddress(unit, subject);
   if (subjectOf(kind) === "bearing") return bearingAddress(unit, subject);

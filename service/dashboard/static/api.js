@@ -29,7 +29,7 @@ const REFUSED = "padwatch-refused";
  * Fetch JSON from `/api/v1`; `path` is a list of segments, `query` a list of pairs.
  *
  * While nothing is new the service does not send the answer again, and the very same object is
- * returned: whoever counts ages in it must count them from when that object first came.
+ * returned; ages in it count from the first arrival of that object.
  */
 export async function ask(path, query = [], signal = undefined) {
   const search = new URLSearchParams(query).toString();
@@ -53,7 +53,7 @@ export async function tell(path, body, method = "POST") {
 /** Call `look` whenever the service did not want to know us, or did not let us: perhaps a login is over. */
 export const onRefused = (look) => window.addEventListener(REFUSED, look);
 
-/** Forget every answer: the next reader may be somebody else. */
+/** Drop every answer: the next user may be another one. */
 export const forget = () => answers.clear();
 
 const JSON_ONLY = { Accept: "application/json" };

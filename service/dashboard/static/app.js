@@ -54,7 +54,7 @@ function openPage() {
   draw();
 }
 
-/** Somebody has come or gone, or may now do something else. */
+/** The login or its permissions have changed. */
 function changePerson() {
   openPage();
   overviews.again();
@@ -71,5 +71,5 @@ onAmplitudes(openPage);
 draw();
 const overviews = poll(askOverview, () => OVERVIEW_PERIOD_S);
 onSession(changePerson);
-onRefused(() => askSession().catch(() => {})); // whoever is not reachable is told so by the overview
+onRefused(() => askSession().catch(() => {})); // the overview reports an unreachable service
 setInterval(draw, REDRAW_PERIOD_MS);

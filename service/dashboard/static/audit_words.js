@@ -17,7 +17,7 @@ export function objectWords({ action, object }) {
   return ["link", "device"].includes(subject) || words === object ? words : `${unit} ${words}`;
 }
 
-/** Who did it; what nobody did is told of whoever told it. */
+/** Actor of an entry. */
 export const actorWords = ({ actor }) => actor || "not known";
 
 /** Through what, and from where. */

@@ -6,7 +6,7 @@ const CHANGED = "padwatch-edition";
 let mine = null;
 let isOld = false;
 
-/** Look at the headers of an answer: the first tells what we are, a different one that we are old. */
+/** Read the edition in the headers of an answer; one that differs from the first makes this page outdated. */
 export function noteEdition(headers) {
   const edition = headers.get(HEADER);
   if (edition === null) return;
@@ -16,5 +16,5 @@ export function noteEdition(headers) {
   window.dispatchEvent(new Event(CHANGED));
 }
 
-/** Call `tell` once, when the service has become another one than this page was made for. */
+/** Call `tell` once, when the service has another edition than this page. */
 export const onUpgrade = (tell) => window.addEventListener(CHANGED, tell, { once: true });

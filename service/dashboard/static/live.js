@@ -8,8 +8,8 @@ const NOT_REACHABLE = { level: "bad", reason: "service_not_reachable" };
 /** What a bearing is without a current answer, beside its readings. */
 const NOTHING_KNOWN = { quality: NOT_REACHABLE, speed_source: null, estimators: { xx: null, yy: null } };
 
-/** Nothing has been heard yet. `heard`: the last answer; `dated`: when what it holds first came. */
-export const SILENCE = { overview: null, heard: null, dated: null, failure: null, failedSince: null };
+/** State before the first answer. `receivedAt`: time of the last answer; `dated`: when its content first arrived. */
+export const SILENCE = { overview: null, receivedAt: null, dated: null, failure: null, failedSince: null };
 
 /** Two clocks, since a steady one may stand still while a laptop sleeps. */
 export function moment() {
@@ -24,7 +24,7 @@ export function secondsBetween(earlier, later) {
 /** The state after a good answer; one that is the same as before keeps its date, so that ages go on. */
 export function heardNow(live, overview, now) {
   const dated = overview === live.overview ? live.dated : now;
-  return { overview, heard: now, dated, failure: null, failedSince: null };
+  return { overview, receivedAt: now, dated, failure: null, failedSince: null };
 }
 
 /** The state after a question that failed; the last answer stays, and ages. */
@@ -34,7 +34,7 @@ export function failedNow(live, sentence, now) {
 
 /** What to show at this moment: ages counted on, and no number that is no longer current. */
 export function viewAt(live, now) {
-  const silenceS = live.heard ? secondsBetween(live.heard, now) : null;
+  const silenceS = live.receivedAt ? secondsBetween(live.receivedAt, now) : null;
   const current = silenceS !== null && silenceS <= CURRENT_LIMIT_S;
   const sinceS = live.dated ? secondsBetween(live.dated, now) : null;
   return {

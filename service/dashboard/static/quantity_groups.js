@@ -31,7 +31,7 @@ export function grouped(catalogue) {
 /**
  * Names parted into those that share an axis: `{ chart, title, unit, names, words }`.
  *
- * `title` says what they have in common, `words` what tells them apart, by name; `labels` has both.
+ * `title` is their common part, `words` the part that differs, by name; `labels` has both.
  */
 export function byAxis(names, labels) {
   const axes = new Map();

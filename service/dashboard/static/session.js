@@ -18,10 +18,10 @@ let isPasswordUncertain = false;
 /** `{ login_required, set_up_needed, password_change_needed, name, role, permissions }`; null until the service has said. */
 export const session = () => known;
 
-/** Whether the password was set by somebody else, and must be changed before anything else. */
+/** Whether the password was set by an administrator and must be changed first. */
 export const mustChangePassword = () => known !== null && known.password_change_needed;
 
-/** Whether nothing of the plant may be seen before somebody has logged in, or has changed the password. */
+/** Whether the plant is hidden until a login or a change of the password. */
 export const isLocked = () => mustChangePassword() || (known !== null && known.login_required && known.name === null);
 
 /** Whether something is permitted; while nothing is known the service itself has the last word. */
@@ -37,15 +37,15 @@ export function limitSentence(permission, what) {
 /** Why it is not known which password is valid, or null if it is known. */
 export const passwordDoubt = () => (isPasswordUncertain ? PASSWORD_DOUBT : null);
 
-/** Whether somebody could log in to do more: nobody has, and in the demonstration nobody needs to. */
+/** Whether a login would allow more; in the demonstration none is needed. */
 export const mayLogIn = () => known !== null && known.name === null && known.role === "viewer";
 
-/** Find out; pages hear `padwatch-session` when it is somebody else or something else than before. */
+/** Request the session; the event `padwatch-session` reports a change. */
 export async function askSession(signal) {
   settle(await ask(["session"], [], signal));
 }
 
-/** Let somebody in, or throw why not. */
+/** Log in, or throw the reason of a failure. */
 export async function logIn(name, password) {
   const found = await tell(["session"], { name, password });
   isPasswordUncertain = false;

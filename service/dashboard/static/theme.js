@@ -1,4 +1,4 @@
-/** Light or dark: as the system has it, or as somebody chose on this browser. */
+/** Light or dark: as set in the system, or as chosen in this browser. */
 
 import { keep, kept } from "./kept.js";
 

@@ -35,7 +35,7 @@ const REASONS = {
 /** Readings with one of these reasons are absent because nothing current arrives at all. */
 export const NOT_CURRENT = new Set(["not_connected", "stale", "waiting_for_data", "service_not_reachable"]);
 
-/** Reasons for a missing number that belong to ordinary operation: nobody needs to get up for them. */
+/** Reasons for a missing number that belong to ordinary operation and need no action. */
 const ORDINARY = new Set([
   "waiting_for_data",
   "not_measured",

@@ -24,7 +24,7 @@ from core.alarms.life_cycle import update
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.api.auth.authenticator import AccessDesk
+from service.api.auth.authenticator import Authenticator
 from service.api.context import Context
 from service.app.storage import (
     built_configuration,
@@ -171,13 +171,13 @@ async def build(plant: PlantFile, store: SqliteStore, folder: Path) -> Service:
         films=films,
         operators=LocalCommands(alarms, films, recorder),
         captures=captures,
-        deliveries=Deliveries([], store.outbox, clock),
+        receivers=Deliveries([], store.outbox, clock).look,
         max_shelf_s=7200.0,
         evidence=lambda: evidence.status,
         configuration=built_configuration(own),
         recordings=[evidence_folders(own).captures],
         loops=lambda: loops,
-        access=AccessDesk(store.access, clock, Role.ADMIN),  # as in the demonstration
+        access=Authenticator(store.access, clock, Role.ADMIN),  # as in the demonstration
     )
     desk = evidence_desk(own, store, evidence, clock, context.downloads)
     return Service(

@@ -11,7 +11,7 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
-from service.api.auth.authenticator import Doors, LoggedIn, Refusal
+from service.api.auth.authenticator import CredentialChecker, LoggedIn
 from service.api.auth.backoff import Backoff
 from service.api.auth.passwords import Hashing
 from service.cli.commands import app
@@ -65,7 +65,7 @@ def test_an_account_that_was_added_can_log_in_and_stands_in_the_audit_trail(
     added = padwatch("users", "add", "Anna", "--role", "admin", password=PASSWORD + "\n")
     assert (added.exit_code, added.stdout) == (0, "anna: added as admin\n")
 
-    doors = Doors(store.access, Hashing(), Backoff())
+    doors = CredentialChecker(store.access, Hashing(), Backoff())
     assert isinstance(doors.log_in("anna", PASSWORD, "::1", NOW_NS, 0), LoggedIn)
     newest = store.audit.entries(AuditQuery(limit=1))[0]
     said = (newest.action, newest.object, newest.source)
@@ -154,11 +154,11 @@ def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
     with closing(sqlite3.connect(plant_path.parent / "data" / "padwatch.sqlite3")) as connection:
         assert key not in "\n".join(connection.iterdump())
 
-    doors = Doors(access, Hashing(), Backoff())
+    doors = CredentialChecker(access, Hashing(), Backoff())
     assert isinstance(doors.machine(key, NOW_NS), Identity)
     said = [padwatch("keys", "revoke", listed["id"]).stdout for _ in range(2)]
     assert said == [f"{listed['id']}: revoked\n", f"{listed['id']}: was revoked already\n"]
-    assert doors.machine(key, NOW_NS) is Refusal.REVOKED
+    assert doors.machine(key, NOW_NS) is None
     assert ", revoked, " in padwatch("keys", "list").stdout
 
 

@@ -11,8 +11,8 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 from starlette.types import Message
 
-from service.api.answers import EditionHeader
-from service.api.http.middleware import BoundedAnswers
+from service.api.answers import EDITION_HEADER
+from service.api.http.middleware import AddedHeaders, BoundedAnswers
 from service.dashboard import assets as told
 from service.dashboard.assets import Asset, edition, pages, plotly
 from service.dashboard.routes import dashboard_router
@@ -136,7 +136,7 @@ def test_nothing_else_is_served(client, path) -> None:
 
 def test_every_answer_names_the_edition_even_a_refusal() -> None:
     app = FastAPI()
-    app.add_middleware(EditionHeader, edition=edition())
+    app.add_middleware(AddedHeaders, headers=[(EDITION_HEADER, edition())])
     answer = TestClient(app).get("/api/v1/nothing-here")
     assert answer.status_code == 404
     assert answer.headers["padwatch-edition"] == edition()

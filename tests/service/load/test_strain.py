@@ -9,14 +9,13 @@ from rigs.capturing import block
 from starlette.responses import PlainTextResponse
 
 from service.api.load import (
-    N_LOOKS,
-    LoadLimits,
+    N_CHECKS,
+    LoadShedder,
     LoadWatch,
+    RefusalState,
     Refused,
-    Shedding,
-    Strain,
     advance,
-    question,
+    refused_from,
 )
 from service.measuring.acquirer import Bus
 
@@ -38,7 +37,7 @@ def bus(stepped_clock: Any) -> SteppedBus:
 
 @pytest.fixture
 def load(bus: SteppedBus, stepped_clock: Any) -> LoadWatch:
-    return LoadWatch(bus, LoadLimits(), stepped_clock)
+    return LoadWatch(bus, stepped_clock)
 
 
 async def test_questions_about_the_past_are_refused_first_and_views_of_now_after_them(
@@ -61,7 +60,7 @@ async def test_a_queue_that_fills_refuses_before_it_is_full(
     seen = []
     for _ in range(5):
         await bus.publish(block(0))
-        for _ in range(N_LOOKS):
+        for _ in range(N_CHECKS):
             load.look(0.0)
         seen.append(load.refused)
 
@@ -74,14 +73,14 @@ def test_one_pause_of_the_event_loop_refuses_nothing_but_lasting_lateness_does(
     for late_s in (9.0, 0.0, 9.0, 9.0, 9.0, 0.0):
         load.look(late_s)
         assert load.refused is NOTHING
-    for _ in range(2 * N_LOOKS - 1):
+    for _ in range(2 * N_CHECKS - 1):
         load.look(1.5)
 
     assert load.refused is HISTORY
 
 
 def test_less_is_refused_step_by_step_when_it_has_been_enough_for_a_while() -> None:
-    strain, seen = Strain(VIEWS), []
+    strain, seen = RefusalState(VIEWS), []
     for second in range(20):
         strain = advance(strain, 0.1, float(second))
         seen.append(strain.refused)
@@ -90,7 +89,7 @@ def test_less_is_refused_step_by_step_when_it_has_been_enough_for_a_while() -> N
 
 
 def test_a_strain_that_comes_back_at_once_is_not_over() -> None:
-    strain = Strain(HISTORY)
+    strain = RefusalState(HISTORY)
     for second in range(20):
         strain = advance(strain, 0.1 if second % 4 else 0.9, float(second))
         assert strain.refused is HISTORY
@@ -125,20 +124,20 @@ def test_a_strain_that_comes_back_at_once_is_not_over() -> None:
 def test_alarms_and_actions_are_never_refused_and_the_disk_is_asked_less_before_memory(
     asked: str, kind: Refused
 ) -> None:
-    assert question(*asked.split()) is kind
+    assert refused_from(*asked.split()) is kind
 
 
 async def test_what_is_refused_is_told_when_to_ask_again_and_counted(
     load: LoadWatch, bus: SteppedBus, stepped_clock: Any
 ) -> None:
     await bus.publish(block(0))
-    app = Shedding(PlainTextResponse("here you are"), load)
+    app = LoadShedder(PlainTextResponse("here you are"), load)
     transport = httpx2.ASGITransport(app)
     paths = ("/api/v1/alarms", "/api/v1/units", "/api/v1/units/U1/bearings/B/trends", "/readyz")
     found = []
     async with httpx2.AsyncClient(transport=transport, base_url="http://here") as client:
         for _ in range(3):
-            for _ in range(N_LOOKS):
+            for _ in range(N_CHECKS):
                 load.look(0.0)
             answers = await asyncio.gather(*(client.get(path) for path in paths))
             found.append([answer.status_code for answer in answers])

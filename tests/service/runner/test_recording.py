@@ -102,7 +102,7 @@ async def test_a_store_that_fails_for_a_while_makes_the_service_unready_and_lose
             films=plant.films,
             operators=LocalCommands(plant.alarms, plant.films, plant.recorder),
             captures=plant.captures,
-            deliveries=Deliveries([], plant.store.outbox, plant.clock),
+            receivers=Deliveries([], plant.store.outbox, plant.clock).look,
         )
     )
     running = asyncio.create_task(plant.runner(U1=source).run())

@@ -1,4 +1,4 @@
-"""Doors on both databases, with hashes that cost little."""
+"""CredentialChecker on both databases, with hashes that cost little."""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -8,10 +8,10 @@ import pytest
 from argon2 import PasswordHasher
 from harness.places import Place, SqlitePlace
 
-from service.api.auth.authenticator import Doors
+from service.api.auth.authenticator import CredentialChecker
 from service.api.auth.backoff import Backoff
 from service.api.auth.passwords import Hashing
-from service.api.auth.people import People
+from service.api.auth.people import AccountService
 from service.store.access.port import AccessStore
 from service.store.sql_store import SqlStore
 
@@ -62,10 +62,10 @@ def hashing(hasher: CountingHasher) -> Hashing:
 
 
 @pytest.fixture
-def people(access: AccessStore, hashing: Hashing) -> People:
-    return People(access, hashing)
+def people(access: AccessStore, hashing: Hashing) -> AccountService:
+    return AccountService(access, hashing)
 
 
 @pytest.fixture
-def doors(access: AccessStore, hashing: Hashing) -> Doors:
-    return Doors(access, hashing, Backoff())
+def doors(access: AccessStore, hashing: Hashing) -> CredentialChecker:
+    return CredentialChecker(access, hashing, Backoff())

@@ -9,9 +9,9 @@ from argon2.low_level import Type
 from harness.places import Place
 
 from core.units import DAY_NS
-from service.api.auth.authenticator import Doors, LoggedIn, Refusal
+from service.api.auth.authenticator import CredentialChecker, LoggedIn
 from service.api.auth.passwords import Hashing, PasswordRefusedError, new_password, plant_hasher
-from service.api.auth.people import SET_UP_S, People, create_key
+from service.api.auth.people import SET_UP_S, AccountService, create_key
 from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.access.identities import (
     Identity,
@@ -32,7 +32,7 @@ S = 1_000_000_000
 PASSWORD = "rotor rope gauge"  # noqa: S105
 
 
-def test_an_account_is_kept_as_it_was_made(people: People, access: AccessStore) -> None:
+def test_an_account_is_kept_as_it_was_made(people: AccountService, access: AccessStore) -> None:
     people.add("Berta", Role.VIEWER, PASSWORD, T0)
     people.add("anna", Role.ADMIN, PASSWORD, T0 + S)
 
@@ -47,7 +47,7 @@ def test_an_account_is_kept_as_it_was_made(people: People, access: AccessStore) 
 
 
 def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(
-    people: People, access: AccessStore
+    people: AccountService, access: AccessStore
 ) -> None:
     people.add("anna", Role.VIEWER, PASSWORD, T0)
     before = access.accounts.get("anna")
@@ -61,7 +61,7 @@ def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(
 
 
 def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(
-    people: People, access: AccessStore, store: SqlStore
+    people: AccountService, access: AccessStore, store: SqlStore
 ) -> None:
     people.add("anna", Role.ADMIN, PASSWORD, T0)
     people.add("berta", Role.ENGINEER, PASSWORD, T0)
@@ -86,7 +86,9 @@ def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(
     assert access.accounts.all() == []
 
 
-def test_of_two_admins_who_leave_at_once_one_stays(people: People, access: AccessStore) -> None:
+def test_of_two_admins_who_leave_at_once_one_stays(
+    people: AccountService, access: AccessStore
+) -> None:
     people.add("viewer", Role.VIEWER, PASSWORD, T0)
 
     def leave(name: str) -> bool:
@@ -105,7 +107,7 @@ def test_of_two_admins_who_leave_at_once_one_stays(people: People, access: Acces
 
 
 def test_the_set_up_token_makes_the_first_admin_and_nothing_more(
-    people: People, access: AccessStore, doors: Doors
+    people: AccountService, access: AccessStore, doors: CredentialChecker
 ) -> None:
     token = people.offer_set_up(T0)
     assert token is not None
@@ -126,7 +128,7 @@ def test_the_set_up_token_makes_the_first_admin_and_nothing_more(
     assert people.offer_set_up(T0) is None
 
 
-def test_a_set_up_token_is_void_when_it_is_old_or_another_was_drawn(people: People) -> None:
+def test_a_set_up_token_is_void_when_it_is_old_or_another_was_drawn(people: AccountService) -> None:
     first, second = people.offer_set_up(T0), people.offer_set_up(T0)
     assert first is not None
     assert second is not None
@@ -137,7 +139,9 @@ def test_a_set_up_token_is_void_when_it_is_old_or_another_was_drawn(people: Peop
     assert people.set_up(second, "anna", PASSWORD, late_ns - 1)
 
 
-def test_of_many_who_set_up_at_once_one_is_admin(people: People, access: AccessStore) -> None:
+def test_of_many_who_set_up_at_once_one_is_admin(
+    people: AccountService, access: AccessStore
+) -> None:
     token = people.offer_set_up(T0)
     assert token is not None
     with ThreadPoolExecutor(8) as threads:
@@ -146,7 +150,7 @@ def test_of_many_who_set_up_at_once_one_is_admin(people: People, access: AccessS
 
 
 def test_a_key_opens_as_what_it_was_made_for_until_its_day(
-    access: AccessStore, doors: Doors
+    access: AccessStore, doors: CredentialChecker
 ) -> None:
     key, shown = create_key(access, "Historian", Role.VIEWER, ("U1", "U2", "U1"), 30, T0)
 
@@ -155,13 +159,13 @@ def test_a_key_opens_as_what_it_was_made_for_until_its_day(
     )
     end_ns = T0 + 30 * DAY_NS
     assert isinstance(doors.machine(shown, end_ns - 1), Identity)
-    assert doors.machine(shown, end_ns) is Refusal.EXPIRED
+    assert doors.machine(shown, end_ns) is None
     assert access.keys.get(key.id) != key  # its use is noted
     assert shown not in repr(access.keys.all())
 
 
 def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(
-    access: AccessStore, doors: Doors
+    access: AccessStore, doors: CredentialChecker
 ) -> None:
     key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
     other_id, other = new_key()
@@ -170,12 +174,14 @@ def test_a_key_with_a_wrong_end_opens_nothing_and_counts_as_unknown(
     for nothing in ("", "pw_", "pw__", shown + "\n", key.id, "pw_" + "0" * 12 + "_"):
         assert key_id(nothing) is None
     for wrong in (forged, shown[:-1], shown + "A", shown.upper(), f" {shown}", shown.swapcase()):
-        assert doors.machine(wrong, T0) is Refusal.UNKNOWN
+        assert doors.machine(wrong, T0) is None
     (stored,) = access.keys.all()
     assert stored.used_ns is None
 
 
-def test_the_last_use_of_a_key_is_written_once_a_minute(access: AccessStore, doors: Doors) -> None:
+def test_the_last_use_of_a_key_is_written_once_a_minute(
+    access: AccessStore, doors: CredentialChecker
+) -> None:
     key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
     seen = set()
     for second in range(150):
@@ -195,12 +201,12 @@ def test_no_key_is_made_for_ever_or_for_an_admin_of_one_unit(access: AccessStore
 
 
 def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
-    access: AccessStore, doors: Doors, store_place: Place
+    access: AccessStore, doors: CredentialChecker, store_place: Place
 ) -> None:
     key, shown = create_key(access, "historian", Role.VIEWER, (), 30, T0)
     assert access.keys.revoke(key.id, T0 + S)
     assert not access.keys.revoke(key.id, T0 + 2 * S)
-    assert doors.machine(shown, T0 + S) is Refusal.REVOKED
+    assert doors.machine(shown, T0 + S) is None
     (stored,) = access.keys.all()
     assert (stored.revoked_ns, stored.state(T0 + 99 * DAY_NS)) == (T0 + S, KeyState.REVOKED)
     for statement, words in (
@@ -215,7 +221,7 @@ def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
 
 
 def test_every_change_is_in_the_audit_trail_with_what_was_before_and_nothing_secret(
-    store: SqlStore, people: People
+    store: SqlStore, people: AccountService
 ) -> None:
     accounts = store.access.accounts
     token = people.offer_set_up(T0)

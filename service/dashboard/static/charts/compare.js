@@ -59,7 +59,7 @@ const keyOf = (label, symbol) => ({
   x: [null], y: [null], type: "scatter", mode: "markers", name: label, legendgroup: label, marker: { symbol, size: 8, color: FAINT }, hoverinfo: "skip",
 });
 
-/** Layout over the whole range asked for; who has zoomed into the values stays there as time goes on. */
+/** Layout over the whole requested range; a zoom into the values is kept. */
 export function compareLayout(trends, title, colourBy) {
   const layout = trendLayout(trends, title, `${trends.start} ${trends.end}`, "normal");
   layout.yaxis.uirevision = title;

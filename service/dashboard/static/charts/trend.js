@@ -14,7 +14,7 @@ const LOOKS = {
 /**
  * Buckets of one series in pieces without interruption, scaled to the shown unit.
  *
- * Buckets nobody wrote to are narrower than the refresh and mean nothing; a bucket without a value,
+ * Empty buckets are narrower than the refresh and mean nothing; a bucket without a value,
  * or a step wider than two and a half refreshes, is an interruption and is drawn as one.
  */
 export function piecesOf(trends, name, refreshS) {
@@ -57,7 +57,7 @@ export function trendTraces(pieces, name, label, axisLetter, changes = {}) {
 
 const isKnown = (bucket) => bucket.random !== null;
 
-/** Two fine dotted lines, so that nobody takes them for the band of what was read. */
+/** Two fine dotted lines, distinct from the band of readings. */
 function randomTraces(pieces, look, label) {
   const known = pieces.map((piece) => piece.filter(isKnown)).filter((piece) => piece.length > 0);
   if (known.length === 0) return [];

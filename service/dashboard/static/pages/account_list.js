@@ -1,4 +1,4 @@
-/** Accounts of people: who there is, somebody new, and what may be done to each. */
+/** Accounts of people: list, new account, and operations on each. */
 
 import { ROLES } from "../access_words.js";
 import { ask, tell } from "../api.js";
@@ -11,16 +11,16 @@ import { session } from "../session.js";
 const HEADS = ["Name", "Role", "Added", "Password set", ""];
 const PASSWORD = { type: "password", autocomplete: "new-password", required: "", maxlength: "256" };
 const PASSWORD_HELP = "Password, 12 characters or more";
-const NOBODY = "No account yet: in the demonstration nobody on this computer needs to log in. Others can do so once there is an account.";
+const NO_ACCOUNT = "No account yet: in the demonstration no login is needed on this computer. Others can do so once there is an account.";
 
 /** Returns `{ node, ask(signal) }`; `again` asks for all of it afresh. */
 export function accountList(again) {
-  const table = listing("Accounts", HEADS, NOBODY, ({ name }) => name, (account) => accountRow(account, again));
+  const table = listing("Accounts", HEADS, NO_ACCOUNT, ({ name }) => name, (account) => accountRow(account, again));
   const name = element("input", { required: "", maxlength: "80", autocomplete: "off", autocapitalize: "none", spellcheck: "false" });
   const role = roleChoice("viewer");
   const password = element("input", PASSWORD);
   const fields = [labelled("Name", name), labelled("Role", role), labelled(PASSWORD_HELP, password)];
-  const add = element("button", { type: "button" }, "Add somebody…");
+  const add = element("button", { type: "button" }, "Add account…");
   const form = question("A new account", "Add", fields, () => tell(["accounts"], { name: name.value.trim(), role: role.value, password: password.value }), again);
   add.addEventListener("click", () => form.open(add));
   const head = element("div", { class: "panel-head" }, element("h2", {}, "People"), add);

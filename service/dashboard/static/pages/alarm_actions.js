@@ -1,4 +1,4 @@
-/** What somebody may do to one alarm: acknowledge it, shelve it, bring it back. */
+/** Operations on one alarm: acknowledge it, shelve it, bring it back. */
 
 import { kindWords, placeWords } from "../alarm_words.js";
 import { tell } from "../api.js";
@@ -21,7 +21,7 @@ const DONE = {
   "return-to-service": "back in service",
 };
 
-/** Returns `{ node, draw(alarm) }`; `again(sentence)` hears what was done, null for nothing, and asks afresh. */
+/** Returns `{ node, draw(alarm) }`; `again(sentence)` receives a report, null without an action, and requests the list again. */
 export function alarmActions(actor, again) {
   let alarm = null;
   const failure = element("span", { class: "action-failure", role: "alert" });

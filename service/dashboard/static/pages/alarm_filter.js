@@ -10,7 +10,7 @@ const RANGES = [
   ["oil_temperature", "Oil, °C"],
 ];
 
-/** Returns `{ node, query() }`; `onAsk` is called when somebody wants to look. */
+/** Returns `{ node, query() }`; `onAsk` is called when the filter is submitted. */
 export function alarmFilter(onAsk) {
   const options = STATES.map((state) => element("option", { value: state }, stateWords(state)));
   const state = element("select", {}, element("option", { value: "" }, "any state"), ...options);

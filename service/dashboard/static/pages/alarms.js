@@ -1,4 +1,4 @@
-/** The alarm list: what is wrong and seen, what somebody has taken off the list, and the history. */
+/** Alarm list: active, acknowledged and hidden alarms, and the history. */
 
 import { conditionWords, isHidden } from "../alarm_words.js";
 import { ask } from "../api.js";
@@ -37,11 +37,11 @@ export function alarmsPage(main) {
   const head = element("div", { class: "alarms-head" }, element("h1", { tabindex: "-1" }, "Alarms"), state.node, done, actor.node);
   const delivery = deliveryView();
   main.append(head, delivery.node, listed.node, unjudged.node, hidden.node, rates.node, history.node);
-  let heard = null;
+  let receivedAt = null;
   let failure = null;
 
   function draw() {
-    const silenceS = heard ? secondsBetween(heard, moment()) : null;
+    const silenceS = receivedAt ? secondsBetween(receivedAt, moment()) : null;
     const current = silenceS !== null && silenceS <= CURRENT_LIMIT_S;
     state.node.hidden = current && failure === null;
     state.draw("bad", silenceWords(silenceS, failure));
@@ -51,7 +51,7 @@ export function alarmsPage(main) {
   async function askList(signal) {
     try {
       const found = await ask(["alarms"], [], signal);
-      [heard, failure] = [moment(), null];
+      [receivedAt, failure] = [moment(), null];
       keepingFocus(main, () => {
         listed.draw(found.alarms.filter((alarm) => !isHidden(alarm)));
         hidden.draw(found.alarms.filter(isHidden));
@@ -103,7 +103,7 @@ export function alarmsPage(main) {
   };
 }
 
-/** A button that was pressed may go away with what it did: the keyboard goes on at its row, or at the top. */
+/** A pressed button may disappear with its action: the focus then moves to its row, or to the top. */
 function keepingFocus(main, draw) {
   const focused = document.activeElement;
   const row = focused.closest("tr");

@@ -5,12 +5,12 @@ import { element } from "../dom.js";
 
 let nFilters = 0;
 
-/** Returns `{ node, query(), offer(entries) }`; `onAsk` is called when somebody wants to look. */
+/** Returns `{ node, query(), offer(entries) }`; `onAsk` is called when the filter is submitted. */
 export function auditFilter(onAsk) {
   const id = `audit-filter-${(nFilters += 1)}`;
   const actors = element("datalist", { id: `${id}-actors` });
   const objects = element("datalist", { id: `${id}-objects` });
-  const actor = element("input", { maxlength: "300", list: actors.id, placeholder: "anybody" });
+  const actor = element("input", { maxlength: "300", list: actors.id, placeholder: "any actor" });
   const object = element("input", { maxlength: "300", list: objects.id, placeholder: "anything" });
   const action = element("select", {}, element("option", { value: "" }, "everything"));
   const [from, until] = ["start", "end"].map(() => element("input", { type: "datetime-local" }));

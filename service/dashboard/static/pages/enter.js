@@ -1,4 +1,4 @@
-/** The door for somebody who sees the plant without a login and wants to change something; then back to the page before. */
+/** Login page for a user who sees the plant without a login; it returns to the page before. */
 
 import { session } from "../session.js";
 import { loginPage } from "./login.js";

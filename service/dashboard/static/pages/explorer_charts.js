@@ -9,7 +9,7 @@ import { formatTime } from "../format.js";
 import { stateWords } from "../film_words.js";
 import { byAxis } from "../quantity_groups.js";
 
-/** A double click makes the chart reset itself, too, which is nobody's zoom. */
+/** A double click also makes the chart reset itself, which is not a zoom of the user. */
 const AFTER_DOUBLE_MS = 500;
 
 /** Returns `{ node, show(found, state, labels, refreshS), trouble(failure), draw(notCurrent) }`. */
@@ -83,7 +83,7 @@ const withoutRandom = (pieces) => pieces.map((piece) => piece.map((bucket) => ({
 
 const hasData = ({ pieces }) => pieces.length > 0;
 
-/** What tells a line from the others of its chart. */
+/** Text that distinguishes a line from the others of its chart. */
 function lineLabel([unit, bearing], words, hasOthers) {
   return [hasOthers ? `${unit} ${bearing}` : "", words].filter(Boolean).join(": ");
 }

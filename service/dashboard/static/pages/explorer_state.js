@@ -19,7 +19,7 @@ export const COLOURS = [
 
 export const STATES = ["standstill", "run_up", "speed_no_load", "part_load", "full_load", "run_down", "unknown"];
 
-/** What is shown to whoever comes without an address. */
+/** View of an address without parameters. */
 const USUAL = ["stiffness_xx_n_per_m", "stiffness_yy_n_per_m"];
 const A_DAY_S = 86400;
 const MOST_SPAN_S = 10 * 365 * 86400;

@@ -55,7 +55,7 @@ export function timeBar(onRange, onBack) {
       back.disabled = !canGoBack;
       complain("");
     },
-    /** Time goes on. */
+    /** Follow the present time. */
     tick: (serviceMs) => (nowMs = serviceMs),
   };
 }

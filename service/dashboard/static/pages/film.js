@@ -21,7 +21,7 @@ export function filmPage(main, unitId, bearingId) {
   const charts = filmCharts(path);
   const baselines = baselineTable(path, actor, () => questions.again());
   main.append(element("div", { class: "bearing film-page" }, head.node, verdict.node, charts.node, actor.node, baselines.node));
-  const films = askFilm(path, verdict, charts.heard);
+  const films = askFilm(path, verdict, charts.update);
   let baseline = null;
 
   const questions = poll(async (signal) => {

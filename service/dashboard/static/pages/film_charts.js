@@ -15,7 +15,7 @@ const MAX_POINTS = 1500;
 const SPANS = [[7, "7 d"], [30, "30 d"], [365, "1 y"]];
 const DIRECTIONS = [["x", "x"], ["y", "y"]];
 
-/** Returns `{ node, heard(film), learned(baselines, baseline), draw(view), close() }`. */
+/** Returns `{ node, update(film), learned(baselines, baseline), draw(view), close() }`. */
 export function filmCharts(path) {
   const direction = choice("Direction", DIRECTIONS, "x", () => show());
   const span = choice("History", SPANS, 30, () => questions.again());
@@ -57,7 +57,7 @@ export function filmCharts(path) {
 
   return {
     node: element("div", { class: "charts" }, element("div", { class: "choices" }, direction.node, span.node), ...boxes.map((box) => box.node)),
-    heard(film) {
+    update(film) {
       const isFirst = known.film === null;
       known.film = film;
       if (isFirst) questions.again();

@@ -16,13 +16,13 @@ export function filmSummary(path, unit, bearing) {
   return { node: panel.node, draw() {}, close: questions.stop };
 }
 
-/** Asks for the film again and again; `heard` is told of every answer. */
-export function askFilm(path, panel, heard = () => {}) {
+/** Requests the film periodically; `onAnswer` receives every answer. */
+export function askFilm(path, panel, onAnswer = () => {}) {
   return poll(async (signal) => {
     try {
       const film = await ask([...path, "film"], [], signal);
       panel.draw(film);
-      heard(film);
+      onAnswer(film);
     } catch (failure) {
       if (signal.aborted) return;
       panel.fail(failure instanceof NotReachable ? `service not reachable. ${failure.message}` : failure.message);

@@ -1,4 +1,4 @@
-/** A key that has just been made, this once: to be copied now, for nobody can show it again. */
+/** A key that has just been made, this once: to be copied now, since it is not shown again. */
 
 import { element, setText } from "../dom.js";
 

@@ -27,7 +27,7 @@ export function liveSource(path) {
   };
 }
 
-/** A recording; where it breaks off it goes on behind. */
+/** A recording; after a break it continues behind the break. */
 export function recordedSource(recording, bearing) {
   async function piece(startS, signal) {
     const query = [["bearing", bearing], ["start_s", startS.toFixed(3)], ["seconds", String(PIECE_S)]];

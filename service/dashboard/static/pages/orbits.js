@@ -167,7 +167,7 @@ function absenceWords(view, unitId, bearingId) {
   return unit.source.data_age_s === null ? "No sample of this unit has arrived since the service started." : null;
 }
 
-/** That nothing new arrives, so that nobody takes the last motion for the present one; null if something does. */
+/** Note that no new samples arrive, so that the last motion is not taken for the present one; null if they arrive. */
 function stalenessWords(view, unitId) {
   const ageS = view.units.find(({ id }) => id === unitId)?.source.data_age_s ?? null;
   if (ageS === null || ageS < STALE_S) return null;

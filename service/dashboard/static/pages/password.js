@@ -1,13 +1,13 @@
-/** Another password for whoever is logged in. */
+/** New password of the logged-in account. */
 
 import { element, setText } from "../dom.js";
 import { entry, entryForm } from "../parts/entry.js";
 import { changePassword, mustChangePassword, session } from "../session.js";
 
-const NOBODY = "Nobody is logged in here, so that there is no password to change.";
+const NOT_LOGGED_IN = "You are not logged in: there is no password to change.";
 const EXPLANATION = "12 characters or more; several words are easy to remember and hard to guess. Wherever else you are logged in, that ends.";
 
-const SET_BY_OTHERS = "Somebody else has set your password: change it before you go on. ";
+const SET_BY_OTHERS = "An administrator set your password: change it first. ";
 
 /** Whose password has been changed: the page may have been opened anew with the new session meanwhile. */
 let changed = null;
@@ -16,7 +16,7 @@ let changed = null;
 export function passwordPage(main) {
   const name = session()?.name ?? null;
   const title = element("h1", {}, "Your password");
-  const words = element("p", { class: "sentence" }, name === null ? NOBODY : mustChangePassword() ? SET_BY_OTHERS + EXPLANATION : EXPLANATION);
+  const words = element("p", { class: "sentence" }, name === null ? NOT_LOGGED_IN : mustChangePassword() ? SET_BY_OTHERS + EXPLANATION : EXPLANATION);
   const box = element("section", { class: "panel door" }, title, words);
   main.append(box);
   if (name === null) return { draw() {}, close() {} };

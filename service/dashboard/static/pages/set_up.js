@@ -1,4 +1,4 @@
-/** A service that has no account yet: whoever has its token makes the first one. */
+/** A service that has no account yet: its token is needed to create the first one. */
 
 import { element } from "../dom.js";
 import { entry, entryForm } from "../parts/entry.js";

@@ -105,7 +105,7 @@ function driftWords({ clock, kind }) {
   return `${sign}${Math.abs(clock.drift_ppm).toFixed(1)} ± ${(1.96 * clock.drift_uncertainty_ppm).toFixed(1)} ppm`;
 }
 
-/** Terms stay, only what has changed is written: somebody may be selecting a word. */
+/** Terms stay, only changed text is written, which keeps a selection. */
 function drawFacts(list, facts) {
   if (list.childElementCount !== facts.length) {
     list.replaceChildren(...facts.map(([term]) => element("div", {}, element("dt", {}, term), element("dd"))));

@@ -35,7 +35,7 @@ export function sourcesPage(main) {
       const [sources, { alarms }] = await Promise.all([ask(["sources"], [], signal), ask(["alarms"], [], signal)]);
       const dated = sources === known?.sources ? known.dated : moment(); // the very same answer ages on
       const settings = known?.settings ?? (await settingsOf(signal));
-      known = { sources, alarms, settings, dated, heard: moment(), lost: sources.map(lost.of) };
+      known = { sources, alarms, settings, dated, receivedAt: moment(), lost: sources.map(lost.of) };
       failure = null;
     } catch (error) {
       if (signal.aborted) return;
@@ -44,7 +44,7 @@ export function sourcesPage(main) {
   }, () => PERIOD_S);
 
   function drawState() {
-    const silenceS = known && secondsBetween(known.heard, moment());
+    const silenceS = known && secondsBetween(known.receivedAt, moment());
     const current = known !== null && silenceS <= CURRENT_LIMIT_S;
     state.node.hidden = failure === null && (current || known === null);
     state.draw("bad", known ? `This list is ${formatAge(silenceS)} old: how samples arrive now is not known. ${failure ?? ""}` : failure);

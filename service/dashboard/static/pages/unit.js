@@ -46,7 +46,7 @@ export function unitPage(main, unitId) {
   };
 }
 
-/** What is known of a film; null if that cannot be had, for the overview still tells its verdict. */
+/** Film of a bearing; null if the request fails, since the overview still shows its verdict. */
 async function filmOf(unit, bearing, signal) {
   try {
     return await ask(["units", unit, "bearings", bearing, "film"], [], signal);

@@ -29,7 +29,7 @@ export function momentSlider(onChange) {
   }
   slider.addEventListener("input", () => choose(Number(slider.value)));
   newest.addEventListener("click", () => choose(offered.time.length - 1));
-  let heard = false;
+  let hasAnswered = false;
   return {
     node,
     offer(spectra, isThere) {
@@ -40,8 +40,8 @@ export function momentSlider(onChange) {
     index: () => indexOf(offered, chosenS),
     /** From its first drawing on, a click into the chart chooses the spectrum next to it. */
     hear(chart) {
-      if (heard) return;
-      heard = true;
+      if (hasAnswered) return;
+      hasAnswered = true;
       chart.on("plotly_click", ({ points }) => {
         const atMs = typeof points[0].y === "number" ? points[0].y : Date.parse(`${points[0].y.replace(" ", "T")}Z`);
         choose(nearest(offered.time.map(localMs), atMs));

@@ -45,7 +45,7 @@ function drawBanner(view) {
 }
 
 function serviceSentence(view) {
-  if (isLocked()) return mustChangePassword() ? "The password must be changed." : "Nobody is logged in.";
+  if (isLocked()) return mustChangePassword() ? "The password must be changed." : "You are not logged in.";
   if (view.silenceS === null) return "Waiting for the service’s first answer.";
   return `Service answered ${formatAge(view.silenceS)} ago`;
 }

@@ -1,4 +1,4 @@
-/** Where the uncertainty of one result comes from, asked for only while somebody looks. */
+/** Uncertainty budget of one result, requested only while it is open. */
 
 import { ask } from "../api.js";
 import { element, setText } from "../dom.js";

@@ -1,4 +1,4 @@
-/** Who is told of alarms: a line for each receiver that fails or is behind, nothing while all is well. */
+/** Receivers of alarm messages: a line for each receiver that fails or is behind, else nothing. */
 
 import { element } from "../dom.js";
 import { formatTime } from "../format.js";

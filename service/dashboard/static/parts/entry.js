@@ -18,7 +18,7 @@ export function entry(label, attributes) {
 }
 
 /**
- * A form that carries `send` out; `refused(failure)` hears of one that went wrong.
+ * A form that carries `send` out; `refused(failure)` is called after a failure.
  *
  * Who has tried too often waits: the button counts the seconds down that the service asked for.
  * Returns `{ node, close() }`.

@@ -5,7 +5,7 @@ import { element, setAttribute } from "../dom.js";
 /**
  * Returns `{ node, draw(things) }`; `nothing` is said where there are none.
  *
- * `keyOf(thing)` tells things apart; `rowOf(thing)` makes `{ nodes, draw(thing) }`.
+ * `keyOf(thing)` identifies a thing; `rowOf(thing)` makes `{ nodes, draw(thing) }`.
  */
 export function listing(title, heads, nothing, keyOf, rowOf) {
   const cells = heads.map((head) => element("th", { scope: "col", role: "columnheader" }, head || element("span", { class: "hidden" }, "Actions")));

@@ -5,7 +5,7 @@ import { element, setText } from "../dom.js";
 /**
  * Returns `{ node, open(opener) }`; `fields` stand before the button that carries `act` out.
  *
- * `act` throws why not; `done` hears that it was done.
+ * `act` throws the reason of a failure; `done` is called after a success.
  */
 export function question(sentence, words, fields, act, done) {
   const failure = element("span", { class: "action-failure", role: "alert" });

@@ -4,7 +4,7 @@ import { element, setText } from "../dom.js";
 import { speedOrigin } from "../words.js";
 import { readingOf, readingView } from "./reading.js";
 
-const NOBODY = { readings: {}, speed_source: null };
+const NO_BEARING = { readings: {}, speed_source: null };
 
 /** Returns `{ node, draw(unit) }`. */
 export function runningView() {
@@ -14,7 +14,7 @@ export function runningView() {
   return {
     node: element("div", { class: "running" }, speed.node, from, power.node),
     draw(unit) {
-      const knowing = (name) => unit.bearings.find((b) => readingOf(b, name).value !== null) ?? unit.bearings[0] ?? NOBODY;
+      const knowing = (name) => unit.bearings.find((b) => readingOf(b, name).value !== null) ?? unit.bearings[0] ?? NO_BEARING;
       const latest = knowing("speed_rpm");
       speed.draw(latest, latest.quality?.reason);
       const origin = speedOrigin(latest);

@@ -12,16 +12,16 @@ const PERIOD_S = 2;
 /** Asks for the list. Returns `{ markOf(unit), close() }`; `markOf` gives `{ node, draw() }`. */
 export function unitAlarmMarks() {
   let alarms = null;
-  let heard = null;
+  let receivedAt = null;
   const questions = poll(async (signal) => {
     try {
       ({ alarms } = await ask(["alarms"], [], signal));
-      heard = moment();
+      receivedAt = moment();
     } catch {
       // the head of the page says that alarms are not known
     }
   }, () => PERIOD_S);
-  const isCurrent = () => heard !== null && secondsBetween(heard, moment()) <= CURRENT_LIMIT_S;
+  const isCurrent = () => receivedAt !== null && secondsBetween(receivedAt, moment()) <= CURRENT_LIMIT_S;
   return { markOf: (unit) => unitMark(() => (isCurrent() ? alarms.filter((alarm) => isAbout(alarm, unit)) : null)), close: questions.stop };
 }
 

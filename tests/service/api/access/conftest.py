@@ -11,12 +11,13 @@ import pytest
 from argon2 import PasswordHasher
 from rigs.described import described_app
 
-from service.api.auth.authenticator import AccessDesk
+from service.api.auth.authenticator import Authenticator
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import create_key
 from service.app.metrics import Watched, scrape
 from service.measuring.acquirer import Bus
 from service.measuring.timings import Timings
+from service.notifications.sender import Deliveries
 from service.store.access.identities import Role
 
 PASSWORD = "the river is high in may"  # noqa: S105
@@ -28,7 +29,7 @@ COOKIE = "__Host-padwatch"
 class Access:
     """A service that asks everybody who he is."""
 
-    desk: AccessDesk
+    desk: Authenticator
     app: Any
     service: Any
 
@@ -40,7 +41,7 @@ class Access:
     async def account(self, name: str, role: Role) -> None:
         """Add an account whose password its owner has set."""
         now_ns = self.service.clock.now_ns()
-        await asyncio.to_thread(self.desk._people.add, name, role, PASSWORD, now_ns)
+        await asyncio.to_thread(self.desk.people.add, name, role, PASSWORD, now_ns)
 
     async def session(self, name: str) -> str:
         """Log in; the token of the session."""
@@ -79,12 +80,12 @@ def access(service: Any) -> Access:
         films=context.films,
         captures=context.captures,
         evidence=service.evidence,
-        deliveries=context.deliveries,
+        deliveries=Deliveries([], service.store.outbox, service.clock),
         timings=Timings(context.units, service.clock),
         clock=service.clock,
     )
     hashing = Hashing(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
-    desk = AccessDesk(service.store.access, service.clock, local_role=None, hashing=hashing)
+    desk = Authenticator(service.store.access, service.clock, local_role=None, hashing=hashing)
     app = described_app(
         replace(context, access=desk, metrics=partial(scrape, watched)), service.desk
     )

@@ -99,7 +99,7 @@ async def test_a_known_person_gets_in_while_strangers_take_all_places(
     access: Any, anna: str
 ) -> None:
     assert anna  # from the same place before
-    while access.desk._work._places.acquire(blocking=False):
+    while access.desk.work._places.acquire(blocking=False):
         pass
     statuses = []
     for peer in ("192.0.2.7", "192.0.2.8"):

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from service.api.auth.passwords import MAX_AT_ONCE, MAX_WAITING, AccessWork, TooManyLoginsError
+from service.api.auth.passwords import MAX_AT_ONCE, MAX_WAITING, AccessThreads, TooManyLoginsError
 from service.store.port import StoreError
 
 
@@ -21,25 +21,25 @@ def held() -> Iterator[threading.Event]:
 async def test_only_so_many_passwords_wait_and_nobody_else_for_them(
     held: threading.Event,
 ) -> None:
-    work = AccessWork()
+    work = AccessThreads()
     logins = [
-        asyncio.create_task(work.hashed(held.wait, is_known=False)) for _ in range(MAX_WAITING)
+        asyncio.create_task(work.run_hashing(held.wait, is_known=False)) for _ in range(MAX_WAITING)
     ]
     await asyncio.sleep(0)
 
     with pytest.raises(TooManyLoginsError):
-        await work.hashed(held.wait, is_known=False)
-    assert await work.looked_up(lambda: "found") == "found"
+        await work.run_hashing(held.wait, is_known=False)
+    assert await work.run(lambda: "found") == "found"
     held.set()
     assert await asyncio.gather(*logins) == [True] * MAX_WAITING
-    assert await work.hashed(lambda: "in") == "in"
+    assert await work.run_hashing(lambda: "in") == "in"
     work.close()
 
 
 async def test_at_the_end_nothing_more_is_begun(held: threading.Event) -> None:
-    work = AccessWork()
+    work = AccessThreads()
     logins = [
-        asyncio.create_task(work.hashed(held.wait, is_known=False)) for _ in range(MAX_WAITING)
+        asyncio.create_task(work.run_hashing(held.wait, is_known=False)) for _ in range(MAX_WAITING)
     ]
     await asyncio.sleep(0)
     work.close()
@@ -52,7 +52,7 @@ async def test_at_the_end_nothing_more_is_begun(held: threading.Event) -> None:
 
 
 async def test_a_note_that_cannot_be_written_is_nobodys_trouble() -> None:
-    work, tried = AccessWork(), threading.Event()
+    work, tried = AccessThreads(), threading.Event()
 
     def write() -> None:
         tried.set()
@@ -61,5 +61,5 @@ async def test_a_note_that_cannot_be_written_is_nobodys_trouble() -> None:
     work.note(write)
 
     assert await asyncio.to_thread(tried.wait, 30.0)
-    assert await work.looked_up(lambda: "found") == "found"
+    assert await work.run(lambda: "found") == "found"
     work.close()
