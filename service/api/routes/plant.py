@@ -15,6 +15,7 @@ from service.api.context import Context, LiveState, UnitId
 from service.api.parameters import TimeRange
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, Time
+from service.runtime.metrics import HistogramState
 from service.settings.loading import plant_file_schema
 from service.settings.units import UnitSettings
 from service.store.access.identities import Permission
