@@ -3,9 +3,7 @@
 import asyncio
 import random
 import signal
-import sys
 from contextlib import suppress
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -13,12 +11,23 @@ import uvloop
 
 from acquisition.clock import Clock, SystemClock
 from acquisition.errors import AcquisitionError, LinkError
+from acquisition.recordings.reader import open_recording
 from acquisition.recordings.writer import RecordingWriter
 from acquisition.source import SampleSource
-from service.app.recordings import recording_of, recording_writer
-from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
+from service.app.recordings import recording_writer
+from service.cli.options import (
+    JsonOutput,
+    NewRecording,
+    PlantPath,
+    UnitOption,
+    fail,
+    one_unit,
+    print_result,
+    progress,
+)
 from service.measuring.sources import source_of
 from service.runtime.process import made_by
+from service.settings.loading import load_plant_file
 from service.settings.sources.devices import ModbusVectorSettings
 
 MAX_SECONDS = 7 * 86_400.0
@@ -29,48 +38,41 @@ RETRY_S = 0.5
 
 def record(
     plant_file: PlantPath,
-    out: Annotated[Path, typer.Option(help="Folder of the recording; must not exist yet.")],
+    out: NewRecording,
     unit: UnitOption = None,
     seconds: Annotated[
         float, typer.Option(min=0.1, max=MAX_SECONDS, help="Length of the recording.")
     ] = 600.0,
     reconnect: Annotated[
-        bool, typer.Option("--reconnect", help="Go on after a lost link; what it cost is a gap.")
+        bool, typer.Option("--reconnect", help="Continue after a lost link, with a gap.")
     ] = False,
-    json_output: Annotated[
-        bool, typer.Option("--json", help="Print the manifest instead of a sentence.")
-    ] = False,
+    json_output: JsonOutput = False,
 ) -> None:
     """Record a unit's samples exactly as its DAQ delivers them.
 
     Ctrl-C and SIGTERM end the recording early and keep it. So does a lost link, with exit code 1,
     unless --reconnect is given: then the recording ends when its length has passed.
     """
-    settings = one_unit(read_plant_file(plant_file), unit, plant_file)
+    settings = one_unit(load_plant_file(plant_file), unit, plant_file)
     if isinstance(settings.source, ModbusVectorSettings):
-        fail(f"padwatch record: the rack of unit {settings.id} gives vectors, not samples", code=2)
+        fail(f"the rack of unit {settings.id} delivers vectors, not samples", code=2)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        fail(f"padwatch record: {out.parent}: {error.strerror}")
-    try:
-        writer = recording_writer(settings, out, made_by())
-        clock = SystemClock()
-        patience = Patience(seconds, clock) if reconnect else None
-        problem = uvloop.run(record_blocks(source_of(settings, clock), writer, seconds, patience))
-        manifest = recording_of(out).manifest
-    except AcquisitionError as error:
-        fail(f"padwatch record: {error}")
-    if json_output:
-        typer.echo(manifest.model_dump_json(indent=1))
-    else:
-        n_bytes = sum(file.size for file in manifest.files.values())
-        typer.echo(
-            f"{out}: {manifest.n_samples / manifest.rate_hz:.1f} s of unit {manifest.unit},"
-            f" {len(manifest.channels)} channels, {n_bytes / 1e6:.1f} MB"
-        )
+        fail(f"{out.parent}: {error.strerror}")
+    writer = recording_writer(settings, out, made_by())
+    clock = SystemClock()
+    patience = Patience(seconds, clock) if reconnect else None
+    problem = uvloop.run(record_blocks(source_of(settings, clock), writer, seconds, patience))
+    manifest = open_recording(out).manifest
+    n_bytes = sum(file.size for file in manifest.files.values())
+    line = (
+        f"{out}: {manifest.n_samples / manifest.rate_hz:.1f} s of unit {manifest.unit},"
+        f" {len(manifest.channels)} channels, {n_bytes / 1e6:.1f} MB"
+    )
+    print_result(manifest, [line], json_output)
     if problem:
-        fail(f"padwatch record: ended early: {problem}")
+        fail(f"ended early: {problem}")
 
 
 class Patience:
@@ -94,12 +96,12 @@ async def record_blocks(
     seconds: float,
     patience: Patience | None = None,
 ) -> str | None:
-    """Record until enough has passed, SIGINT or SIGTERM comes, or the link is lost.
+    """Record until the length has passed, SIGINT or SIGTERM arrives, or the link is lost.
 
     Parameters
     ----------
     patience
-        Given if a lost link is to be opened again.
+        Reopens a lost link; without it, a lost link ends the recording.
 
     Returns
     -------
@@ -128,19 +130,14 @@ async def record_blocks(
 async def _read(
     source: SampleSource, writer: RecordingWriter, seconds: float, patience: Patience | None
 ) -> None:
-    on_terminal = sys.stderr.isatty()
-    with typer.progressbar(
-        length=round(seconds), label="Recording", file=sys.stderr, hidden=not on_terminal
-    ) as bar:
+    with progress("Recording", round(seconds)) as bar:
         while True:
             try:
-                await _read_once(source, writer, seconds, bar)
+                return await _read_once(source, writer, seconds, bar)
             except LinkError as error:
                 if patience is None:
                     raise
                 await patience.wait(error)
-            else:
-                return
 
 
 async def _read_once(

@@ -12,10 +12,12 @@ import pytest
 
 from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import RawBlock, calibrate
+from acquisition.recordings.reader import open_recording
+from acquisition.recordings.source import RecordingSource
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import Rejection
-from service.app.recordings import recording_of, recording_source, recording_writer, selection_of
+from service.app.recordings import recording_writer, selection_of
 from service.cli.offline.reanalysis import (
     LastAverages,
     assessment_model,
@@ -72,8 +74,8 @@ async def test_a_recording_analysed_equals_what_was_seen_live_to_the_last_bit(
             live += live_monitor.ingest(block)
             writer.write_calibrated(block)
 
-    recording = recording_of(tmp_path / "run")
-    source = recording_source(recording, selection_of(recording, unit), None, stepped_clock)
+    recording = open_recording(tmp_path / "run")
+    source = RecordingSource(recording, stepped_clock, selection_of(recording, unit))
     monitor, n_passed = UnitMonitor(machine, ANALYSIS), []
     again = [found async for found in assessments(source, monitor, n_passed.append)]
 

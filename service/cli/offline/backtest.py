@@ -61,6 +61,19 @@ class Found:
             alarms_per_unit_year=n_alarms / self.unit_years if self.unit_years else None,
         )
 
+    def report(self, file: str, n_rows: int, duration_s: float) -> BackTestReport:
+        """Return the report of a file."""
+        return BackTestReport(
+            file=file,
+            rows=n_rows,
+            films=self.films,
+            alarms=self.alarms,
+            rate=self.rate(),
+            doubts=self.doubts,
+            duration_s=duration_s,
+            readings_per_s=n_rows / max(duration_s, 1e-9),
+        )
+
 
 def run_back_test(
     histories: Mapping[Place, BearingRows],
