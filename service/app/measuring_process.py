@@ -10,7 +10,7 @@ from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.api.load import LoadLimits, LoadWatch
 from service.app.notifications import receivers_of
-from service.app.process import Ground
+from service.app.process import Ground, start_loops
 from service.app.service_health import Pressure, health_of
 from service.app.storage import (
     captures_of,
@@ -69,12 +69,11 @@ class Analysis:
     def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
         """Start the background loops; they run until they are cancelled."""
         beats, loops = self.ground.beats, self.own_loops
-        if self.part == WHOLE:  # no other process shares the plant
-            loops = {**loops, **self.shared_loops}
-        begun = [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
-        if self.part == WHOLE:
-            begun.append(tasks.create_task(self.deliveries.run(beats), name="deliver"))
-        return begun
+        if self.part != WHOLE:
+            return start_loops(loops, beats, tasks)
+        # no other process shares the plant
+        begun = start_loops(loops | self.shared_loops, beats, tasks)
+        return [*begun, tasks.create_task(self.deliveries.run(beats), name="deliver")]
 
     @property
     def own_loops(self) -> dict[str, Loop]:

@@ -9,9 +9,9 @@ from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from service.app.measuring_process import Analysis, analysis_on, reporting_loops
 from service.app.notifications import router_of
-from service.app.process import Ground, Supervision, live_view
+from service.app.process import Ground, Supervision, live_view, start_loops
 from service.app.service_audit import ServiceTrail
-from service.app.serving_process import Serving, context_of, serving_of
+from service.app.serving_process import context_of, serving_of
 from service.app.storage import database_path, evidence_desk, open_store
 from service.app.web import access_desk
 from service.measuring.acquirer import Bus
@@ -19,8 +19,7 @@ from service.measuring.analyser import BUS_CAPACITY, Runner
 from service.measuring.sources import WatchedUnit
 from service.measuring.timings import Timings, timed, timed_sources
 from service.notifications.message import Around
-from service.runtime.heartbeats import Heartbeats
-from service.runtime.process import stop_on_signals
+from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -103,70 +102,42 @@ async def _run(
     bus = Bus(BUS_CAPACITY, clock)
     monitors = {unit: watched.monitor for unit, watched in units.items()}
     analysis = await analysis_on(ground, monitors, bus, around)
-    runner = _runner(units, analysis, bus)
+    runner = Runner(
+        units,
+        ground.live,
+        analysis.recorder,
+        clock,
+        analysis.alarms,
+        analysis.films,
+        bus,
+        ground.beats,
+    )
     audit = ServiceTrail(plant, ground.origin, ground.store.audit, clock)
     await audit.begin()
     context = context_of(analysis, desk, audit.refusals, bus, timed_sources(units))
     evidence = evidence_desk(plant, ground.store, analysis.evidence, clock, context.downloads)
-    serving = serving_of(context, ground, listener, desk, announce, evidence)
+    server = serving_of(context, ground, listener, desk, announce, evidence)
     supervision = Supervision(manager, ground.beats, ground.live, units, clock)
+
+    def begin(tasks: asyncio.TaskGroup, stopped: asyncio.Event) -> list[asyncio.Task[None]]:
+        running = tasks.create_task(runner.run(), name="run")
+        if performance.ends:
+            running.add_done_callback(lambda _: stopped.set())
+        loops = {**_reporting_loops(analysis), "clock": audit.watch_clock}
+        return [running, *analysis.start(tasks), *start_loops(loops, ground.beats, tasks)]
+
     try:
-        await _perform(runner, analysis, audit, serving, supervision, ends=performance.ends)
+        await server.run(supervision, ground.beats, begin)
     finally:
         desk.close()
         await analysis.close()
         await audit.end()
 
 
-def _reporting(analysis: Analysis, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
-    """Start the loops that serve replicas; only PostgreSQL and live data have replicas."""
+def _reporting_loops(analysis: Analysis) -> Mapping[str, Loop]:
+    """Return the loops that serve replicas; only PostgreSQL and live data have replicas."""
     ground = analysis.ground
     if ground.plant.store.postgresql is None or ground.origin is not Origin.LIVE:
-        return []
+        return {}
     held = [*(unit.id for unit in ground.plant.unit), PLANT]
-    loops = reporting_loops(analysis, lambda: held)
-    beats = ground.beats
-    return [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
-
-
-def _runner(units: Mapping[str, WatchedUnit], analysis: Analysis, bus: Bus) -> Runner:
-    ground = analysis.ground
-    return Runner(
-        units,
-        ground.live,
-        analysis.recorder,
-        ground.clock,
-        analysis.alarms,
-        analysis.films,
-        bus,
-        ground.beats,
-    )
-
-
-async def _perform(
-    runner: Runner,
-    analysis: Analysis,
-    audit: ServiceTrail,
-    serving: Serving,
-    supervision: Supervision,
-    *,
-    ends: bool,
-) -> None:
-    """Run all parts until the service is stopped or its sources have ended."""
-    stopped = stop_on_signals()
-    watching = analysis.ground.beats.tend("clock", audit.watch_clock)
-    async with asyncio.TaskGroup() as tasks:
-        running = tasks.create_task(runner.run(), name="run")
-        beside = [*analysis.start(tasks), *_reporting(analysis, tasks)]
-        beside.append(tasks.create_task(watching, name="clock"))
-        server = serving.start(tasks)
-        announcing = tasks.create_task(serving.tell(supervision), name="announce")
-        supervising = tasks.create_task(supervision.run(), name="supervise")
-        if ends:
-            running.add_done_callback(lambda _: stopped.set())
-        await stopped.wait()
-        supervision.stopping()
-        serving.stop()
-        for task in (running, *beside, announcing, supervising):
-            task.cancel()
-        await asyncio.wait([server])
+    return reporting_loops(analysis, lambda: held)

@@ -6,7 +6,7 @@ from service.api.load import LoadWatch
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Bus
 from service.measuring.recorder import Recorder
-from service.measuring.service_alarms import LookAtHealth, ServiceHealth, StreamLook, enough_room
+from service.measuring.service_alarms import LookAtHealth, ServiceHealth, StreamLook
 from service.measuring.soundness import Soundness
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import Shed, Tape
@@ -20,11 +20,11 @@ def health_of(
     recorder: Recorder,
     captures: Captures,
     bus: Bus,
-    space: SpaceWatch | None = None,
-    load: LoadWatch | None = None,
-    tape: Tape | None = None,
-    recordings: WaveformKeeper | None = None,
-    soundness: Soundness | None = None,
+    space: SpaceWatch,
+    load: LoadWatch,
+    tape: Tape,
+    recordings: WaveformKeeper,
+    soundness: Soundness,
     stream: StreamLook | None = None,
 ) -> LookAtHealth:
     """Return a function that reads the health of the running service."""
@@ -40,25 +40,24 @@ def health_of(
             analysis_delay_s=max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
             captures_error=captures.trouble,
             recording_error=recording_error(tape, recordings),
-            n_recordings_damaged=recordings.n_lost if recordings else 0,
-            refused=load.words if load else None,
-            stored_trouble=soundness.trouble if soundness else None,
+            n_recordings_damaged=recordings.n_lost,
+            refused=load.words,
+            stored_trouble=soundness.trouble,
             stream_trouble=stream.trouble() if stream else None,
             accounts={
                 unit: status.account
                 for unit in names
                 if (status := live.status(unit)).last_sample_ns is not None
             },
-            disk=enough_room if space is None else space.condition,
+            disk=space.condition,
         )
 
     return look
 
 
-def recording_error(tape: Tape | None, recordings: WaveformKeeper | None) -> str | None:
+def recording_error(tape: Tape, recordings: WaveformKeeper) -> str | None:
     """Return why samples are not recorded or recordings not maintained; None if neither."""
-    now = tape.trouble if tape else None
-    return now or (recordings.lasting_trouble if recordings else None)
+    return tape.trouble or recordings.lasting_trouble
 
 
 BEHIND_S = 3.0
@@ -82,12 +81,7 @@ class Pressure:
         Returns whether requests are refused already; they are shed before waveforms.
     """
 
-    def __init__(
-        self,
-        bus: Bus,
-        is_full: Callable[[], bool] = lambda: False,
-        has_shed: Callable[[], bool] = lambda: True,
-    ) -> None:
+    def __init__(self, bus: Bus, is_full: Callable[[], bool], has_shed: Callable[[], bool]) -> None:
         self._bus, self._is_full, self._has_shed = bus, is_full, has_shed
         self._is_behind = False
 

@@ -12,13 +12,19 @@ from acquisition.clock import Clock
 from service.api.auth.authenticator import AccessDesk
 from service.api.auth.refusals import Refusals
 from service.api.context import Context
-from service.api.http.listening import url_of
-from service.api.http.server import GuardedServer
 from service.api.load import Shedding
 from service.app.measuring_process import Analysis
-from service.app.metrics import Watched, scrape
+from service.app.metrics import scrape
 from service.app.notifications import receivers_of
-from service.app.process import STALE_HOPS, Ground, Supervision, live_view, refresh_s
+from service.app.process import (
+    STALE_HOPS,
+    Ground,
+    ProcessServer,
+    Supervision,
+    live_view,
+    refresh_s,
+    start_loops,
+)
 from service.app.service_audit import ServiceTrail
 from service.app.storage import evidence_folders, open_store, recordings_folder
 from service.app.web import access_desk, application, server_of
@@ -39,7 +45,6 @@ from service.measuring.timings import Timings
 from service.reports.routes import EvidenceDesk
 from service.runtime.heartbeats import Heartbeats
 from service.runtime.polls import TimedSource
-from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.core_values import chatter_rule_of, machine_of
 from service.settings.plant import PlantFile
@@ -50,49 +55,6 @@ GC_THRESHOLDS = (20_000, 20, 20)
 """Rare collections: requests and blocks leave few reference cycles."""
 
 
-@dataclass(frozen=True)
-class Serving:
-    """A server on a socket.
-
-    Parameters
-    ----------
-    announce
-        Called with the URL once the server answers, then with the set-up token if there is no
-        account.
-    afterwards
-        Preparation that can follow the first answers; called once, in a thread.
-    """
-
-    ground: Ground
-    server: GuardedServer
-    listener: socket.socket
-    desk: AccessDesk
-    announce: Callable[[str], None]
-    afterwards: Callable[[], object]
-
-    def start(self, tasks: asyncio.TaskGroup) -> asyncio.Task[None]:
-        """Start the server; the task ends after `stop`."""
-        serve = partial(self.server.run_on, self.listener)
-        return tasks.create_task(self.ground.beats.tend("serve", serve), name="serve")
-
-    def stop(self) -> None:
-        """Stop accepting requests."""
-        self.server.should_exit = True
-
-    async def tell(self, supervision: Supervision) -> None:
-        """Announce the server as soon as it answers."""
-        while not self.server.started:
-            await asyncio.sleep(0.01)
-        supervision.ready()
-        self.announce(url_of(self.listener, has_tls=self.server.config.is_ssl))
-        if token := await self.desk.offer_set_up():
-            self.announce(f"to make the first account, within one hour and once: {token}")
-        await asyncio.to_thread(self.afterwards)
-        gc.collect()
-        gc.freeze()  # objects of the start stay; a collection of them takes 0.1 s
-        gc.set_threshold(*GC_THRESHOLDS)
-
-
 def serving_of(
     context: Context,
     ground: Ground,
@@ -100,12 +62,28 @@ def serving_of(
     desk: AccessDesk,
     announce: Callable[[str], None],
     evidence: EvidenceDesk | None = None,
-) -> Serving:
-    """Build the server of a context; the OpenAPI document is rendered once, after the start."""
+) -> ProcessServer:
+    """Build the server of a context; the OpenAPI document is rendered once, after the start.
+
+    Parameters
+    ----------
+    announce
+        Called with the URL once the server answers, then with the set-up token if there is no
+        account.
+    """
     app = application(context, evidence)
-    asked = app if context.load is None else Shedding(app, context.load)
-    server = server_of(asked, ground.plant, ground.clock)
-    return Serving(ground, server, listener, desk, announce, afterwards=app.rendered)
+
+    async def prepare() -> None:
+        if token := await desk.offer_set_up():
+            announce(f"to make the first account, within one hour and once: {token}")
+        await asyncio.to_thread(app.rendered)
+        gc.collect()
+        gc.freeze()  # objects of the start stay; a collection of them takes 0.1 s
+        gc.set_threshold(*GC_THRESHOLDS)
+
+    limited = app if context.load is None else Shedding(app, context.load)
+    server = server_of(limited, ground.plant, ground.clock)
+    return ProcessServer("serve", server, listener, announce, prepare)
 
 
 def context_of(
@@ -133,7 +111,7 @@ def context_of(
         deliveries=analysis.deliveries,
         evidence=lambda: analysis.evidence.status,
         configuration=analysis.evidence.configuration,
-        metrics=partial(scrape, metrics_of(analysis, bus, sources)),
+        metrics=partial(scrape, analysis, bus, sources),
         origin=ground.origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
         sources=sources,
@@ -146,31 +124,6 @@ def context_of(
         recordings=(evidence_folders(plant).captures, recordings_folder(plant)),
         faults=lambda: analysis.recordings.faults,
         stored_trouble=lambda: analysis.soundness.trouble,
-    )
-
-
-def metrics_of(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource]) -> Watched:
-    """Return the sources of metrics in a process that analyses."""
-    ground = analysis.ground
-    return Watched(
-        bearings={unit.id: [bearing.id for bearing in unit.bearing] for unit in ground.plant.unit},
-        live=ground.live,
-        bus=bus,
-        recorder=analysis.recorder,
-        alarms=analysis.alarms,
-        films=analysis.films,
-        captures=analysis.captures,
-        evidence=analysis.evidence,
-        deliveries=analysis.deliveries,
-        timings=ground.timings,
-        clock=ground.clock,
-        sources=sources,
-        space=analysis.space,
-        load=analysis.load,
-        tape=analysis.tape,
-        recordings=analysis.recordings,
-        soundness=analysis.soundness,
-        store_kind=ground.store.kind,
     )
 
 
@@ -280,48 +233,20 @@ async def run_serve(
         If the service would be reachable from other hosts without TLS or accounts.
     """
     with closing(open_store(plant)) as store:
-        await _run(plant, store, listener, clock, announce, manager)
-
-
-async def _run(
-    plant: PlantFile,
-    store: Store,
-    listener: socket.socket,
-    clock: Clock,
-    announce: Callable[[str], None],
-    manager: ServiceManager,
-) -> None:
-    desk = access_desk(plant, store.access, clock)
-    replica = await replica_on(plant, store, clock)
-    beats = Heartbeats(clock)
-    ground = Ground(
-        plant, Origin.LIVE, clock, store, live_view(plant, clock), beats, Timings([], clock)
-    )
-    audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
-    await audit.begin()
-    context = replica_context(replica, desk, audit.refusals, beats)
-    serving = serving_of(context, ground, listener, desk, announce)
-    supervision = Supervision(manager, beats, replica.live, [u.id for u in plant.unit], clock)
-    try:
-        await _perform(replica, serving, supervision, beats)
-    finally:
-        desk.close()
-        await audit.end()
-
-
-async def _perform(
-    replica: Replica, serving: Serving, supervision: Supervision, beats: Heartbeats
-) -> None:
-    stopped = stop_on_signals()
-    async with asyncio.TaskGroup() as tasks:
+        desk = access_desk(plant, store.access, clock)
+        replica = await replica_on(plant, store, clock)
+        beats = Heartbeats(clock)
+        ground = Ground(
+            plant, Origin.LIVE, clock, store, live_view(plant, clock), beats, Timings([], clock)
+        )
+        audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
+        await audit.begin()
+        context = replica_context(replica, desk, audit.refusals, beats)
+        server = serving_of(context, ground, listener, desk, announce)
+        supervision = Supervision(manager, beats, replica.live, [u.id for u in plant.unit], clock)
         loops = {"feed": replica.feed.run, "references": replica.references.run}
-        beside = [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
-        server = serving.start(tasks)
-        announcing = tasks.create_task(serving.tell(supervision), name="announce")
-        supervising = tasks.create_task(supervision.run(), name="supervise")
-        await stopped.wait()
-        supervision.stopping()
-        serving.stop()
-        for task in (*beside, announcing, supervising):
-            task.cancel()
-        await asyncio.wait([server])
+        try:
+            await server.run(supervision, beats, lambda tasks, _: start_loops(loops, beats, tasks))
+        finally:
+            desk.close()
+            await audit.end()

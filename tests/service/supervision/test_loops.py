@@ -197,7 +197,7 @@ async def test_every_task_of_the_program_has_a_pulse(
     settings, clock = load_plant_file(plant), SystemClock()
     before, said = asyncio.all_tasks(), asyncio.Queue()
     stopped = asyncio.Event()
-    monkeypatch.setattr("service.app.service.stop_on_signals", lambda: stopped)
+    monkeypatch.setattr("service.app.process.stop_on_signals", lambda: stopped)
     listener = socket.create_server(("127.0.0.1", 0))
     performance = Performance(settings, live_units(settings, clock))
     service = asyncio.create_task(
