@@ -1,7 +1,7 @@
 """Child process that reads a file of readings and writes its rows as an Arrow stream.
 
-It runs confined, with bounded memory and time and without write access, so that a hostile file
-cannot harm more than this process.
+Its memory and time are limited and it cannot write files, so that a hostile file harms only this
+process.
 """
 
 import sys
@@ -18,13 +18,13 @@ from service.cli.offline.backtest_tables import MAGIC, csv_batches, parquet_batc
 MEMORY_BYTES = 3 * 2**30
 CPU_S = 3600
 WRONG_FILE = 3
-"""Exit code that comes with a sentence for the user."""
+"""Exit code of a wrong file; standard error holds a message for the user."""
 
 _LOG_BYTES = 100_000
 
 
 def main() -> None:
-    """Read one file."""
+    """Read the file named by the first argument."""
     confine(MEMORY_BYTES, CPU_S, _LOG_BYTES)
     try:
         with Path(sys.argv[1]).open("rb") as stream:
@@ -32,7 +32,7 @@ def main() -> None:
     except (ReadingsError, OSError) as error:
         words = error.strerror if isinstance(error, OSError) else str(error)
         _end(words or str(error))
-    except MemoryError:  # as is pyarrow's
+    except MemoryError:  # pyarrow's error is a subclass
         _end(f"needs more than {MEMORY_BYTES >> 30} GiB to read")
 
 

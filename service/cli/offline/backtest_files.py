@@ -1,4 +1,4 @@
-"""Readings for a back-test: from a file, or from the store into a file."""
+"""Files of readings: read for a back-test, or exported from the store."""
 
 import re
 import stat
@@ -39,7 +39,7 @@ IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 """Name of a unit or bearing, as in plant files."""
 
 _ENVIRONMENT = {"ARROW_DEFAULT_MEMORY_POOL": "system", "OPENBLAS_NUM_THREADS": "1"}
-"""Others take much address space, which is limited."""
+"""Other allocators reserve much address space, which is limited."""
 
 
 def read_histories(
@@ -52,14 +52,14 @@ def read_histories(
     Parameters
     ----------
     places
-        Units and bearings that there are; any, if not given.
+        Existing units and bearings; None for any.
     advanced
-        Told how many more bytes of the file have been read.
+        Called with the number of further bytes read.
 
     Raises
     ------
     ReadingsError
-        If anything in it is wrong, with file and lines (CSV) or rows (Parquet), counted from 1.
+        If it is not valid; names the file and lines (CSV) or rows (Parquet), counted from 1.
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
@@ -83,7 +83,7 @@ def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mappin
         if process.exit_code() != 0:
             raise ReadingsError(_why(process))
     columns = {}
-    for key in list(gathered):  # each is released as soon as it is joined
+    for key in list(gathered):  # parts are released as soon as they are joined
         parts = gathered.pop(key)
         if key in TEXTS:
             columns[key] = pa.chunked_array(parts).unify_dictionaries().combine_chunks()
@@ -95,7 +95,7 @@ def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mappin
 def _gathered(
     process: ConfinedProcess, word: str, advanced: Callable[[int], object]
 ) -> dict[str, list[Any]]:
-    """Parts of each column: texts dictionary-encoded, numbers as numpy arrays."""
+    """Return parts of each column: texts dictionary-encoded, numbers as numpy arrays."""
     reader = pa.ipc.open_stream(process.output)
     parts: dict[str, list[Any]] = {key: [] for key in reader.schema.names}
     names: dict[str, set[str]] = {key: set() for key in parts if key in TEXTS}
@@ -117,7 +117,7 @@ def _gathered(
 
 
 def _check_names(key: str, column: Any, names: set[str], line: Any, word: str) -> None:
-    """Refuse names that no unit or bearing can have, and too many different ones."""
+    """Refuse names that are not valid for units or bearings, and too many different names."""
     for code, name in enumerate(column.dictionary.to_pylist()):
         if key in ("unit", "bearing") and not IDENTIFIER.fullmatch(name):
             row = int(np.argmax(column.indices.to_numpy() == code))
@@ -138,7 +138,7 @@ def _why(process: ConfinedProcess) -> str:
 
 
 AT_ONCE_NS = 90 * DAY_NS
-"""Of one film, so that memory does not depend on how many years are stored."""
+"""Time span read at once, so that memory does not depend on the number of years stored."""
 
 SUFFIXES = (".csv", ".parquet")
 QUALITY = {
@@ -164,7 +164,7 @@ def stored_histories(
 
 
 def table_of(place: Place, found: FilmHistory) -> Any:
-    """Rows of both directions."""
+    """Return readings as rows of both directions."""
     return pa.concat_tables(_side(place, found, side) for side in range(len(DIRECTIONS)))
 
 
@@ -192,12 +192,12 @@ def _side(place: Place, found: FilmHistory, side: int) -> Any:
 
 
 class ReadingsFile:
-    """A CSV or Parquet file to be written; a context that leaves nothing behind if it fails.
+    """Writer of a CSV or Parquet file; a context that removes the file after an error.
 
     Parameters
     ----------
     path
-        Whose suffix is one of `SUFFIXES`.
+        Path whose suffix is in `SUFFIXES`.
 
     Raises
     ------
