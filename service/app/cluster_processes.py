@@ -3,7 +3,7 @@
 import asyncio
 import socket
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 
 from prometheus_client.metrics_core import Metric
 from prometheus_client.process_collector import ProcessCollector
@@ -57,10 +57,8 @@ async def run_acquire(
     ----------
     units
         Units whose devices are read; their monitors are not used.
-    listener
-        Where the health page is served.
-    announce
-        Called with its URL once it answers.
+    listener, announce
+        As in `ProcessServer`, for the health page.
     """
     beats, live = Heartbeats(clock), live_view(plant, clock)
     identities = {unit.id: identity_of(plant, unit) for unit in plant.unit if unit.id in units}
@@ -76,18 +74,12 @@ async def run_acquire(
     async def drain() -> None:
         for task in acquiring:
             task.cancel()
-        await _drain(publisher)
+        with suppress(TimeoutError):  # then the rings of the devices may still hold the samples
+            await asyncio.wait_for(publisher.waiting.drained(), DRAIN_S)
 
     health = _health(publisher, live, beats, list(units))
     server = health_server(health, listener, clock, announce)
     await server.run(supervision, beats, begin, drain)
-
-
-async def _drain(publisher: Publisher) -> None:
-    try:
-        await asyncio.wait_for(publisher.waiting.drained(), DRAIN_S)
-    except TimeoutError:
-        return  # the devices' rings may still hold the samples; otherwise the index shows the gap
 
 
 def _health(publisher: Publisher, live: LiveView, beats: Heartbeats, units: list[str]) -> Health:
@@ -126,10 +118,8 @@ async def run_analyse(
         The whole plant.
     monitors
         Monitors of the units of the partition.
-    listener
-        Where the health page is served.
-    announce
-        Called with its URL once it answers.
+    listener, announce
+        As in `ProcessServer`, for the health page.
 
     Raises
     ------
@@ -150,8 +140,14 @@ async def run_analyse(
             part, Origin.LIVE, clock, store, live, Heartbeats(clock), Timings(monitors, clock)
         )
         analysing = Analysing(plant, partition, settings, monitors, ground, around)
+        server = health_server(analysing.health(), listener, clock, announce)
+        supervision = Supervision(manager, ground.beats, live, monitors, clock)
         try:
-            await analysing.run(listener, announce, manager)
+            await server.run(
+                supervision,
+                ground.beats,
+                lambda tasks, _: [tasks.create_task(analysing.run(), name="analyse")],
+            )
         finally:
             await analysing.close()
 
@@ -175,26 +171,13 @@ class Analysing:
         self._analysis: Analysis | None = None
         self._consumer: Consumer | None = None
 
-    async def run(
-        self, listener: socket.socket, announce: Callable[[str], None], manager: ServiceManager
-    ) -> None:
-        """Run until SIGINT or SIGTERM."""
-        ground = self._ground
-        server = health_server(self._health(), listener, ground.clock, announce)
-        supervision = Supervision(manager, ground.beats, ground.live, self._monitors, ground.clock)
-
-        def begin(tasks: asyncio.TaskGroup, _: asyncio.Event) -> list[asyncio.Task[None]]:
-            return [tasks.create_task(self._analyse(), name="analyse")]
-
-        await server.run(supervision, ground.beats, begin)
-
     async def close(self) -> None:
         """Write all pending data, then release the units to other processes."""
         if self._analysis is not None:
             await self._analysis.close()
         self._holds.release()
 
-    async def _analyse(self) -> None:
+    async def run(self) -> None:
         """Wait for the units of this process, then analyse until cancelled."""
         ground = self._ground
         store, clock = ground.store, ground.clock
@@ -266,7 +249,9 @@ class Analysing:
         units = self._consumer.units if self._consumer else {}
         return max((progress.behind_s for progress in units.values()), default=0.0)
 
-    def _health(self) -> Health:
+    def health(self) -> Health:
+        """Return the contents of the health page."""
+
         def checks() -> dict[str, str | None]:
             consumer = self._consumer
             waits_for = self._holds.waits_for
@@ -279,11 +264,17 @@ class Analysing:
             }
 
         def shown() -> dict[str, str]:
-            units = {u: self._ground.live.status(u).state.value for u in self._monitors}
-            shown = {f"unit {unit}": state for unit, state in units.items()}
+            live = self._ground.live
+            shown = {f"unit {unit}": live.status(unit).state.value for unit in self._monitors}
             shown["database"] = self._ground.store.kind
-            if self._analysis is not None:  # the plant has one alarm of each kind
-                shown |= _of_this_host(self._analysis)
+            if (parts := self._analysis) is not None:
+                # conditions of this host; only the leading process raises alarms about them
+                shown |= {
+                    "disk": str(parts.space),
+                    "stored data": parts.soundness.trouble or "ok",
+                    "captures": parts.captures.trouble or "ok",
+                    "recordings": recording_error(parts.tape, parts.recordings) or "ok",
+                }
             return shown
 
         def metrics() -> Iterator[Metric]:
@@ -293,16 +284,6 @@ class Analysing:
             yield from ProcessCollector(registry=None).collect()
 
         return Health(checks, shown, metrics)
-
-
-def _of_this_host(analysis: Analysis) -> dict[str, str]:
-    """Return conditions of this host; only the leading process raises alarms about them."""
-    troubles = {
-        "stored data": analysis.soundness.trouble,
-        "captures": analysis.captures.trouble,
-        "recordings": recording_error(analysis.tape, analysis.recordings),
-    }
-    return {"disk": str(analysis.space), **{name: why or "ok" for name, why in troubles.items()}}
 
 
 def shared_work(analysis: Analysis) -> dict[str, Loop]:

@@ -24,7 +24,7 @@ from service.app.storage import (
 from service.cluster.reported_commands import CarryingOut
 from service.cluster.reported_state import Reporter, process_name
 from service.measuring.acquirer import Bus
-from service.measuring.alarm_engine import WHOLE, AlarmEngine, Listener, PlantPart, alarm_engine
+from service.measuring.alarm_engine import WHOLE, AlarmEngine, PlantPart, alarm_engine
 from service.measuring.analyser import NO_MEMORIES, Analyser, UnitMemory
 from service.measuring.films import FilmKeeper, film_keeper
 from service.measuring.recorder import FILE, ParkedRows, Recorder
@@ -166,13 +166,18 @@ async def analysis_on(
     look = health_of(
         monitors, live, recorder, captures, bus, space, load, tape, recordings, soundness, stream
     )
+
+    def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:
+        captures.take(block, news)
+        tape.take(block)
+
     alarms = await alarm_engine(
         plant,
         origin,
         store,
         recorder.put,
         clock,
-        _listener(captures, tape),
+        listen,
         vector_rows(plant),
         look,
         part,
@@ -206,16 +211,6 @@ async def analysis_on(
         load=load,
         soundness=soundness,
     )
-
-
-def _listener(captures: Captures, tape: Tape) -> Listener:
-    """Return a listener that passes every judged block to both recorders of samples."""
-
-    def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:
-        captures.take(block, news)
-        tape.take(block)
-
-    return listen
 
 
 def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> Mapping[str, Loop]:

@@ -52,7 +52,16 @@ def receivers(settings: ReceiverSettings, clock: Clock) -> Iterator[Receiver]:
         yield _receiver(settings, settings.id, address, Webhook(target, trust, clock))
         return
     for recipient in settings.recipients:
-        mailbox = _mailbox(settings, recipient, timeouts)
+        mailbox = MailTarget(
+            host=settings.host,
+            port=settings.port,
+            sender=settings.sender,
+            recipient=recipient,
+            tls=settings.tls,
+            username=settings.username,
+            password=_secret(settings.password),
+            timeouts=timeouts,
+        )
         yield _receiver(settings, _name(settings, recipient), recipient, Mail(mailbox, trust))
 
 
@@ -100,19 +109,6 @@ def _receiver(
         max_retry_s=settings.max_retry_s,
         max_age_s=SECONDS_PER_HOUR * settings.max_age_h,
         quiet=None if settings.quiet is None else _quiet(settings.quiet),
-    )
-
-
-def _mailbox(settings: SmtpSettings, recipient: str, timeouts: Timeouts) -> MailTarget:
-    return MailTarget(
-        host=settings.host,
-        port=settings.port,
-        sender=settings.sender,
-        recipient=recipient,
-        tls=settings.tls,
-        username=settings.username,
-        password=_secret(settings.password),
-        timeouts=timeouts,
     )
 
 

@@ -47,11 +47,6 @@ class Ground:
     beats: Heartbeats
     timings: Timings
 
-    @property
-    def refresh_s(self) -> float:
-        """Seconds between results of the slowest unit."""
-        return refresh_s(self.plant)
-
 
 def live_view(plant: PlantFile, clock: Clock) -> LiveView:
     """Return the live view of a plant before its first samples."""

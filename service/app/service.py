@@ -3,6 +3,7 @@
 import asyncio
 import socket
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 
 from acquisition.clock import Clock
@@ -60,10 +61,8 @@ async def run_service(
 
     Parameters
     ----------
-    listener
-        Socket of the HTTP server.
-    announce
-        Called with the URL once the server answers, then with the set-up token if there is no
+    listener, announce
+        As in `ProcessServer`; `announce` is also called with the set-up token if there is no
         account.
     manager
         Notified when the service is ready, alive and stopping.
@@ -76,62 +75,41 @@ async def run_service(
         If the service would be reachable from other hosts without TLS or accounts.
     """
     plant, origin = performance.plant, performance.origin
-    live = live_view(plant, clock)
-    around = Around(live)
-    with only_one(database_path(plant)):
-        store = open_store(plant, origin, router_of(plant, origin, around, clock))
-        beats, timings = Heartbeats(clock), Timings(performance.units, clock)
-        ground = Ground(plant, origin, clock, store, live, beats, timings)
-        try:
-            await _run(performance, ground, around, listener, announce, manager)
-        finally:
-            store.close()
-
-
-async def _run(
-    performance: Performance,
-    ground: Ground,
-    around: Around,
-    listener: socket.socket,
-    announce: Callable[[str], None],
-    manager: ServiceManager,
-) -> None:
-    plant, clock = ground.plant, ground.clock
-    desk = access_desk(plant, ground.store.access, clock, performance.is_demo)
-    units = timed(performance.units, ground.timings)
-    bus = Bus(BUS_CAPACITY, clock)
-    monitors = {unit: watched.monitor for unit, watched in units.items()}
-    analysis = await analysis_on(ground, monitors, bus, around)
-    runner = Runner(
-        units,
-        ground.live,
-        analysis.recorder,
-        clock,
-        analysis.alarms,
-        analysis.films,
-        bus,
-        ground.beats,
+    live, beats, timings = (
+        live_view(plant, clock),
+        Heartbeats(clock),
+        Timings(performance.units, clock),
     )
-    audit = ServiceTrail(plant, ground.origin, ground.store.audit, clock)
-    await audit.begin()
-    context = context_of(analysis, desk, audit.refusals, bus, timed_sources(units))
-    evidence = evidence_desk(plant, ground.store, analysis.evidence, clock, context.downloads)
-    server = serving_of(context, ground, listener, desk, announce, evidence)
-    supervision = Supervision(manager, ground.beats, ground.live, units, clock)
+    around = Around(live)
+    router = router_of(plant, origin, around, clock)
+    with only_one(database_path(plant)), closing(open_store(plant, origin, router)) as store:
+        ground = Ground(plant, origin, clock, store, live, beats, timings)
+        desk = access_desk(plant, store.access, clock, performance.is_demo)
+        units = timed(performance.units, timings)
+        bus = Bus(BUS_CAPACITY, clock)
+        monitors = {unit: watched.monitor for unit, watched in units.items()}
+        analysis = await analysis_on(ground, monitors, bus, around)
+        parts = (analysis.alarms, analysis.films, bus, beats)
+        runner = Runner(units, live, analysis.recorder, clock, *parts)
+        audit = ServiceTrail(plant, origin, store.audit, clock)
+        await audit.begin()
+        context = context_of(analysis, desk, audit.refusals, bus, timed_sources(units))
+        evidence = evidence_desk(plant, store, analysis.evidence, clock, context.downloads)
+        server = serving_of(context, ground, listener, desk, announce, evidence)
 
-    def begin(tasks: asyncio.TaskGroup, stopped: asyncio.Event) -> list[asyncio.Task[None]]:
-        running = tasks.create_task(runner.run(), name="run")
-        if performance.ends:
-            running.add_done_callback(lambda _: stopped.set())
-        loops = {**_reporting_loops(analysis), "clock": audit.watch_clock}
-        return [running, *analysis.start(tasks), *start_loops(loops, ground.beats, tasks)]
+        def begin(tasks: asyncio.TaskGroup, stopped: asyncio.Event) -> list[asyncio.Task[None]]:
+            running = tasks.create_task(runner.run(), name="run")
+            if performance.ends:
+                running.add_done_callback(lambda _: stopped.set())
+            loops = {**_reporting_loops(analysis), "clock": audit.watch_clock}
+            return [running, *analysis.start(tasks), *start_loops(loops, beats, tasks)]
 
-    try:
-        await server.run(supervision, ground.beats, begin)
-    finally:
-        desk.close()
-        await analysis.close()
-        await audit.end()
+        try:
+            await server.run(Supervision(manager, beats, live, units, clock), beats, begin)
+        finally:
+            desk.close()
+            await analysis.close()
+            await audit.end()
 
 
 def _reporting_loops(analysis: Analysis) -> Mapping[str, Loop]:

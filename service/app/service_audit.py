@@ -10,9 +10,9 @@ import structlog
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
 from service.api.auth.refusals import Refusals
+from service.app.storage import built_configuration
 from service.measuring.service_alarms import STEP_S
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.settings.configuration import built_from, configuration_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditEntry, Deed
@@ -30,9 +30,8 @@ Release = Mapping[str, str]
 
 def release_of(plant: PlantFile, origin: Origin) -> Release:
     """Describe this build with a plant file; its configuration is stored with the evidence."""
-    program = version("padwatch")
-    configuration = configuration_of(plant, program, built_from()).version
-    return {"version": program, CONFIGURATION: configuration, "origin": origin.value}
+    configuration = built_configuration(plant).version
+    return {"version": version("padwatch"), CONFIGURATION: configuration, "origin": origin.value}
 
 
 def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[Deed]:

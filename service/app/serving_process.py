@@ -5,7 +5,6 @@ import gc
 import socket
 from collections.abc import Callable, Mapping
 from contextlib import closing
-from dataclasses import dataclass
 from functools import partial
 
 from acquisition.clock import Clock
@@ -102,7 +101,7 @@ def context_of(
         live=ground.live,
         store=ground.store,
         clock=ground.clock,
-        refresh_s=ground.refresh_s,
+        refresh_s=refresh_s(plant),
         references=analysis.references,
         alarms=analysis.alarms,
         films=analysis.films,
@@ -127,27 +126,35 @@ def context_of(
     )
 
 
-@dataclass(frozen=True)
 class Replica:
     """State of a plant as other processes wrote it to the database."""
 
-    plant: PlantFile
-    store: Store
-    clock: Clock
-    live: ReplicaLive
-    alarms: ReplicaAlarms
-    films: ReplicaFilms
-    feed: Feed
-    references: ReferencesInForce
-    deliveries: ReplicaDeliveries
+    def __init__(self, plant: PlantFile, store: Store, clock: Clock) -> None:
+        self._plant, self._store, self._clock = plant, store, clock
+        units = [unit.id for unit in plant.unit]
+        self.live = ReplicaLive(units, clock, STALE_HOPS * refresh_s(plant))
+        self.alarms = ReplicaAlarms(units, self.live.is_alive, chatter_rule_of(plant.alarms))
+        self.films = ReplicaFilms(plant, store.films)
+        self.feed = Feed(store, self.live, self.alarms, self.films, clock)
+        machines = {unit.id: Described(machine_of(unit)) for unit in plant.unit}
+        self.references = ReferencesInForce(machines, store, clock)
+        receivers = receivers_of(plant, Origin.LIVE, clock)
+        self.deliveries = ReplicaDeliveries(receivers, store.outbox)
+
+    async def start(self) -> None:
+        """Read the current state before the first request.
+
+        Raises
+        ------
+        StoreError
+            If the state cannot be read.
+        """
+        await self.feed.start()
+        await self.references.look()
 
     def checks(self) -> dict[str, str]:
         """Return the status of the analysis of each unit, in words."""
-        return {f"analysis of {unit}": self._signs_of(unit) for unit in self._units}
-
-    @property
-    def _units(self) -> list[str]:
-        return [unit.id for unit in self.plant.unit]
+        return {f"analysis of {unit.id}": self._signs_of(unit.id) for unit in self._plant.unit}
 
     def _signs_of(self, unit: str) -> str:
         silence_s = self.live.silence_s(unit)
@@ -156,57 +163,33 @@ class Replica:
         said = f"last sign of life {silence_s:.1f} s ago"
         return said if self.live.is_alive(unit) else f"silent: {said}"
 
-
-async def replica_on(plant: PlantFile, store: Store, clock: Clock) -> Replica:
-    """Build the parts and read the current state before the first request.
-
-    Raises
-    ------
-    StoreError
-        If the state cannot be read.
-    """
-    units = [unit.id for unit in plant.unit]
-    live = ReplicaLive(units, clock, STALE_HOPS * refresh_s(plant))
-    alarms = ReplicaAlarms(units, live.is_alive, chatter_rule_of(plant.alarms))
-    films = ReplicaFilms(plant, store.films)
-    feed = Feed(store, live, alarms, films, clock)
-    await feed.start()
-    references = ReferencesInForce(
-        {unit.id: Described(machine_of(unit)) for unit in plant.unit}, store, clock
-    )
-    await references.look()
-    receivers = receivers_of(plant, Origin.LIVE, clock)
-    deliveries = ReplicaDeliveries(receivers, store.outbox)
-    return Replica(plant, store, clock, live, alarms, films, feed, references, deliveries)
-
-
-def replica_context(
-    replica: Replica, desk: AccessDesk | None, refusals: Refusals | None, beats: Heartbeats
-) -> Context:
-    """Return the context of the API in a process that only serves."""
-    plant = replica.plant
-    bearings = {unit.id: [bearing.id for bearing in unit.bearing] for unit in plant.unit}
-    seen = (replica.live, replica.alarms, replica.films, replica.deliveries, replica.clock)
-    return Context(
-        plant_name=plant.plant.name,
-        units={unit.id: unit for unit in plant.unit},
-        live=replica.live,
-        store=replica.store,
-        clock=replica.clock,
-        refresh_s=refresh_s(plant),
-        references=replica.references,
-        alarms=replica.alarms,
-        films=replica.films,
-        operators=Asking(replica.store, replica.alarms, replica.clock),
-        captures=NoCaptures(),
-        deliveries=replica.deliveries,
-        metrics=ReplicaMetrics(bearings, *seen, replica.store.kind).scrape,
-        max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
-        loops=beats.look,
-        checks=replica.checks,
-        refusals=refusals,
-        access=desk,
-    )
+    def context(
+        self, desk: AccessDesk | None, refusals: Refusals | None, beats: Heartbeats
+    ) -> Context:
+        """Return the context of the API in a process that only serves."""
+        plant, store = self._plant, self._store
+        bearings = {unit.id: [bearing.id for bearing in unit.bearing] for unit in plant.unit}
+        seen = (self.live, self.alarms, self.films, self.deliveries, self._clock)
+        return Context(
+            plant_name=plant.plant.name,
+            units={unit.id: unit for unit in plant.unit},
+            live=self.live,
+            store=store,
+            clock=self._clock,
+            refresh_s=refresh_s(plant),
+            references=self.references,
+            alarms=self.alarms,
+            films=self.films,
+            operators=Asking(store, self.alarms, self._clock),
+            captures=NoCaptures(),
+            deliveries=self.deliveries,
+            metrics=ReplicaMetrics(bearings, *seen, store.kind).scrape,
+            max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
+            loops=beats.look,
+            checks=self.checks,
+            refusals=refusals,
+            access=desk,
+        )
 
 
 async def run_serve(
@@ -220,10 +203,8 @@ async def run_serve(
 
     Parameters
     ----------
-    listener
-        Socket of the HTTP server.
-    announce
-        Called with the URL once the server answers.
+    listener, announce
+        As in `ProcessServer`.
 
     Raises
     ------
@@ -234,14 +215,15 @@ async def run_serve(
     """
     with closing(open_store(plant)) as store:
         desk = access_desk(plant, store.access, clock)
-        replica = await replica_on(plant, store, clock)
+        replica = Replica(plant, store, clock)
+        await replica.start()
         beats = Heartbeats(clock)
         ground = Ground(
             plant, Origin.LIVE, clock, store, live_view(plant, clock), beats, Timings([], clock)
         )
         audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
         await audit.begin()
-        context = replica_context(replica, desk, audit.refusals, beats)
+        context = replica.context(desk, audit.refusals, beats)
         server = serving_of(context, ground, listener, desk, announce)
         supervision = Supervision(manager, beats, replica.live, [u.id for u in plant.unit], clock)
         loops = {"feed": replica.feed.run, "references": replica.references.run}

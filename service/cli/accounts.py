@@ -15,6 +15,7 @@ from service.cli.options import (
     JsonOutput,
     PasswordFd,
     PlantPath,
+    argument,
     command_group,
     fail,
     password_from,
@@ -53,7 +54,7 @@ keys_app = command_group("Keys of machines: create, list, revoke.")
 @keys_app.command()
 def create(
     plant_file: PlantPath,
-    name: Annotated[str, typer.Argument(help="Purpose of the key.", show_default=False)],
+    name: Annotated[str, argument("Purpose of the key.")],
     role: Annotated[Role, typer.Option(help="Role of the machine.")] = Role.VIEWER,
     unit: Annotated[
         list[str] | None, typer.Option(help="Open only this unit; may be repeated.")
@@ -90,7 +91,7 @@ def list_keys(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
 @keys_app.command()
 def revoke(
     plant_file: PlantPath,
-    id_: Annotated[str, typer.Argument(metavar="ID", help="As listed.", show_default=False)],
+    id_: Annotated[str, argument("As listed.", metavar="ID")],
 ) -> None:
     """Revoke a key permanently, from its next request on."""
     with access_of(load_plant_file(plant_file)) as access:
@@ -123,7 +124,7 @@ def _line(key: ApiKey, now_ns: int) -> str:
 
 users_app = command_group("Accounts of people: add, list, change, remove.")
 
-Name = Annotated[str, typer.Argument(help="Name of the account.", show_default=False)]
+Name = Annotated[str, argument("Name of the account.")]
 
 
 @users_app.command()

@@ -9,7 +9,7 @@ import typer
 
 from service.api.audit_csv import write_csv
 from service.app.storage import open_trail
-from service.cli.options import JsonOutput, PlantPath, command_group, fail, print_result
+from service.cli.options import JsonOutput, PlantPath, argument, command_group, fail, print_result
 from service.settings.loading import load_plant_file
 from service.store.access.audit_verification import Verdict
 
@@ -42,7 +42,7 @@ def verify(
 @app.command()
 def export(
     plant_file: PlantPath,
-    out: Annotated[Path, typer.Argument(help="CSV file to write, a new one.", show_default=False)],
+    out: Annotated[Path, argument("CSV file to write, a new one.")],
 ) -> None:
     """Write the whole audit trail, oldest first, as a CSV file that spreadsheets read as text."""
     trail = open_trail(load_plant_file(plant_file))

@@ -15,7 +15,7 @@ from service.cli.offline.backtest import (
 )
 from service.cli.offline.backtest_bearing import Learning, places_of, rules_of
 from service.cli.offline.backtest_files import read_histories
-from service.cli.options import JsonOutput, fail, print_result, progress
+from service.cli.options import JsonOutput, argument, fail, option, print_result, progress
 from service.runtime.process import made_by
 from service.settings.films import FilmAlarmSettings
 from service.settings.loading import load_plant_file
@@ -23,55 +23,39 @@ from service.settings.toml_file import load_toml
 
 
 def backtest(
-    readings: Annotated[
-        Path, typer.Argument(help="Readings (CSV or Parquet).", show_default=False)
-    ],
+    readings: Annotated[Path, argument("Readings (CSV or Parquet).")],
     plant: Annotated[
         Path | None,
-        typer.Option(
-            help="Plant file (TOML): units, bearings, rated figures, bracket stiffness, settings.",
-            show_default=False,
-        ),
+        option("Plant file (TOML): units, bearings, rated figures, bracket stiffness, settings."),
     ] = None,
     settings: Annotated[
         Path | None,
-        typer.Option(
-            help="Settings to try (TOML): keys of [films] that replace the plant file's.",
-            show_default=False,
-        ),
+        option("Settings to try (TOML): keys of [films] that replace the plant file's."),
     ] = None,
     learn_days: Annotated[
         float | None,
-        typer.Option(
-            help="Days of learning after the first reading and after each event"
+        option(
+            "Days of learning after the first reading and after each event"
             " [learning_days of the settings, 365]",
-            show_default=False,
             min=1.0,
             max=36_500.0,
         ),
     ] = None,
     learn_until: Annotated[
         str | None,
-        typer.Option(
-            help="Learn the first baseline up to this time, such as 2025-01-01T00:00:00Z.",
-            show_default=False,
-        ),
+        option("Learn the first baseline up to this time, such as 2025-01-01T00:00:00Z."),
     ] = None,
     event: Annotated[
         list[str] | None,
-        typer.Option(
-            help="Machine event that starts a new baseline: 'UNIT[/BEARING] TIME [TEXT]';"
-            " may be repeated.",
-            show_default=False,
+        option(
+            "Machine event that starts a new baseline: 'UNIT[/BEARING] TIME [TEXT]';"
+            " may be repeated."
         ),
     ] = None,
     estimator: Annotated[
         str, typer.Option(help="Name of the stiffness estimator, stored with exported baselines.")
     ] = "not told",
-    export: Annotated[
-        Path | None,
-        typer.Option(help="New folder for the learned baselines, as JSON.", show_default=False),
-    ] = None,
+    export: Annotated[Path | None, option("New folder for the learned baselines, as JSON.")] = None,
     json_output: JsonOutput = False,
 ) -> None:
     """Learn baselines from past readings, and list the alarms that would have followed."""

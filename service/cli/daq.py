@@ -21,7 +21,7 @@ from acquisition.simulated.devices.recorded import RecordedFeed
 from acquisition.simulated.feed import SampleFeed
 from service.app.recordings import recordings_by_unit, selection_of
 from service.app.simulated_daq import Wire, daq_of, over_wire, run_daq
-from service.cli.options import PlantPath, fail
+from service.cli.options import PlantPath, fail, option
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
@@ -39,10 +39,7 @@ def daq(
         list[Path] | None,
         typer.Option(help="Play this recording of a unit instead of simulations; repeatable."),
     ] = None,
-    through: Annotated[
-        Wire | None,
-        typer.Option(help="Serve over this wire on loopback instead.", show_default=False),
-    ] = None,
+    through: Annotated[Wire | None, option("Serve over this wire on loopback instead.")] = None,
     speed: SpeedOption = 1.0,
     control: Annotated[
         bool,

@@ -12,6 +12,7 @@ from service.app.notifications import composer_of, receivers_of
 from service.cli.options import (
     JsonOutput,
     PlantPath,
+    argument,
     command_group,
     fail,
     plant_store,
@@ -26,7 +27,7 @@ from service.settings.storage import Origin
 
 app = command_group("Test receivers of alarms; send again.")
 
-ReceiverId = Annotated[str, typer.Argument(help="Receiver of the plant file.", show_default=False)]
+ReceiverId = Annotated[str, argument("Receiver of the plant file.")]
 
 
 @app.command("test")

@@ -29,19 +29,24 @@ from service.store.access.port import AccessRefusedError
 from service.store.backup import BackupError
 from service.store.port import Store, StoreError
 
-PlantPath = Annotated[Path, typer.Argument(help="The plant file (TOML).", show_default=False)]
-PlantOption = Annotated[
-    Path, typer.Option("--plant", help="The plant file (TOML).", show_default=False)
-]
-UnitOption = Annotated[
-    str | None, typer.Option("--unit", help="Unit of the plant file.", show_default=False)
-]
+
+def option(meaning: str, *names: str, **limits: Any) -> Any:
+    """Declare an option whose help shows no default."""
+    return typer.Option(*names, help=meaning, show_default=False, **limits)
+
+
+def argument(meaning: str, **settings: Any) -> Any:
+    """Declare an argument whose help shows no default."""
+    return typer.Argument(help=meaning, show_default=False, **settings)
+
+
+PlantPath = Annotated[Path, argument("The plant file (TOML).")]
+PlantOption = Annotated[Path, option("The plant file (TOML).", "--plant")]
+UnitOption = Annotated[str | None, option("Unit of the plant file.", "--unit")]
 PortOption = Annotated[
     int | None, typer.Option("--port", min=0, max=65535, help="HTTP port instead of the file's.")
 ]
-RecordingFolder = Annotated[
-    Path, typer.Argument(help="Folder of the recording.", show_default=False)
-]
+RecordingFolder = Annotated[Path, argument("Folder of the recording.")]
 NewRecording = Annotated[
     Path, typer.Option("--out", help="Folder of the recording; must not exist yet.")
 ]

@@ -28,6 +28,7 @@ from service.cli.options import (
     UnitOption,
     fail,
     one_unit,
+    option,
     progress,
 )
 from service.runtime.times import rfc3339
@@ -55,10 +56,7 @@ def reanalyse(
     unit: UnitOption = None,
     window: Annotated[
         WindowChoice | None,
-        typer.Option(
-            help="The last full average of each bearing, or every result [last; --json: all]",
-            show_default=False,
-        ),
+        option("The last full average of each bearing, or every result [last; --json: all]"),
     ] = None,
     calibration: Annotated[
         CalibrationChoice,

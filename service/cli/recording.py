@@ -21,9 +21,11 @@ from service.cli.options import (
     PlantPath,
     RecordingFolder,
     UnitOption,
+    argument,
     command_group,
     fail,
     one_unit,
+    option,
     plant_store,
     print_result,
     progress,
@@ -107,6 +109,11 @@ def _row(verdict: Verdict) -> dict[str, object]:
 
 
 GAPS_PRINTED = 20
+DESCRIBED = {
+    *("unit", "version", "made_by", "sample_type", "rate_hz", "block_samples"),
+    *("slow_channels", "files"),
+}
+"""Fields of the manifest in the description of a recording."""
 
 
 def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
@@ -114,12 +121,7 @@ def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
     manifest = recording.manifest
     return {
         "folder": str(recording.folder),
-        "unit": manifest.unit,
-        "version": manifest.version,
-        "made_by": manifest.made_by,
-        "sample_type": manifest.sample_type,
-        "rate_hz": manifest.rate_hz,
-        "block_samples": manifest.block_samples,
+        **manifest.model_dump(mode="json", include=DESCRIBED),
         "start": rfc3339(summary.start_ns),
         "end": rfc3339(summary.stop_ns),
         "samples": summary.n_samples,
@@ -142,8 +144,6 @@ def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
             channel.model_dump(mode="json") | {"unit": UNIT_OF[channel.measurand]}
             for channel in manifest.channels
         ],
-        "slow_channels": [channel.model_dump(mode="json") for channel in manifest.slow_channels],
-        "files": {name: file.model_dump() for name, file in manifest.files.items()},
     }
 
 
@@ -207,9 +207,7 @@ def verify(folder: RecordingFolder, json_output: JsonOutput = False) -> None:
 @app.command()
 def export(
     folder: RecordingFolder,
-    format_: Annotated[
-        ExportFormat, typer.Option("--format", help="Of the file.", show_default=False)
-    ],
+    format_: Annotated[ExportFormat, option("Of the file.", "--format")],
     out: Annotated[Path, typer.Option(help="File to write; must not exist yet.")],
 ) -> None:
     """Write a recording as a file for other tools: engineering units, UTC, no rows in gaps."""
@@ -221,7 +219,7 @@ def export(
 
 @app.command("import")
 def import_(
-    file: Annotated[Path, typer.Argument(help="The file to import.", show_default=False)],
+    file: Annotated[Path, argument("The file to import.")],
     mapping: Annotated[Path, typer.Option(help="Which column is which channel (TOML).")],
     plant: PlantOption,
     out: NewRecording,

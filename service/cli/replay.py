@@ -22,7 +22,7 @@ from service.app.simulated_daq import Wire, over_wire
 from service.app.storage import database_path
 from service.app.web import listener_of
 from service.cli.daq import RunningDaq, SpeedOption, daq_process
-from service.cli.options import JsonOutput, PlantOption, fail, print_result
+from service.cli.options import JsonOutput, PlantOption, fail, option, print_result
 from service.cli.run import announce
 from service.measuring.sources import source_of, watched_units
 from service.runtime.process import run_to_its_end
@@ -34,15 +34,9 @@ from service.settings.storage import Origin
 def replay(
     recordings: Annotated[list[Path], typer.Argument(help="Folders of the recordings.")],
     plant: PlantOption,
-    through: Annotated[
-        Wire | None,
-        typer.Option(help="Play through a simulated DAQ over this wire.", show_default=False),
-    ] = None,
+    through: Annotated[Wire | None, option("Play through a simulated DAQ over this wire.")] = None,
     speed: SpeedOption = 1.0,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the results [<data folder>/replays/…]", show_default=False),
-    ] = None,
+    out: Annotated[Path | None, option("Folder of the results [<data folder>/replays/…]")] = None,
     serve: Annotated[
         bool, typer.Option(help="Keep serving the results until Ctrl-C after the replay.")
     ] = False,

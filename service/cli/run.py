@@ -119,8 +119,7 @@ def _announce_acquire(url: str) -> None:
 def analyse(
     plant_file: PlantPath,
     partition: Annotated[
-        str,
-        typer.Option(help="Which units: i/n for the i-th of n shares, such as 1/2."),
+        str, typer.Option(help="Which units: i/n for the i-th of n shares, such as 1/2.")
     ] = "1/1",
     port: HealthPort = None,
 ) -> None:

@@ -15,8 +15,10 @@ from service.cli.offline.backtest_files import SUFFIXES, ReadingsFile, stored_hi
 from service.cli.options import (
     JsonOutput,
     PlantPath,
+    argument,
     command_group,
     fail,
+    option,
     plant_store,
     print_result,
     progress,
@@ -33,7 +35,7 @@ from service.store.sqlite.checking import Finding, findings
 
 def backup(
     plant_file: PlantPath,
-    folder: Annotated[Path, typer.Argument(help="Folder of the copies.", show_default=False)],
+    folder: Annotated[Path, argument("Folder of the copies.")],
     keep: Annotated[int, typer.Option(min=1, max=10_000, help="Copies that are kept.")] = 14,
     json_output: JsonOutput = False,
 ) -> None:
@@ -57,9 +59,7 @@ def backup(
 
 def restore(
     plant_file: PlantPath,
-    copy: Annotated[
-        Path, typer.Argument(help="A copy made by `padwatch backup`.", show_default=False)
-    ],
+    copy: Annotated[Path, argument("A copy made by `padwatch backup`.")],
     json_output: JsonOutput = False,
 ) -> None:
     """Replace the database by a copy, while padwatch is stopped; the old one is kept beside it.
@@ -153,7 +153,7 @@ def _lines(plant: PlantFile, found: Sequence[Finding]) -> Iterator[str]:
 
 readings_app = command_group("Readings of the films, out of the store.")
 
-Time = Annotated[str | None, typer.Option(help="Such as 2025-01-01T00:00:00Z.", show_default=False)]
+Time = Annotated[str | None, option("Such as 2025-01-01T00:00:00Z.")]
 
 
 @readings_app.callback()
@@ -164,9 +164,7 @@ def readings() -> None:
 @readings_app.command()
 def export(
     plant_file: PlantPath,
-    out: Annotated[
-        Path, typer.Argument(help="File to write, .csv or .parquet.", show_default=False)
-    ],
+    out: Annotated[Path, argument("File to write, .csv or .parquet.")],
     start: Time = None,
     end: Time = None,
 ) -> None:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from itertools import groupby
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from service.cli.offline.backtest_report import (
     alarm_reports,
     film_reports,
 )
+from service.runtime.times import EPOCH
 from service.store.documents import to_json
 
 YEAR_NS = 365.25 * DAY_NS
@@ -290,7 +291,6 @@ def _name(film: FilmReport) -> str:
     return f"{film.unit} {film.bearing} {film.direction}"
 
 
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _EVENT = re.compile(
     r"(?P<unit>[^\s/]+)(?:/(?P<bearing>[^\s/]+))?\s+(?P<time>\S+)(?:\s+(?P<text>.*))?"
 )
@@ -311,7 +311,7 @@ def time_ns_of(text: str) -> int:
         raise ValueError(f"{text!r:.60} is not a time like 2026-03-01T08:00:00Z") from error
     if moment.tzinfo is None:
         raise ValueError(f"{text!r:.60} needs an offset from UTC, such as a trailing Z")
-    return (moment - _EPOCH) // timedelta(microseconds=1) * 1000
+    return (moment - EPOCH) // timedelta(microseconds=1) * 1000
 
 
 def event_of(text: str) -> MachineEvent:

@@ -27,9 +27,8 @@ from service.cli.offline.backtest_cells import (
     ReadingsError,
     shown,
 )
-from service.cli.offline.backtest_child import WRONG_FILE
 from service.cli.offline.backtest_histories import BearingRows, Place, histories_of
-from service.cli.offline.backtest_tables import MAGIC
+from service.cli.offline.backtest_tables import MAGIC, WRONG_FILE
 from service.store.film_port import FilmHistory, FilmQuery, FilmStore
 
 MAX_NAMES = 2000
@@ -74,7 +73,7 @@ def read_histories(
 
 
 def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mapping[str, Any]:
-    module, file = "service.cli.offline.backtest_child", str(path.absolute())
+    module, file = "service.cli.offline.backtest_tables", str(path.absolute())
     with closing(ConfinedProcess(module, file, environment=_ENVIRONMENT)) as process:
         try:
             gathered = _gathered(process, word, advanced)
@@ -100,20 +99,17 @@ def _gathered(
     parts: dict[str, list[Any]] = {key: [] for key in reader.schema.names}
     names: dict[str, set[str]] = {key: set() for key in parts if key in TEXTS}
     before = 0
-    try:
-        while True:
-            batch, metadata = reader.read_next_batch_with_custom_metadata()
-            for key in parts:
-                if key in names:
-                    parts[key].append(pc.dictionary_encode(batch.column(key)))
-                    _check_names(key, parts[key][-1], names[key], batch.column(LINE), word)
-                else:
-                    parts[key].append(batch.column(key).to_numpy().copy())
-            n_bytes = int(metadata["n_bytes"])
-            advanced(n_bytes - before)
-            before = n_bytes
-    except StopIteration:
-        return parts
+    for batch, metadata in reader.iter_batches_with_custom_metadata():
+        for key in parts:
+            if key in names:
+                parts[key].append(pc.dictionary_encode(batch.column(key)))
+                _check_names(key, parts[key][-1], names[key], batch.column(LINE), word)
+            else:
+                parts[key].append(batch.column(key).to_numpy().copy())
+        n_bytes = int(metadata["n_bytes"])
+        advanced(n_bytes - before)
+        before = n_bytes
+    return parts
 
 
 def _check_names(key: str, column: Any, names: set[str], line: Any, word: str) -> None:

@@ -114,7 +114,7 @@ async def analysing(plant: PlantFile) -> AsyncIterator[tuple[Analysing, Ground]]
     ground, monitors = ground_of(plant, SystemClock(), store)
     assert plant.stream is not None
     process = Analysing(plant, Partition(), plant.stream, monitors, ground, Around(ground.live))
-    task = asyncio.create_task(process._analyse())
+    task = asyncio.create_task(process.run())
     try:
         yield process, ground
     finally:
