@@ -132,7 +132,9 @@ def print_result(
     document: object, lines: Iterable[str], json_output: bool, indent: int | None = 1
 ) -> None:
     """Print a result as JSON, or as lines of text."""
-    shown = [to_json(document, indent=indent).decode()] if json_output else lines
+    shown = (
+        [to_json(document, indent=indent, inf_nan_mode="null").decode()] if json_output else lines
+    )
     for line in shown:
         typer.echo(line)
 

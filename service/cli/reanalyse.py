@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 import uvloop
+from pydantic_core import to_json
 
 from acquisition.clock import SystemClock
 from acquisition.recordings.reader import open_recording
@@ -17,7 +18,7 @@ from core.monitor.monitor import UnitMonitor
 from service.app.recordings import selection_of
 from service.cli.offline.reanalysis import (
     LastAverages,
-    assessment_model,
+    assessment_document,
     assessments,
     calibration_differences,
     is_full,
@@ -110,7 +111,8 @@ async def _print(found: AsyncIterator[Assessment], json_output: bool) -> int:
     async for assessment in found:
         if json_output:
             before = ",\n" if n_printed else "[\n"
-            typer.echo(before + assessment_model(assessment).model_dump_json(), nl=False)
+            document = to_json(assessment_document(assessment), inf_nan_mode="null").decode()
+            typer.echo(before + document, nl=False)
         else:
             typer.echo("\n".join(_table(assessment)))
         n_printed += 1
@@ -120,14 +122,14 @@ async def _print(found: AsyncIterator[Assessment], json_output: bool) -> int:
 
 
 def _table(assessment: Assessment) -> Iterator[str]:
-    found = assessment.window
+    found, document = assessment.window, assessment_document(assessment)
     segments = f"{found.n_segments} of {found.n_segments_wanted} segments"
     yield (
         f"\n{assessment.unit} {assessment.bearing}, {rfc3339(assessment.time_ns)},"
         f" {segments}{'' if is_full(assessment) else ' (not a full average)'},"
-        f" {found.duration_s:.1f} s, {assessment_model(assessment).quality.level}"
+        f" {found.duration_s:.1f} s, {document['quality'].level}"
     )
-    for reading in assessment_model(assessment).readings.values():
+    for reading in document["readings"].values():
         value = "—" if reading.value is None else f"{reading.value:.6g}"
         doubt = "" if reading.level == "good" else f"  {reading.level}: {reading.reason}"
         yield f"  {reading.label:<48}{value:>14} {reading.unit:<10}{doubt}".rstrip()

@@ -4,7 +4,7 @@ import asyncio
 import random
 import signal
 from contextlib import suppress
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 import uvloop
@@ -131,21 +131,17 @@ async def _read(
     source: SampleSource, writer: RecordingWriter, seconds: float, patience: Patience | None
 ) -> None:
     with progress("Recording", round(seconds)) as bar:
-        while True:
+        while writer.duration_s < seconds:
             try:
-                return await _read_once(source, writer, seconds, bar)
+                async with source.connect() as blocks:
+                    async for block in blocks:
+                        writer.write_calibrated(block)
+                        bar.update(round(min(writer.duration_s, seconds)) - bar.pos)
+                        if writer.duration_s >= seconds:
+                            break
+                    else:
+                        return  # the source has ended
             except LinkError as error:
                 if patience is None:
                     raise
                 await patience.wait(error)
-
-
-async def _read_once(
-    source: SampleSource, writer: RecordingWriter, seconds: float, bar: Any
-) -> None:
-    async with source.connect() as blocks:
-        async for block in blocks:
-            writer.write_calibrated(block)
-            bar.update(round(min(writer.duration_s, seconds)) - bar.pos)
-            if writer.duration_s >= seconds:
-                return

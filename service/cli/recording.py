@@ -60,7 +60,9 @@ def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     others = [verdict for verdict in verdicts if verdict.found is not Found.SOUND]
     document = {
         **{found.value: counts[found] for found in Found},
-        "recordings": [_row(verdict) for verdict in others],
+        "recordings": [
+            {"kind": v.kind, "name": v.name, "found": v.found, "reason": v.reason} for v in others
+        ],
         "folders": [str(root) for root in roots.values()],
     }
     lines = [
@@ -97,15 +99,6 @@ def _index(plant: PlantFile) -> Sequence[WaveformFile]:
 
 def _words(found: Found) -> str:
     return found.value.replace("_", " ")
-
-
-def _row(verdict: Verdict) -> dict[str, object]:
-    return {
-        "kind": verdict.kind.value,
-        "name": verdict.name,
-        "found": verdict.found.value,
-        "reason": verdict.reason,
-    }
 
 
 GAPS_PRINTED = 20

@@ -1,8 +1,8 @@
 """`padwatch reference`: set and list references of the shaft centre."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -10,7 +10,6 @@ from acquisition.clock import SystemClock
 from core.machine.unit import Bearing
 from service.api.routes.bearings import ReferenceModel, reference_model
 from service.api.routes.references import SetReferenceModel, set_reference_model
-from service.api.values import ApiModel
 from service.app.storage import has_store
 from service.cli.options import (
     JsonOutput,
@@ -38,66 +37,48 @@ from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.gap_reference import GapReference, ReferenceSource
 
 
-class BearingReferences(ApiModel):
-    """References of a bearing; the parts are those of the API."""
-
-    unit: str
-    """Unit."""
-
-    bearing: str
-    """Bearing."""
-
-    gap_reference_um: list[float]
-    """Probe gaps [x, y] with the shaft centred, as in force."""
-
-    opposite_reference_um: list[float] | None
-    """The same gaps of the probes across the shaft."""
-
-    reference: ReferenceModel
-    """Source of the gaps in force."""
-
-    history: list[SetReferenceModel]
-    """All references that were set, newest first."""
-
-
 def bearing_references(
     unit: str, bearing: Bearing, history: Sequence[GapReference]
-) -> BearingReferences:
+) -> dict[str, Any]:
     """Return a bearing's reference in force, from the plant file or set since, and its history.
 
     Parameters
     ----------
     history
         Newest first.
+
+    Returns
+    -------
+    Gaps in force as [x, y] in µm, of the probes and of those across the shaft; their source and
+    the history in models of the API.
     """
     newest = history[0] if history else None
     watched = bearing if newest is None else with_reference(bearing, newest)
-    opposite = watched.opposite_reference_um
-    return BearingReferences(
-        unit=unit,
-        bearing=bearing.id,
-        gap_reference_um=list(watched.gap_reference_um),
-        opposite_reference_um=None if opposite is None else list(opposite),
-        reference=reference_model(newest),
-        history=[set_reference_model(reference) for reference in history],
-    )
+    return {
+        "unit": unit,
+        "bearing": bearing.id,
+        "gap_reference_um": watched.gap_reference_um,
+        "opposite_reference_um": watched.opposite_reference_um,
+        "reference": reference_model(newest),
+        "history": [set_reference_model(reference) for reference in history],
+    }
 
 
-def text_lines(found: BearingReferences) -> Iterator[str]:
+def text_lines(found: Mapping[str, Any]) -> Iterator[str]:
     """Yield a line for the reference in force, and one for each earlier reference."""
-    gaps = _gaps(found.gap_reference_um, found.opposite_reference_um)
-    yield f"{found.unit} {found.bearing}: {gaps}, {_source(found.reference)}"
-    for before in found.history[1:]:
+    gaps = _gaps(found["gap_reference_um"], found["opposite_reference_um"])
+    yield f"{found['unit']} {found['bearing']}: {gaps}, {_source(found['reference'])}"
+    for before in found["history"][1:]:
         gaps = _gaps(before.gap_reference_um, before.opposite_reference_um)
         yield f"  before: {gaps}, {_source(before)}"
 
 
-def _gaps(near: list[float], opposite: list[float] | None) -> str:
+def _gaps(near: Sequence[float], opposite: Sequence[float] | None) -> str:
     across = "" if opposite is None else f", opposite {_pair(opposite)}"
     return _pair(near) + across
 
 
-def _pair(gaps_um: list[float]) -> str:
+def _pair(gaps_um: Sequence[float]) -> str:
     return f"{gaps_um[0]:.10g}, {gaps_um[1]:.10g} µm"
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic_core import to_json
 
 from acquisition.delivery.blocks import BlockAssembler
 from acquisition.delivery.calibration import RawBlock, calibrate
@@ -20,7 +21,7 @@ from core.samples.blocks import Rejection
 from service.app.recordings import recording_writer, selection_of
 from service.cli.offline.reanalysis import (
     LastAverages,
-    assessment_model,
+    assessment_document,
     assessments,
     calibration_differences,
 )
@@ -113,7 +114,7 @@ def test_the_last_full_average_is_kept_and_the_last_of_all_until_there_is_one(
 
 
 def test_an_assessment_has_every_digit_in_json(sample: Assessment) -> None:
-    found = json.loads(assessment_model(sample).model_dump_json())
+    found = json.loads(to_json(assessment_document(sample)))
     for name, reading in sample.readings.items():
         assert found["readings"][name]["value"] == reading.value
         assert found["readings"][name]["reason"] == reading.quality.reason.value

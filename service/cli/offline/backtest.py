@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from core.baseline.baseline import BearingBaseline
-from core.baseline.history import ReadingOutcome, StiffnessHistory
+from core.baseline.history import ReadingOutcome
 from core.change.shaft_response import ShaftResponse
 from core.condition.operating_state import STEADY
 from core.units import DAY_NS
@@ -94,7 +94,10 @@ def run_back_test(
         If an event names a bearing without readings, or operating states are unknown.
     """
     result = BackTestResult(doubts=list(_doubts(histories, rules)))
-    _check_events(histories, rules)
+    for event in rules.events:
+        if not any(event.is_about(*place) for place in histories):
+            name = event.unit + (f"/{event.bearing}" if event.bearing else "")
+            raise ReadingsError(f"event of {name}: there are no readings of it")
     for unit, places in groupby(sorted(histories), key=lambda place: place[0]):
         runs = []
         for place in places:
@@ -150,13 +153,6 @@ def _compared_ns(run: BearingRun) -> int:
     )
 
 
-def _check_events(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> None:
-    for event in rules.events:
-        if not any(event.is_about(*place) for place in histories):
-            name = event.unit + (f"/{event.bearing}" if event.bearing else "")
-            raise ReadingsError(f"event of {name}: there are no readings of it")
-
-
 def _doubts(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> Iterator[str]:
     """Yield warnings about the validity of the results."""
     nominal_h = rules.baseline.reading_h
@@ -170,19 +166,15 @@ def _doubts(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> Ite
                     f"{unit} {bearing}: readings are {60 * apart_h:.3g} min apart, but each counts"
                     f" as {60 * nominal_h:.3g} min; set reading_period_s"
                 )
-        if n := _without_condition(history):
+        is_good = np.any(history.outcome == ReadingOutcome.MEASURED, axis=0)
+        is_known = np.isfinite(history.eccentricity_ratio) & np.isfinite(history.oil_temperature_c)
+        if n := int(np.sum(is_good & ~is_known)):
             yield (
                 f"{unit} {bearing}: {n} of {len(history)} readings have a good stiffness but no"
                 " eccentricity_ratio or no oil_temperature_c; they were neither learned nor judged"
             )
         if rules.baseline.uses_attitude and not np.isfinite(history.attitude_deg).any():
             yield f"{unit} {bearing}: no attitude_deg, so its baseline does not use it"
-
-
-def _without_condition(history: StiffnessHistory) -> int:
-    is_good = np.any(history.outcome == ReadingOutcome.MEASURED, axis=0)
-    is_known = np.isfinite(history.eccentricity_ratio) & np.isfinite(history.oil_temperature_c)
-    return int(np.sum(is_good & ~is_known))
 
 
 def export_baselines(result: BackTestResult, folder: Path) -> int:
@@ -194,18 +186,14 @@ def export_baselines(result: BackTestResult, folder: Path) -> int:
         If the folder exists, or cannot be written.
     """
     folder.mkdir(parents=True)
-    files = list(_files(result))
-    for name, text in files:
-        (folder / name).write_text(text, encoding="utf-8")
-    return len(files)
-
-
-def _files(result: BackTestResult) -> Iterator[tuple[str, str]]:
-    for baseline in result.baselines:
-        of = baseline.origin
-        yield f"{of.unit}-{of.bearing}-v{of.version}.json", to_json(baseline)
+    documents: dict[str, BearingBaseline | ShaftResponse] = {
+        f"{b.origin.unit}-{b.origin.bearing}-v{b.origin.version}.json": b for b in result.baselines
+    }
     for unit, number, response in result.responses:
-        yield f"{unit}-shaft-response-v{number}.json", to_json(response)
+        documents[f"{unit}-shaft-response-v{number}.json"] = response
+    for name, document in documents.items():
+        (folder / name).write_text(to_json(document), encoding="utf-8")
+    return len(documents)
 
 
 VERDICTS = {

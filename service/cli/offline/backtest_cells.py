@@ -1,6 +1,6 @@
 """Columns of a file of readings: names, conversion and errors."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -110,7 +110,21 @@ def check_headings(headings: Sequence[str]) -> None:
     """
     if len(headings) > MAX_COLUMNS:
         raise ReadingsError(f"{len(headings)} columns; at most {MAX_COLUMNS} are read")
-    problems = list(_problems(headings))
+    missing = [key for key in REQUIRED if key not in headings]
+    if TIME not in headings and TIME_NS not in headings:
+        missing.insert(0, f"{TIME} or {TIME_NS}")
+    unknown = [heading for heading in headings if heading not in (TIME_NS, *HEADINGS)]
+    twice = sorted({heading for heading in headings if headings.count(heading) > 1})
+    problems = []
+    if missing:
+        problems.append(f"missing columns: {', '.join(missing)}")
+    if unknown:
+        known = ", ".join((TIME_NS, *HEADINGS))
+        problems.append(f"unknown columns: {_listed(unknown)}; known are {known}")
+    if twice:
+        problems.append(f"repeated columns: {_listed(twice)}")
+    if TIME in headings and TIME_NS in headings:
+        problems.append(f"both {TIME} and {TIME_NS}; give one of them")
     if problems:
         raise ReadingsError("; ".join(problems))
 
@@ -120,22 +134,6 @@ def schema_of(headings: Sequence[str]) -> Any:
     texts = [(key, pa.string()) for key in TEXTS if key in headings]
     numbers = [(key, pa.float64()) for key in NUMBERS if key in headings]
     return pa.schema([(TIME_NS, pa.int64()), *texts, *numbers, (LINE, pa.int64())])
-
-
-def _problems(headings: Sequence[str]) -> Iterator[str]:
-    missing = [key for key in REQUIRED if key not in headings]
-    if TIME not in headings and TIME_NS not in headings:
-        missing.insert(0, f"{TIME} or {TIME_NS}")
-    if missing:
-        yield f"missing columns: {', '.join(missing)}"
-    unknown = [heading for heading in headings if heading not in (TIME_NS, *HEADINGS)]
-    if unknown:
-        yield f"unknown columns: {_listed(unknown)}; known are {TIME_NS}, {', '.join(HEADINGS)}"
-    twice = sorted({heading for heading in headings if headings.count(heading) > 1})
-    if twice:
-        yield f"repeated columns: {_listed(twice)}"
-    if TIME in headings and TIME_NS in headings:
-        yield f"both {TIME} and {TIME_NS}; give one of them"
 
 
 def _listed(names: list[str]) -> str:

@@ -8,7 +8,6 @@ import csv
 import os
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -29,20 +28,8 @@ MAX_LINE_BYTES = 16_384
 _BOM = b"\xef\xbb\xbf"
 
 
-@dataclass(frozen=True, eq=False)
-class Lines:
-    """Consecutive lines.
-
-    Parameters
-    ----------
-    text
-        UTF-8, each line with its end.
-    number : (n,)
-        Numbers in the file of the lines that are not empty.
-    """
-
-    text: bytes
-    number: TimeArray
+Lines = tuple[bytes, TimeArray]
+"""Text of consecutive lines, and the (n,) numbers in the file of those that are not empty."""
 
 
 def checked_lines(stream: BinaryIO) -> Iterator[Lines]:
@@ -75,7 +62,7 @@ def _checked(text: bytes, first: int) -> Lines:
     except UnicodeDecodeError as error:
         number = first + text.count(b"\n", 0, error.start)
         raise ReadingsError(f"line {number}: not UTF-8 text") from error
-    return Lines(text, np.array([n for n, line in enumerate(lines, first) if line.rstrip(b"\r")]))
+    return (text, np.array([n for n, line in enumerate(lines, first) if line.rstrip(b"\r")]))
 
 
 def _fault(line: bytes) -> str | None:
@@ -101,30 +88,30 @@ def csv_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
         If it is not a valid file of readings; the message names the lines.
     """
     headings: list[str] = []
-    for lines in checked_lines(stream):
-        if not headings and lines.number.size:
-            headings, lines = _heading(lines)
-        if lines.number.size:
-            yield converted(_table(lines, headings), lines.number, "line"), stream.tell()
+    for text, numbers in checked_lines(stream):
+        if not headings and numbers.size:
+            headings, text = _heading(text, numbers[0])
+            numbers = numbers[1:]
+        if numbers.size:
+            yield converted(_table(text, numbers, headings), numbers, "line"), stream.tell()
     if not headings:
         raise ReadingsError("is empty: there is no heading")
 
 
-def _heading(lines: Lines) -> tuple[list[str], Lines]:
-    text = lines.text.lstrip(b"\r\n")
-    line, _, rest = text.partition(b"\n")
+def _heading(text: bytes, number: int) -> tuple[list[str], bytes]:
+    line, _, rest = text.lstrip(b"\r\n").partition(b"\n")
     try:
         names = next(csv.reader([line.decode()], strict=True))
     except csv.Error as error:
-        raise ReadingsError(f"line {lines.number[0]}: {error}") from error
+        raise ReadingsError(f"line {number}: {error}") from error
     if len(names) == 1 and {";", "\t"} & set(names[0]):
-        raise ReadingsError(f"line {lines.number[0]}: columns must be separated by commas")
+        raise ReadingsError(f"line {number}: columns must be separated by commas")
     headings = [name.strip() for name in names]
     check_headings(headings)
-    return headings, Lines(rest, lines.number[1:])
+    return headings, rest
 
 
-def _table(lines: Lines, headings: list[str]) -> Any:
+def _table(text: bytes, numbers: TimeArray, headings: list[str]) -> Any:
     misfits: list[tuple[int, int]] = []
 
     def note(row: Any) -> str:
@@ -133,10 +120,8 @@ def _table(lines: Lines, headings: list[str]) -> Any:
 
     try:
         table = pacsv.read_csv(
-            pa.BufferReader(lines.text),
-            pacsv.ReadOptions(
-                use_threads=False, block_size=len(lines.text) + 1, column_names=headings
-            ),
+            pa.BufferReader(text),
+            pacsv.ReadOptions(use_threads=False, block_size=len(text) + 1, column_names=headings),
             pacsv.ParseOptions(invalid_row_handler=note),
             pacsv.ConvertOptions(
                 column_types=dict.fromkeys(headings, pa.string()),
@@ -145,21 +130,19 @@ def _table(lines: Lines, headings: list[str]) -> Any:
             ),
         )
     except pa.ArrowInvalid as error:
-        raise ReadingsError(_misfit(misfits, lines, headings, error)) from error
-    if len(table) != lines.number.size:
-        raise ReadingsError(f"line {lines.number[0]} or a later one: not a row")
-    return _trimmed(table) if b" " in lines.text else table
+        raise ReadingsError(_misfit(misfits, numbers, headings, error)) from error
+    if len(table) != numbers.size:
+        raise ReadingsError(f"line {numbers[0]} or a later one: not a row")
+    return _trimmed(table) if b" " in text else table
 
 
 def _misfit(
-    misfits: list[tuple[int, int]], lines: Lines, headings: list[str], error: Exception
+    misfits: list[tuple[int, int]], numbers: TimeArray, headings: list[str], error: Exception
 ) -> str:
     if not misfits:
-        return f"line {lines.number[0]} or a later one: {str(error).splitlines()[0]}"
+        return f"line {numbers[0]} or a later one: {str(error).splitlines()[0]}"
     row, n_columns = misfits[0]
-    return (
-        f"line {lines.number[row - 1]}: {n_columns} columns where the heading has {len(headings)}"
-    )
+    return f"line {numbers[row - 1]}: {n_columns} columns where the heading has {len(headings)}"
 
 
 def _trimmed(table: Any) -> Any:

@@ -1,72 +1,30 @@
 """Analysis of a recording as of live samples, with results in the models of the API."""
 
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from typing import Any
 
 from acquisition.delivery.calibration import UnitCalibration
 from acquisition.source import SampleSource
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from service.api.routes.bearings import estimator_names, runout_names
-from service.api.values import (
-    ApiModel,
-    EstimatorName,
-    QualityModel,
-    ReadingModel,
-    RunoutName,
-    SpeedSourceName,
-    Time,
-    WindowModel,
-    quality_model,
-    reading_model,
-    window_model,
-)
+from service.api.values import quality_model, reading_model, window_model
 from service.runtime.times import rfc3339
 
 
-class AssessmentModel(ApiModel):
-    """One bearing at one refresh; the parts are those of the API's ``latest``."""
-
-    unit: str
-    """Unit."""
-
-    bearing: str
-    """Bearing."""
-
-    time: Time
-    """End of the samples."""
-
-    quality: QualityModel
-    """The worst of the 1× amplitudes and the preferred stiffness."""
-
-    speed_source: SpeedSourceName
-    """Source of the running speed."""
-
-    runout: dict[str, RunoutName | None]
-    """Whether runout was subtracted from 1× of the newest segment, and the reason if not."""
-
-    window: WindowModel
-    """The samples."""
-
-    estimators: dict[str, EstimatorName | None]
-    """Estimator of `stiffness`, by axes "xx" and "yy"; null if there is none."""
-
-    readings: dict[str, ReadingModel]
-    """All quantities of the catalogue, by name."""
-
-
-def assessment_model(assessment: Assessment) -> AssessmentModel:
-    """Return an assessment with its parts as in the API, to the last digit."""
-    return AssessmentModel(
-        unit=assessment.unit,
-        bearing=assessment.bearing,
-        time=rfc3339(assessment.time_ns),
-        quality=quality_model(assessment.quality),
-        speed_source=assessment.speed_source.value,
-        runout=runout_names(assessment),
-        window=window_model(assessment.window),
-        estimators=estimator_names(assessment),
-        readings={name: reading_model(name, r) for name, r in assessment.readings.items()},
-    )
+def assessment_document(assessment: Assessment) -> dict[str, Any]:
+    """Return an assessment with its parts in the models of the API's ``latest``, to all digits."""
+    return {
+        "unit": assessment.unit,
+        "bearing": assessment.bearing,
+        "time": rfc3339(assessment.time_ns),
+        "quality": quality_model(assessment.quality),
+        "speed_source": assessment.speed_source.value,
+        "runout": runout_names(assessment),
+        "window": window_model(assessment.window),
+        "estimators": estimator_names(assessment),
+        "readings": {name: reading_model(name, r) for name, r in assessment.readings.items()},
+    }
 
 
 async def assessments(
