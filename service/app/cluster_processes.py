@@ -14,7 +14,7 @@ from core.monitor.monitor import UnitMonitor
 from service.app.health_page import Health, health_server
 from service.app.measuring_process import Analysis, analysis_on, reporting_loops
 from service.app.notifications import router_of
-from service.app.process import Ground, Supervision, live_view, start_loops
+from service.app.process import ProcessContext, Supervision, live_view, start_loops
 from service.app.service_health import recording_error
 from service.app.storage import database_path, open_store
 from service.cluster.consumer import Consumer, consumer_metrics
@@ -136,16 +136,16 @@ async def run_analyse(
             stack.enter_context(only_one(database_path(plant)))
         store = open_store(part, Origin.LIVE, router_of(part, Origin.LIVE, around, clock))
         stack.callback(store.close)
-        ground = Ground(
+        process = ProcessContext(
             part, Origin.LIVE, clock, store, live, Heartbeats(clock), Timings(monitors, clock)
         )
-        analysing = Analysing(plant, partition, settings, monitors, ground, around)
+        analysing = Analysing(plant, partition, settings, monitors, process, around)
         server = health_server(analysing.health(), listener, clock, announce)
-        supervision = Supervision(manager, ground.beats, live, monitors, clock)
+        supervision = Supervision(manager, process.beats, live, monitors, clock)
         try:
             await server.run(
                 supervision,
-                ground.beats,
+                process.beats,
                 lambda tasks, _: [tasks.create_task(analysing.run(), name="analyse")],
             )
         finally:
@@ -161,13 +161,13 @@ class Analysing:
         partition: Partition,
         settings: StreamSettings,
         monitors: Mapping[str, UnitMonitor],
-        ground: Ground,
+        process: ProcessContext,
         around: Around,
     ) -> None:
         self._share, self._settings = partition.share_of(plant), settings
-        self._monitors, self._ground, self._around = monitors, ground, around
+        self._monitors, self._process, self._around = monitors, process, around
         self._plant = plant
-        self._holds = Holds(ground.store, monitors, ground.clock)
+        self._holds = Holds(process.store, monitors, process.clock)
         self._analysis: Analysis | None = None
         self._consumer: Consumer | None = None
 
@@ -179,11 +179,11 @@ class Analysing:
 
     async def run(self) -> None:
         """Wait for the units of this process, then analyse until cancelled."""
-        ground = self._ground
-        store, clock = ground.store, ground.clock
+        process = self._process
+        store, clock = process.store, process.clock
         await self._holds.take()
         bus = Bus(BUS_CAPACITY, clock)  # always empty: blocks wait in the stream
-        monitors = timed_monitors(self._monitors, ground.timings)
+        monitors = timed_monitors(self._monitors, process.timings)
         stored = {
             unit: found
             for unit in monitors
@@ -192,14 +192,14 @@ class Analysing:
         memories = memories_of(stored.values())
         stream = StreamLook(self._trouble, self._behind_s)
         analysis = self._analysis = await analysis_on(
-            ground, monitors, bus, self._around, self._share, memories, stream
+            process, monitors, bus, self._around, self._share, memories, stream
         )
 
         async def begin(stream: str, newest: int) -> dict[str, UnitProgress]:
             """Return where each unit resumes."""
-            parts = (analysis.analyser, ground.live, analysis.recorder, clock)
+            parts = (analysis.analyser, process.live, analysis.recorder, clock)
             progress = {}
-            for unit in ground.plant.unit:
+            for unit in process.plant.unit:
                 reach = await asyncio.to_thread(store.reach, unit.id)
                 position = usable(stored.get(unit.id), stream, newest)
                 identity, memory = identity_of(self._plant, unit), memories.get(unit.id)
@@ -211,8 +211,8 @@ class Analysing:
         self._consumer = consumer
         everywhere = [unit.id for unit in self._plant.unit]
         silent = SilentUnits(everywhere, analysis.alarms, store, clock)
-        after_s = silences_s(ground.plant.unit, self._settings.silent_after_s)
-        silence = Silence(after_s, analysis.analyser, ground.live, clock)
+        after_s = silences_s(process.plant.unit, self._settings.silent_after_s)
+        silence = Silence(after_s, analysis.analyser, process.live, clock)
 
         async def watch(pulse: Pulse) -> None:
             """Check that this process still holds its units, and which units are silent."""
@@ -228,7 +228,7 @@ class Analysing:
             return [*self._monitors, *service, *([SHARED] if silent.is_watching else [])]
 
         shared = {**shared_work(analysis), "silent units": silent.run}
-        leadership = Leadership(store.hold, shared, ground.beats, clock)
+        leadership = Leadership(store.hold, shared, process.beats, clock)
         loops = {
             "lead": leadership.run,
             "record": analysis.recorder.run,
@@ -238,7 +238,7 @@ class Analysing:
         }
         async with asyncio.TaskGroup() as tasks:
             analysis.start(tasks)
-            start_loops(loops, ground.beats, tasks)
+            start_loops(loops, process.beats, tasks)
 
     def _trouble(self) -> str | None:
         """Return why no blocks arrive from the stream, or None."""
@@ -255,18 +255,18 @@ class Analysing:
         def checks() -> dict[str, str | None]:
             consumer = self._consumer
             waits_for = self._holds.waits_for
-            loops = {f"loop {name}": t for name, t in self._ground.beats.look().items()}
+            loops = {f"loop {name}": t for name, t in self._process.beats.look().items()}
             return {
                 "units": None if waits_for is None else f"standing by: {waits_for}",
-                "store": self._ground.live.store_error,
+                "store": self._process.live.store_error,
                 "stream": "not begun" if consumer is None else self._trouble(),
                 **loops,
             }
 
         def shown() -> dict[str, str]:
-            live = self._ground.live
+            live = self._process.live
             shown = {f"unit {unit}": live.status(unit).state.value for unit in self._monitors}
-            shown["database"] = self._ground.store.kind
+            shown["database"] = self._process.store.kind
             if (parts := self._analysis) is not None:
                 # conditions of this host; only the leading process raises alarms about them
                 shown |= {
@@ -280,7 +280,7 @@ class Analysing:
         def metrics() -> Iterator[Metric]:
             if self._consumer is not None:
                 yield from consumer_metrics(self._consumer)
-            yield store_info(self._ground.store.kind)
+            yield store_info(self._process.store.kind)
             yield from ProcessCollector(registry=None).collect()
 
         return Health(checks, shown, metrics)
@@ -291,7 +291,7 @@ def shared_work(analysis: Analysis) -> dict[str, Loop]:
 
     async def deliver(pulse: Pulse) -> None:
         pulse.rest()  # each sender has its own heartbeat
-        await analysis.deliveries.run(analysis.ground.beats)
+        await analysis.deliveries.run(analysis.process.beats)
         await asyncio.Event().wait()  # without receivers there is nothing to do
 
     return {**analysis.shared_loops, "deliver": deliver}

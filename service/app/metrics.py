@@ -52,9 +52,9 @@ class Scrape:
 
     def collect(self) -> Iterator[Metric]:
         """Yield all families."""
-        parts, ground = self.analysis, self.analysis.ground
-        live, timings, now_ns = ground.live, ground.timings, ground.clock.now_ns()
-        units = {unit.id: [bearing.id for bearing in unit.bearing] for unit in ground.plant.unit}
+        parts, process = self.analysis, self.analysis.process
+        live, timings, now_ns = process.live, process.timings, process.clock.now_ns()
+        units = {unit.id: [bearing.id for bearing in unit.bearing] for unit in process.plant.unit}
         yield gauge(
             "build_info",
             "1; which padwatch this is, and by which Python it runs.",
@@ -65,7 +65,7 @@ class Scrape:
         yield from link_metrics(live, list(units), self.sources, now_ns)
         yield from queue_metrics(self.bus)
         yield from result_metrics(timings, live, units)
-        yield from store_metrics(parts.recorder, live, timings, ground.store.kind)
+        yield from store_metrics(parts.recorder, live, timings, process.store.kind)
         yield from space_metrics(parts.space)
         yield from evidence_metrics(parts.captures, parts.evidence)
         yield from load_metrics(parts.load)

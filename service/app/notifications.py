@@ -15,7 +15,6 @@ from service.notifications.routing import QuietHours, Route, Router
 from service.notifications.sender import Receiver
 from service.notifications.webhook import Webhook, WebhookTarget
 from service.settings.notifications import (
-    QuietSettings,
     ReceiverSettings,
     SecretSettings,
     SmtpSettings,
@@ -101,6 +100,7 @@ def _routes(settings: ReceiverSettings) -> Iterator[Route]:
 def _receiver(
     settings: ReceiverSettings, name: str, address: str, carrier: Webhook | Mail
 ) -> Receiver:
+    quiet = settings.quiet
     return Receiver(
         name=name,
         kind=settings.kind,
@@ -108,17 +108,17 @@ def _receiver(
         carrier=carrier,
         max_retry_s=settings.max_retry_s,
         max_age_s=SECONDS_PER_HOUR * settings.max_age_h,
-        quiet=None if settings.quiet is None else _quiet(settings.quiet),
+        quiet=quiet
+        and QuietHours(
+            time.fromisoformat(quiet.start),
+            time.fromisoformat(quiet.end),
+            ZoneInfo(quiet.time_zone),
+        ),
     )
 
 
 def _name(settings: SmtpSettings, recipient: str) -> str:
     return f"{settings.id}:{recipient}"
-
-
-def _quiet(settings: QuietSettings) -> QuietHours:
-    start, end = time.fromisoformat(settings.start), time.fromisoformat(settings.end)
-    return QuietHours(start, end, ZoneInfo(settings.time_zone))
 
 
 def _secret(settings: SecretSettings | None) -> Secret | None:

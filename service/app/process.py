@@ -28,7 +28,7 @@ STALE_HOPS = 2.5
 
 
 @dataclass(frozen=True)
-class Ground:
+class ProcessContext:
     """Context of one process: plant, store, live view, heartbeats and timings.
 
     Parameters

@@ -10,7 +10,7 @@ from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from service.app.measuring_process import Analysis, analysis_on, reporting_loops
 from service.app.notifications import router_of
-from service.app.process import Ground, Supervision, live_view, start_loops
+from service.app.process import ProcessContext, Supervision, live_view, start_loops
 from service.app.service_audit import ServiceTrail
 from service.app.serving_process import context_of, serving_of
 from service.app.storage import database_path, evidence_desk, open_store
@@ -28,7 +28,7 @@ from service.store.holds import only_one
 
 
 @dataclass(frozen=True)
-class Performance:
+class ServiceRun:
     """Configuration of a service run: a live plant, or recordings of it.
 
     Parameters
@@ -51,7 +51,7 @@ class Performance:
 
 
 async def run_service(
-    performance: Performance,
+    service_run: ServiceRun,
     listener: socket.socket,
     clock: Clock,
     announce: Callable[[str], None],
@@ -74,32 +74,32 @@ async def run_service(
     ClosedError
         If the service would be reachable from other hosts without TLS or accounts.
     """
-    plant, origin = performance.plant, performance.origin
+    plant, origin = service_run.plant, service_run.origin
     live, beats, timings = (
         live_view(plant, clock),
         Heartbeats(clock),
-        Timings(performance.units, clock),
+        Timings(service_run.units, clock),
     )
     around = Around(live)
     router = router_of(plant, origin, around, clock)
     with only_one(database_path(plant)), closing(open_store(plant, origin, router)) as store:
-        ground = Ground(plant, origin, clock, store, live, beats, timings)
-        desk = access_desk(plant, store.access, clock, performance.is_demo)
-        units = timed(performance.units, timings)
+        process = ProcessContext(plant, origin, clock, store, live, beats, timings)
+        desk = access_desk(plant, store.access, clock, service_run.is_demo)
+        units = timed(service_run.units, timings)
         bus = Bus(BUS_CAPACITY, clock)
         monitors = {unit: watched.monitor for unit, watched in units.items()}
-        analysis = await analysis_on(ground, monitors, bus, around)
+        analysis = await analysis_on(process, monitors, bus, around)
         parts = (analysis.alarms, analysis.films, bus, beats)
         runner = Runner(units, live, analysis.recorder, clock, *parts)
         audit = ServiceTrail(plant, origin, store.audit, clock)
         await audit.begin()
         context = context_of(analysis, desk, audit.refusals, bus, timed_sources(units))
         evidence = evidence_desk(plant, store, analysis.evidence, clock, context.downloads)
-        server = serving_of(context, ground, listener, desk, announce, evidence)
+        server = serving_of(context, process, listener, desk, announce, evidence)
 
         def begin(tasks: asyncio.TaskGroup, stopped: asyncio.Event) -> list[asyncio.Task[None]]:
             running = tasks.create_task(runner.run(), name="run")
-            if performance.ends:
+            if service_run.ends:
                 running.add_done_callback(lambda _: stopped.set())
             loops = {**_reporting_loops(analysis), "clock": audit.watch_clock}
             return [running, *analysis.start(tasks), *start_loops(loops, beats, tasks)]
@@ -114,8 +114,8 @@ async def run_service(
 
 def _reporting_loops(analysis: Analysis) -> Mapping[str, Loop]:
     """Return the loops that serve replicas; only PostgreSQL and live data have replicas."""
-    ground = analysis.ground
-    if ground.plant.store.postgresql is None or ground.origin is not Origin.LIVE:
+    process = analysis.process
+    if process.plant.store.postgresql is None or process.origin is not Origin.LIVE:
         return {}
-    held = [*(unit.id for unit in ground.plant.unit), PLANT]
+    held = [*(unit.id for unit in process.plant.unit), PLANT]
     return reporting_loops(analysis, lambda: held)

@@ -17,7 +17,7 @@ from service.app.metrics import scrape
 from service.app.notifications import receivers_of
 from service.app.process import (
     STALE_HOPS,
-    Ground,
+    ProcessContext,
     ProcessServer,
     Supervision,
     live_view,
@@ -56,7 +56,7 @@ GC_THRESHOLDS = (20_000, 20, 20)
 
 def serving_of(
     context: Context,
-    ground: Ground,
+    process: ProcessContext,
     listener: socket.socket,
     desk: AccessDesk,
     announce: Callable[[str], None],
@@ -81,7 +81,7 @@ def serving_of(
         gc.set_threshold(*GC_THRESHOLDS)
 
     limited = app if context.load is None else Shedding(app, context.load)
-    server = server_of(limited, ground.plant, ground.clock)
+    server = server_of(limited, process.plant, process.clock)
     return ProcessServer("serve", server, listener, announce, prepare)
 
 
@@ -93,14 +93,14 @@ def context_of(
     sources: Mapping[str, TimedSource],
 ) -> Context:
     """Return the context of the API in a process that also analyses."""
-    ground = analysis.ground
-    plant = ground.plant
+    process = analysis.process
+    plant = process.plant
     return Context(
         plant_name=plant.plant.name,
         units={unit.id: unit for unit in plant.unit},
-        live=ground.live,
-        store=ground.store,
-        clock=ground.clock,
+        live=process.live,
+        store=process.store,
+        clock=process.clock,
         refresh_s=refresh_s(plant),
         references=analysis.references,
         alarms=analysis.alarms,
@@ -111,10 +111,10 @@ def context_of(
         evidence=lambda: analysis.evidence.status,
         configuration=analysis.evidence.configuration,
         metrics=partial(scrape, analysis, bus, sources),
-        origin=ground.origin,
+        origin=process.origin,
         max_shelf_s=3600.0 * plant.alarms.max_shelf_h,
         sources=sources,
-        loops=ground.beats.look,
+        loops=process.beats.look,
         refusals=refusals,
         access=desk,
         space=analysis.space,
@@ -218,13 +218,13 @@ async def run_serve(
         replica = Replica(plant, store, clock)
         await replica.start()
         beats = Heartbeats(clock)
-        ground = Ground(
+        process = ProcessContext(
             plant, Origin.LIVE, clock, store, live_view(plant, clock), beats, Timings([], clock)
         )
         audit = ServiceTrail(plant, Origin.LIVE, store.audit, clock)
         await audit.begin()
         context = replica.context(desk, audit.refusals, beats)
-        server = serving_of(context, ground, listener, desk, announce)
+        server = serving_of(context, process, listener, desk, announce)
         supervision = Supervision(manager, beats, replica.live, [u.id for u in plant.unit], clock)
         loops = {"feed": replica.feed.run, "references": replica.references.run}
         try:

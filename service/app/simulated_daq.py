@@ -72,7 +72,9 @@ async def run_daq(servers: Mapping[str, DaqServer], print_line: Print, *, contro
                     tasks.create_task(_serve(*entry, print_line)) for entry in servers.items()
                 ]
                 if controlled:
-                    running.append(tasks.create_task(_obey(servers, print_line, stopped)))
+                    running.append(
+                        tasks.create_task(_execute_commands(servers, print_line, stopped))
+                    )
                 await stopped.wait()
                 for task in running:
                     task.cancel()
@@ -86,14 +88,14 @@ async def _serve(unit: str, server: DaqServer, print_line: Print) -> None:
     print_line(json.dumps({"ended": unit}))
 
 
-async def _obey(
+async def _execute_commands(
     servers: Mapping[str, DaqServer], print_line: Print, stopped: asyncio.Event
 ) -> None:
     lines: asyncio.Queue[str] = asyncio.Queue()
     reading = (asyncio.get_running_loop(), lines.put_nowait)
     threading.Thread(target=_read_lines, args=reading, daemon=True, name="commands").start()
     while line := await lines.get():
-        print_line(json.dumps(obeyed(servers, line)))
+        print_line(json.dumps(execute_command(servers, line)))
     stopped.set()
 
 
@@ -109,7 +111,7 @@ def _read_lines(loop: asyncio.AbstractEventLoop, put: Callable[[str], None]) -> 
         loop.call_soon_threadsafe(put, "")
 
 
-def obeyed(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
+def execute_command(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
     """Execute one command: ``UNIT FAULT [COUNT]``.
 
     Returns

@@ -269,10 +269,10 @@ def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> WaveformKee
     """Build the keeper of the recordings of a live plant."""
     data, custody = Path(plant.service.data_folder), custody_of(plant)
 
-    def hire() -> Caretaker:
+    def make_caretaker() -> Caretaker:
         return Caretaker(custody, Index(store.waveforms, place_of(data)), clock)
 
-    return WaveformKeeper(custody.gauge, hire, clock, WatchKeeping(data))
+    return WaveformKeeper(custody.gauge, make_caretaker, clock, WatchKeeping(data))
 
 
 def custody_of(plant: PlantFile) -> Custody:

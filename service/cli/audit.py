@@ -13,7 +13,7 @@ from service.cli.options import JsonOutput, PlantPath, argument, command_group, 
 from service.settings.loading import load_plant_file
 from service.store.access.audit_verification import Verdict
 
-app = command_group("The audit trail: who did what to what.")
+app = command_group("Verify and export the audit trail.")
 
 
 @app.command()

@@ -13,7 +13,7 @@ from service.cli.offline.backtest import (
     run_back_test,
     time_ns_of,
 )
-from service.cli.offline.backtest_bearing import Learning, places_of, rules_of
+from service.cli.offline.backtest_bearing import UNSPECIFIED, Learning, places_of, rules_of
 from service.cli.offline.backtest_files import read_histories
 from service.cli.options import JsonOutput, argument, fail, option, print_result, progress
 from service.runtime.process import made_by
@@ -54,7 +54,7 @@ def backtest(
     ] = None,
     estimator: Annotated[
         str, typer.Option(help="Name of the stiffness estimator, stored with exported baselines.")
-    ] = "not told",
+    ] = UNSPECIFIED,
     export: Annotated[Path | None, option("New folder for the learned baselines, as JSON.")] = None,
     json_output: JsonOutput = False,
 ) -> None:

@@ -155,7 +155,7 @@ def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
         try:
             line = process.stdout.readline() if process.stdout else b""
             if not line or process.stdout is None:
-                fail("the simulated DAQ did not start; its own message stands above")
+                fail("the simulated DAQ did not start; see its message above")
             endpoints: Endpoints = json.loads(line)
             daq = RunningDaq(endpoints, {unit: threading.Event() for unit in endpoints})
             news = threading.Thread(target=_listen, args=(process.stdout, daq), daemon=True)

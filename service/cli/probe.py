@@ -110,7 +110,9 @@ def map_(
     if at is None:
         settings = one_unit(load_plant_file(file), unit, file)
         device = _mapped_device(settings, slow)
-        units, registers = _units_of(settings), device.registers
+        units = {channel.id: MEASURAND_UNITS[channel.measurand] for channel in settings.channel}
+        units |= {channel.id: channel.unit for channel in settings.slow_channel}
+        registers = device.registers
         place: ModbusLinkSettings = device
     else:
         units, registers = {}, load_map_file(file).register_map()
@@ -195,12 +197,6 @@ def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
         key = "slow_source" if slow else "source"
         fail(f"the {key} of unit {unit.id} has no register map", code=2)
     return device
-
-
-def _units_of(unit: UnitSettings) -> dict[str, str]:
-    """Return the engineering unit of each channel."""
-    waveforms = {channel.id: MEASURAND_UNITS[channel.measurand] for channel in unit.channel}
-    return waveforms | {c.id: c.unit for c in unit.slow_channel}
 
 
 def _unit(look: ValueLook, units: dict[str, str]) -> str:

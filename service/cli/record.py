@@ -62,8 +62,8 @@ def record(
         fail(f"{out.parent}: {error.strerror}")
     writer = recording_writer(settings, out, made_by())
     clock = SystemClock()
-    patience = Patience(seconds, clock) if reconnect else None
-    problem = uvloop.run(record_blocks(source_of(settings, clock), writer, seconds, patience))
+    policy = ReconnectPolicy(seconds, clock) if reconnect else None
+    problem = uvloop.run(record_blocks(source_of(settings, clock), writer, seconds, policy))
     manifest = open_recording(out).manifest
     n_bytes = sum(file.size for file in manifest.files.values())
     line = (
@@ -75,7 +75,7 @@ def record(
         fail(f"ended early: {problem}")
 
 
-class Patience:
+class ReconnectPolicy:
     """Waits before a lost link is opened again, until the planned end of the recording."""
 
     def __init__(self, seconds: float, clock: Clock) -> None:
@@ -94,13 +94,13 @@ async def record_blocks(
     source: SampleSource,
     writer: RecordingWriter,
     seconds: float,
-    patience: Patience | None = None,
+    policy: ReconnectPolicy | None = None,
 ) -> str | None:
     """Record until the length has passed, SIGINT or SIGTERM arrives, or the link is lost.
 
     Parameters
     ----------
-    patience
+    policy
         Reopens a lost link; without it, a lost link ends the recording.
 
     Returns
@@ -113,7 +113,7 @@ async def record_blocks(
         If nothing could be recorded; no files remain.
     """
     with writer:
-        reading = asyncio.create_task(_read(source, writer, seconds, patience))
+        reading = asyncio.create_task(_read(source, writer, seconds, policy))
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, reading.cancel)
@@ -128,7 +128,10 @@ async def record_blocks(
 
 
 async def _read(
-    source: SampleSource, writer: RecordingWriter, seconds: float, patience: Patience | None
+    source: SampleSource,
+    writer: RecordingWriter,
+    seconds: float,
+    policy: ReconnectPolicy | None,
 ) -> None:
     with progress("Recording", round(seconds)) as bar:
         while writer.duration_s < seconds:
@@ -142,6 +145,6 @@ async def _read(
                     else:
                         return  # the source has ended
             except LinkError as error:
-                if patience is None:
+                if policy is None:
                     raise
-                await patience.wait(error)
+                await policy.wait(error)

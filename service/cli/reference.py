@@ -132,9 +132,13 @@ def set_reference(
             source=ReferenceSource.MEASURED if measured else ReferenceSource.GIVEN,
             note=note.strip(),
         )
-        now = bearing_references(machine.id, found, _add(plant, reference))
+        actor = Acting(Source.COMMAND_LINE, person())
+        with acting_as(actor), plant_store(plant, creates=True) as store:
+            store.add_reference(reference)
+            history = store.reference_history(machine.id, found.id)
     except (ReferenceRefusedError, ValueError) as error:
         fail(f"unit {machine.id} bearing {found.id}: {error}", code=2)
+    now = bearing_references(machine.id, found, history)
     print_result(now, text_lines(now), json_output)
 
 
@@ -152,14 +156,6 @@ def list_references(plant_file: PlantPath, json_output: JsonOutput = False) -> N
         ]
     lines = (line for references in found for line in text_lines(references))
     print_result(found, lines, json_output)
-
-
-def _add(plant: PlantFile, reference: GapReference) -> Sequence[GapReference]:
-    """Store a reference and return its bearing's history."""
-    who = Acting(Source.COMMAND_LINE, person())
-    with acting_as(who), plant_store(plant, creates=True) as store:
-        store.add_reference(reference)
-        return store.reference_history(reference.unit, reference.bearing)
 
 
 def _measured(plant: PlantFile, unit: str, bearing: Bearing) -> Gaps:

@@ -17,7 +17,7 @@ from service.app.recordings import (
     replay_source,
     replayed_plant,
 )
-from service.app.service import Performance, run_service
+from service.app.service import ServiceRun, run_service
 from service.app.simulated_daq import Wire, over_wire
 from service.app.storage import database_path
 from service.app.web import listener_of
@@ -55,28 +55,28 @@ def replay(
     if database.exists():  # its alarms would be resumed
         fail(f"{database} holds results already; a replay needs a folder of its own")
     with (
-        _performance(played, plant, units, through, speed, serve) as (performance, daq),
-        listener_of(performance.plant, port) as listener,
+        _service_run(played, plant, units, through, speed, serve) as (service_run, daq),
+        listener_of(service_run.plant, port) as listener,
     ):
-        run_to_its_end(_play(performance, listener, daq, database, json_output))
+        run_to_its_end(_play(service_run, listener, daq, database, json_output))
 
 
 @contextmanager
-def _performance(
+def _service_run(
     plant: PlantFile,
     plant_path: Path,
     units: Mapping[str, Path],
     through: Wire | None,
     speed: float,
     serve: bool,
-) -> Iterator[tuple[Performance, RunningDaq | None]]:
+) -> Iterator[tuple[ServiceRun, RunningDaq | None]]:
     """Build the service run, and start the DAQ that plays the recordings, if there is one."""
     clock = SystemClock()
     if through is None:
         watched = watched_units(
             plant, lambda unit: replay_source(units[unit.id], unit, clock, speed or None)
         )
-        yield Performance(plant, watched, Origin.REPLAY, ends=not serve), None
+        yield ServiceRun(plant, watched, Origin.REPLAY, ends=not serve), None
         return
     arguments = [str(plant_path), "--through", through.value, "--speed", str(speed)]
     for folder in units.values():
@@ -87,11 +87,11 @@ def _performance(
         watched = watched_units(
             attached, lambda unit: PlayedOut(source_of(unit, clock), daq.over[unit.id], gone)
         )
-        yield Performance(attached, watched, Origin.REPLAY, ends=not serve), daq
+        yield ServiceRun(attached, watched, Origin.REPLAY, ends=not serve), daq
 
 
 async def _play(
-    performance: Performance,
+    service_run: ServiceRun,
     listener: socket,
     daq: RunningDaq | None,
     database: Path,
@@ -104,7 +104,7 @@ async def _play(
     LinkError
         If the DAQ ended before its recordings.
     """
-    await run_service(performance, listener, SystemClock(), announce)
+    await run_service(service_run, listener, SystemClock(), announce)
     if daq is not None and daq.has_failed:
         raise LinkError(
             "the simulated DAQ has ended before its recordings did: results are incomplete"

@@ -1,6 +1,7 @@
 """`padwatch run`, `serve`, `acquire`, `analyse` and `demo`."""
 
 import os
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +11,7 @@ import typer
 from acquisition.clock import SystemClock
 from service.api.http.listening import listen
 from service.app.health_page import HOST
-from service.app.service import Performance, run_service
+from service.app.service import ServiceRun, run_service
 from service.app.serving_process import run_serve
 from service.app.storage import open_store
 from service.app.web import listener_of
@@ -59,8 +60,8 @@ def run_plant(plant: PlantFile, port: int, is_demo: bool = False) -> None:
     """
     with listener_of(plant, port) as listener:
         clock, manager = SystemClock(), ServiceManager(os.environ)
-        performance = Performance(plant, live_units(plant, clock), is_demo=is_demo)
-        run_to_its_end(run_service(performance, listener, clock, announce, manager))
+        service_run = ServiceRun(plant, live_units(plant, clock), is_demo=is_demo)
+        run_to_its_end(run_service(service_run, listener, clock, announce, manager))
 
 
 def announce(url: str) -> None:
@@ -106,14 +107,9 @@ def acquire(
         clock, manager = SystemClock(), ServiceManager(os.environ)
         units = {id_: its for id_, its in live_units(plant, clock).items() if id_ in wanted}
         run_to_its_end(
-            run_acquire(plant, settings, units, listener, clock, _announce_acquire, manager)
+            run_acquire(plant, settings, units, listener, clock, _announcer("acquire"), manager)
         )
     leave()
-
-
-def _announce_acquire(url: str) -> None:
-    """Print the URL of the health page."""
-    typer.echo(f"padwatch acquire: {url}readyz")
 
 
 def analyse(
@@ -139,7 +135,7 @@ def analyse(
     monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in units}
     with listen(HOST, settings.analyse_port if port is None else port) as listener:
         clock, manager = SystemClock(), ServiceManager(os.environ)
-        parts = (plant, part, settings, monitors, listener, clock, _announce_analyse, manager)
+        parts = (plant, part, settings, monitors, listener, clock, _announcer("analyse"), manager)
         try:
             run_to_its_end(run_analyse(*parts))
         except ExceptionGroup as group:
@@ -150,13 +146,13 @@ def analyse(
     leave()
 
 
-def _announce_analyse(url: str) -> None:
-    """Print the URL of the health page."""
-    typer.echo(f"padwatch analyse: {url}readyz")
-
-
 def _first(error: Exception) -> Exception:
     return _first(error.exceptions[0]) if isinstance(error, ExceptionGroup) else error
+
+
+def _announcer(command: str) -> Callable[[str], None]:
+    """Return a function that prints the URL of the health page."""
+    return lambda url: typer.echo(f"padwatch {command}: {url}readyz")
 
 
 def stream_settings(plant: PlantFile) -> StreamSettings:

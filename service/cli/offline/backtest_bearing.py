@@ -29,6 +29,9 @@ from service.measuring.baseline_learning import drifted
 from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
 
+UNSPECIFIED = "unspecified"
+"""Estimator of a baseline if the user names none."""
+
 
 @dataclass(frozen=True)
 class MachineEvent:
@@ -135,7 +138,7 @@ class BackTestRules:
     events: Sequence[MachineEvent] = ()
     author: str = "back-test"
     created_ns: int = 0
-    estimator: str = "not told"
+    estimator: str = UNSPECIFIED
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +218,10 @@ def _run(
     baseline, doubt, far = None, None, None
     if learned > begin:
         healthy = history.rows(begin, learned)
-        settings = settings_for(history, rules.baseline)
+        # no cell would be known with an attitude that was never measured
+        is_measured = bool(np.isfinite(history.attitude_deg).any())
+        uses_attitude = rules.baseline.uses_attitude and is_measured
+        settings = replace(rules.baseline, uses_attitude=uses_attitude)
         origin = Origin(
             *(*place, rules.estimator, period.version),
             *(rules.author, rules.created_ns, period.event),
@@ -233,12 +239,6 @@ def _run(
         for direction in DIRECTIONS
     }
     return replace(run, decided=decided)
-
-
-def settings_for(history: StiffnessHistory, settings: BaselineSettings) -> BaselineSettings:
-    """Return settings without the attitude if it was never measured; no cell would be known."""
-    is_measured = bool(np.isfinite(history.attitude_deg).any())
-    return replace(settings, uses_attitude=settings.uses_attitude and is_measured)
 
 
 def places_of(plant: PlantFile) -> list[Place]:

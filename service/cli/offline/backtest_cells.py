@@ -52,16 +52,16 @@ class RowProblems:
 
         Raises
         ------
-        ValueError
-            With line numbers.
+        ReadingsError
+            If there is a problem; the message names the lines.
         """
         if not self._found:
             return
         found = sorted(self._found)[:MAX_NAMED]
-        said = [f"{self._word} {line}: {text}" for line, text in found]
+        messages = [f"{self._word} {line}: {text}" for line, text in found]
         if self._n_found > len(found):
-            said.append(f"and {self._n_found - len(found)} more")
-        raise ValueError("; ".join(said))
+            messages.append(f"and {self._n_found - len(found)} more")
+        raise ReadingsError("; ".join(messages))
 
 
 def shown(value: Any) -> str:
@@ -96,7 +96,7 @@ MAX_ROWS = 40_000_000
 """Rows of one file: 20 units of 3 bearings for 6 years; about 230 bytes of memory each."""
 
 
-class ReadingsError(Exception):
+class ReadingsError(ValueError):
     """A file of readings that cannot be used; the message names the place."""
 
 
@@ -173,10 +173,7 @@ def converted(table: Any, line: Any, word: str) -> Any:
         else:
             convert = _text if field.type == pa.string() else _number
             columns.append(convert(table.column(field.name), field.name, problems))
-    try:
-        problems.refuse()
-    except ValueError as error:
-        raise ReadingsError(str(error)) from error
+    problems.refuse()
     return pa.record_batch(columns, schema=schema)
 
 

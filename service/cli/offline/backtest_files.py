@@ -68,7 +68,7 @@ def read_histories(
         return histories_of(_columns(path, word, advanced), places, word)
     except OSError as error:
         raise ReadingsError(f"{path}: {error.strerror}") from error
-    except (ReadingsError, ValueError) as error:
+    except ReadingsError as error:
         raise ReadingsError(f"{path}: {error}") from error
 
 

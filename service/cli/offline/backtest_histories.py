@@ -78,7 +78,7 @@ def histories_of(
 
     Raises
     ------
-    ValueError
+    ReadingsError
         If names are unknown, numbers invalid, rows out of order or repeated, or the directions of
         one time differ in a column of the bearing; the message names the lines.
     """

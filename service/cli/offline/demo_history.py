@@ -80,18 +80,14 @@ def _fill_unit(
         )
         films = judged(history, operation, learned, rules)
         store.add_past(unit.id, bearing, estimator, films, _trends(history, estimator))
-        store.add_baseline(learned, [_step(learned, step) for step in STEPS])
+        steps = [
+            StoredStep(unit.id, bearing, 1, step, now_ns, AUTHOR, EVENT)
+            for step in (BaselineStep.LEARNED, BaselineStep.ACCEPTED)
+        ]
+        store.add_baseline(learned, steps)
     response = learn_response(past, np.logical_and.reduce(settled))
     if response is not None:
         store.set_response(unit.id, response, now_ns)
-
-
-STEPS = (BaselineStep.LEARNED, BaselineStep.ACCEPTED)
-
-
-def _step(learned: BearingBaseline, step: BaselineStep) -> StoredStep:
-    origin = learned.origin
-    return StoredStep(origin.unit, origin.bearing, 1, step, origin.created_ns, AUTHOR, EVENT)
 
 
 def judged(

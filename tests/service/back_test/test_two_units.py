@@ -82,7 +82,7 @@ def test_alarms_are_those_that_core_decides(two_units: Any, found: BackTestResul
         n = learned_rows(two_units, life)
         for bearing, history in life.readings.items():
             is_settled = settled(life, bearing)
-            origin = Origin(unit, bearing, "not told", 1, "back-test", 0)
+            origin = Origin(unit, bearing, "unspecified", 1, "back-test", 0)
             baseline = learn(history.rows(0, n), is_settled[:n], origin, BaselineSettings())
             for direction in DIRECTIONS:
                 film = baseline.of(Watched.STIFFNESS, direction)

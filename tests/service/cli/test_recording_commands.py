@@ -21,7 +21,7 @@ from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.app.recordings import recording_writer, selection_of
 from service.cli.offline.reanalysis import assessment_document, assessments
-from service.cli.record import Patience, record_blocks
+from service.cli.record import ReconnectPolicy, record_blocks
 from service.measuring.simulated_sources import simulated_feed as feed_of
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
@@ -116,11 +116,11 @@ async def test_a_link_that_stays_lost_ends_a_recording_and_keeps_it(
 ) -> None:
     unit = plant.unit[0]
     writer = recording_writer(unit, tmp_path / "run", "a test")
-    patience = None if patience_s is None else Patience(patience_s, stepped_clock)
+    policy = None if patience_s is None else ReconnectPolicy(patience_s, stepped_clock)
     source = Interrupted(unit, 2, lose_the_link)
-    assert await record_blocks(source, writer, 600.0, patience) == "cable cut"
-    # with patience it is asked once more, which is after the 0.2 s
-    assert open_recording(tmp_path / "run").manifest.n_samples == (100 if patience is None else 200)
+    assert await record_blocks(source, writer, 600.0, policy) == "cable cut"
+    # with a policy it is asked once more, which is after the 0.2 s
+    assert open_recording(tmp_path / "run").manifest.n_samples == (100 if policy is None else 200)
 
 
 async def test_a_lost_link_may_be_recorded_across_and_is_an_exact_gap(
@@ -128,8 +128,8 @@ async def test_a_lost_link_may_be_recorded_across_and_is_an_exact_gap(
 ) -> None:
     unit = plant.unit[0]
     writer = recording_writer(unit, tmp_path / "run", "a test")
-    patience = Patience(10.0, stepped_clock)
-    assert await record_blocks(Interrupted(unit, 2, lose_the_link), writer, 1.0, patience) is None
+    policy = ReconnectPolicy(10.0, stepped_clock)
+    assert await record_blocks(Interrupted(unit, 2, lose_the_link), writer, 1.0, policy) is None
     first = [block.first_index for block in open_recording(tmp_path / "run").raw_blocks()]
     assert first == [0, 50, 200, 250, 400, 450, 600]
 

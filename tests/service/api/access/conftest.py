@@ -79,7 +79,7 @@ def access(service: Any) -> Access:
         store=service.store,
     )
     analysis = SimpleNamespace(
-        ground=ground,
+        process=ground,
         recorder=service.recorder,
         alarms=context.alarms,
         films=context.films,
