@@ -31,7 +31,7 @@ from service.measuring.service_alarms import SHARED, StreamLook
 from service.measuring.sources import WatchedUnit
 from service.measuring.timings import Timings, timed_monitors
 from service.notifications.message import Around
-from service.runtime.heartbeats import Heartbeats, Loop, Pulse
+from service.runtime.heartbeats import Heartbeats, Pulse
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
@@ -227,7 +227,12 @@ class Analysing:
             service = [PLANT] if self._share.leads else []
             return [*self._monitors, *service, *([SHARED] if silent.is_watching else [])]
 
-        shared = {**shared_work(analysis), "silent units": silent.run}
+        async def deliver(pulse: Pulse) -> None:
+            pulse.rest()  # each sender has its own heartbeat
+            await analysis.deliveries.run(process.beats)
+            await asyncio.Event().wait()  # without receivers there is nothing to do
+
+        shared = {**analysis.shared_loops, "deliver": deliver, "silent units": silent.run}
         leadership = Leadership(store.hold, shared, process.beats, clock)
         loops = {
             "lead": leadership.run,
@@ -284,14 +289,3 @@ class Analysing:
             yield from ProcessCollector(registry=None).collect()
 
         return Health(checks, shown, metrics)
-
-
-def shared_work(analysis: Analysis) -> dict[str, Loop]:
-    """Return the loops that one process runs for the whole plant."""
-
-    async def deliver(pulse: Pulse) -> None:
-        pulse.rest()  # each sender has its own heartbeat
-        await analysis.deliveries.run(analysis.process.beats)
-        await asyncio.Event().wait()  # without receivers there is nothing to do
-
-    return {**analysis.shared_loops, "deliver": deliver}

@@ -52,24 +52,21 @@ class BackTestResult:
     doubts: list[str] = field(default_factory=list)
     unit_years: float = 0.0
 
-    def rate(self) -> RateReport:
-        """Return the rate of alarms."""
-        n_alarms = len(self.alarms)
-        return RateReport(
-            unit_years=self.unit_years,
-            n_alarms=n_alarms,
-            n_danger=sum(alarm.level == "danger" for alarm in self.alarms),
-            alarms_per_unit_year=n_alarms / self.unit_years if self.unit_years else None,
-        )
-
     def report(self, file: str, n_rows: int, duration_s: float) -> BackTestReport:
         """Return the report of a file."""
+        n_alarms, n_danger = len(self.alarms), sum(a.level == "danger" for a in self.alarms)
+        per_year = n_alarms / self.unit_years if self.unit_years else None
         return BackTestReport(
             file=file,
             rows=n_rows,
             films=self.films,
             alarms=self.alarms,
-            rate=self.rate(),
+            rate=RateReport(
+                unit_years=self.unit_years,
+                n_alarms=n_alarms,
+                n_danger=n_danger,
+                alarms_per_unit_year=per_year,
+            ),
             doubts=self.doubts,
             duration_s=duration_s,
             readings_per_s=n_rows / max(duration_s, 1e-9),
@@ -253,8 +250,8 @@ def _baseline_lines(films: Sequence[FilmReport]) -> Iterator[str]:
 
 
 def _alarm_lines(alarm: AlarmReport) -> Iterator[str]:
-    name = f"{alarm.unit} {alarm.bearing} {alarm.direction}"
-    yield f"  {alarm.begin} to {alarm.end or 'the last reading':<24} {name}, {alarm.level}"
+    end = alarm.end or "the last reading"
+    yield f"  {alarm.begin} to {end:<24} {_name(alarm)}, {alarm.level}"
     danger = f", danger from {alarm.danger}" if alarm.danger else ""
     yield f"    {_change(alarm.raised)}, at most {_change(alarm.largest)}{danger}"
     found = alarm.condition
@@ -275,8 +272,8 @@ def _number(value: float | None, form: str) -> str:
     return "—" if value is None else format(value, form)
 
 
-def _name(film: FilmReport) -> str:
-    return f"{film.unit} {film.bearing} {film.direction}"
+def _name(of: FilmReport | AlarmReport) -> str:
+    return f"{of.unit} {of.bearing} {of.direction}"
 
 
 _EVENT = re.compile(

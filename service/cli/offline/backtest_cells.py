@@ -129,13 +129,6 @@ def check_headings(headings: Sequence[str]) -> None:
         raise ReadingsError("; ".join(problems))
 
 
-def schema_of(headings: Sequence[str]) -> Any:
-    """Return the schema of the rows of a file."""
-    texts = [(key, pa.string()) for key in TEXTS if key in headings]
-    numbers = [(key, pa.float64()) for key in NUMBERS if key in headings]
-    return pa.schema([(TIME_NS, pa.int64()), *texts, *numbers, (LINE, pa.int64())])
-
-
 def _listed(names: list[str]) -> str:
     return ", ".join(shown(name) for name in names[:10]) + (", …" if len(names) > 10 else "")
 
@@ -163,7 +156,10 @@ def converted(table: Any, line: Any, word: str) -> Any:
     ReadingsError
         If a value is wrong; the message names lines and values.
     """
-    schema, problems = schema_of(table.column_names), RowProblems(line, word)
+    texts = [(key, pa.string()) for key in TEXTS if key in table.column_names]
+    numbers = [(key, pa.float64()) for key in NUMBERS if key in table.column_names]
+    schema = pa.schema([(TIME_NS, pa.int64()), *texts, *numbers, (LINE, pa.int64())])
+    problems = RowProblems(line, word)
     columns = []
     for field in schema:
         if field.name == LINE:

@@ -69,7 +69,7 @@ def histories_of(
     Parameters
     ----------
     columns
-        Columns of one length (n,), named as in `schema_of`: texts as `pyarrow.DictionaryArray`,
+        Columns of one length (n,), named as by `converted`: texts as `pyarrow.DictionaryArray`,
         numbers as numpy arrays with NaN for missing numbers.
     places
         Existing units and bearings; None for any.

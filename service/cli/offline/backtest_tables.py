@@ -209,18 +209,15 @@ def main() -> None:
     confine(MEMORY_BYTES, CPU_S, _LOG_BYTES)
     try:
         with Path(sys.argv[1]).open("rb") as stream:
-            _send(_file_batches(stream), sys.stdout.buffer)
+            is_parquet = stream.read(len(MAGIC)) == MAGIC
+            stream.seek(0)
+            batches = parquet_batches(stream) if is_parquet else csv_batches(stream)
+            _send(batches, sys.stdout.buffer)
     except (ReadingsError, OSError) as error:
         words = error.strerror if isinstance(error, OSError) else str(error)
         _end(words or str(error))
     except MemoryError:  # pyarrow's error is a subclass
         _end(f"needs more than {MEMORY_BYTES >> 30} GiB to read")
-
-
-def _file_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
-    is_parquet = stream.read(len(MAGIC)) == MAGIC
-    stream.seek(0)
-    return parquet_batches(stream) if is_parquet else csv_batches(stream)
 
 
 def _send(batches: Iterator[tuple[Any, int]], out: BinaryIO) -> None:

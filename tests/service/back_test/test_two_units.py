@@ -181,7 +181,7 @@ def test_every_reading_is_counted_once(
         assert film.verdicts["normal"] > 1000
         assert film.baselines[0].cells_own > 10
     n_alarms = sum(film.n_alarms for film in found.films)
-    assert found.rate().n_alarms == len(found.alarms) == n_alarms
+    assert found.report("readings.csv", 1, 1.0).rate.n_alarms == len(found.alarms) == n_alarms
     compared_days = [
         np.ptp(life.operation.time_ns) / DAY_NS - two_units.learning_days
         for life in two_units.lives.values()
