@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
-from service.app.measuring_process import Analysis, analysis_on, reporting_loops
+from service.app.measuring_process import analysis_on, reporting_loops
 from service.app.notifications import router_of
 from service.app.process import ProcessContext, Supervision, live_view, start_loops
 from service.app.service_audit import ServiceTrail
@@ -101,7 +101,10 @@ async def run_service(
             running = tasks.create_task(runner.run(), name="run")
             if service_run.ends:
                 running.add_done_callback(lambda _: stopped.set())
-            loops = {**_reporting_loops(analysis), "clock": audit.watch_clock}
+            loops: dict[str, Loop] = {"clock": audit.watch_clock}
+            if plant.store.postgresql is not None and origin is Origin.LIVE:  # may have replicas
+                held = [*(unit.id for unit in plant.unit), PLANT]
+                loops |= reporting_loops(analysis, lambda: held)
             return [running, *analysis.start(tasks), *start_loops(loops, beats, tasks)]
 
         try:
@@ -110,12 +113,3 @@ async def run_service(
             desk.close()
             await analysis.close()
             await audit.end()
-
-
-def _reporting_loops(analysis: Analysis) -> Mapping[str, Loop]:
-    """Return the loops that serve replicas; only PostgreSQL and live data have replicas."""
-    process = analysis.process
-    if process.plant.store.postgresql is None or process.origin is not Origin.LIVE:
-        return {}
-    held = [*(unit.id for unit in process.plant.unit), PLANT]
-    return reporting_loops(analysis, lambda: held)

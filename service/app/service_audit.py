@@ -28,12 +28,6 @@ Release = Mapping[str, str]
 """Version of padwatch, version of its configuration, and origin of its data."""
 
 
-def release_of(plant: PlantFile, origin: Origin) -> Release:
-    """Describe this build with a plant file; its configuration is stored with the evidence."""
-    configuration = built_configuration(plant).version
-    return {"version": version("padwatch"), CONFIGURATION: configuration, "origin": origin.value}
-
-
 def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[Deed]:
     """Return the entries of a start; a changed configuration has its own entry before it.
 
@@ -76,7 +70,12 @@ class ServiceTrail:
     """Records starts, stops and clock steps; a failure to record does not stop the service."""
 
     def __init__(self, plant: PlantFile, origin: Origin, audit: AuditStore, clock: Clock) -> None:
-        self._release = release_of(plant, origin)
+        configuration = built_configuration(plant).version
+        self._release = {
+            "version": version("padwatch"),
+            CONFIGURATION: configuration,
+            "origin": origin.value,
+        }
         self._audit, self._clock = audit, clock
         self.refusals = Refusals(audit, clock)
 

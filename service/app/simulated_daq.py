@@ -204,7 +204,7 @@ def modbus_server(
     Parameters
     ----------
     clock
-        Paces the device; without one it produces as fast as its reader reads.
+        As in `daq_of`.
     patient
         Whether time starts with the reader's first request.
     """

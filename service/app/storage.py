@@ -296,7 +296,7 @@ def custody_of(plant: PlantFile) -> Custody:
 
 
 def retention_limits(settings: RetentionSettings) -> RetentionLimits:
-    """Return the retention limits of the plant file; an age of 0 keeps data for ever."""
+    """Return the retention limits of the plant file; an age of 0 is no limit."""
     return RetentionLimits(
         readings_ns=_age_ns(settings.readings_days),
         minutes_ns=_age_ns(settings.minutes_days),

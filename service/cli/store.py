@@ -1,9 +1,9 @@
 """`padwatch backup`, `restore`, `store check` and `readings export`."""
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -11,7 +11,7 @@ from acquisition.clock import SystemClock
 from service.app.storage import database_path, store_name
 from service.cli.accounts import access_of
 from service.cli.offline.backtest import time_ns_of
-from service.cli.offline.backtest_files import SUFFIXES, ReadingsFile, stored_histories, table_of
+from service.cli.offline.backtest_files import SUFFIXES, readings_file, stored_histories, table_of
 from service.cli.options import (
     JsonOutput,
     PlantPath,
@@ -179,8 +179,8 @@ def export(
         fail(str(error), code=2)
     with plant_store(plant) as store:
         try:
-            with ReadingsFile(out) as file:
-                n_readings = sum(_export(store.films, plant, file, start_ns, end_ns))
+            with readings_file(out) as write:
+                n_readings = sum(_export(store.films, plant, write, start_ns, end_ns))
                 if not n_readings:
                     raise StoreError(f"{store_name(plant)}: has no readings of films in this time")
         except OSError as error:
@@ -188,7 +188,7 @@ def export(
 
 
 def _export(
-    films: FilmStore, plant: PlantFile, file: ReadingsFile, start_ns: int, end_ns: int
+    films: FilmStore, plant: PlantFile, write: Callable[[Any], None], start_ns: int, end_ns: int
 ) -> Iterator[int]:
     """Write the readings of all films; yield their numbers."""
     for unit in plant.unit:
@@ -196,7 +196,7 @@ def _export(
             place, estimator = (unit.id, bearing.id), watched_estimator(unit, bearing)
             n_readings = n_simulated = 0
             for found in stored_histories(films, place, estimator, start_ns, end_ns):
-                file.write(table_of(place, found))
+                write(table_of(place, found))
                 n_readings += len(found)
                 n_simulated += int(found.is_simulated.sum())
             simulated = f", {n_simulated} of them simulated" if n_simulated else ""

@@ -53,13 +53,11 @@ class UnitCauses:
         place, rows = (bearing, direction), np.arange(first, last)
         known = np.isfinite(self._readings.deviation[response.places.index(place), first:last])
         newest = self._readings.columns(rows[known][-MEAN_READINGS:])
-        return attribute(place, response, newest, self._brackets())
-
-    def _brackets(self) -> FloatArray | None:
-        known = [self._rules.bracket_n_per_m.get(run.place) for run in self._runs]
-        if not all(known):
-            return None
-        return np.repeat(np.array(known, np.float64), len(DIRECTIONS))
+        known_n_per_m = [self._rules.bracket_n_per_m.get(run.place) for run in self._runs]
+        brackets = None
+        if all(known_n_per_m):
+            brackets = np.repeat(np.array(known_n_per_m, np.float64), len(DIRECTIONS))
+        return attribute(place, response, newest, brackets)
 
     def _learned(self, period: Period) -> ShaftResponse | None:
         if not self._has_amplitudes or period.learned == period.begin:

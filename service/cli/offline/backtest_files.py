@@ -3,7 +3,7 @@
 import re
 import stat
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import closing
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -187,8 +187,9 @@ def _side(place: Place, found: FilmHistory, side: int) -> Any:
     )
 
 
-class ReadingsFile:
-    """Writer of a CSV or Parquet file; a context that removes the file after an error.
+@contextmanager
+def readings_file(path: Path) -> Iterator[Callable[[Any], None]]:
+    """Create a CSV or Parquet file and yield a function that adds rows; an error removes the file.
 
     Parameters
     ----------
@@ -200,26 +201,17 @@ class ReadingsFile:
     OSError
         If the file exists, or cannot be written.
     """
+    make: Any = pacsv.CSVWriter if path.suffix == ".csv" else pq.ParquetWriter
+    with path.open("xb") as file, ExitStack() as stack:
+        writers: list[Any] = []
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._writer: Any = None
-        self._file = path.open("xb")
+        def write(table: Any) -> None:
+            if not writers:
+                writers.append(stack.enter_context(make(file, table.schema)))
+            writers[0].write_table(table)
 
-    def __enter__(self) -> "ReadingsFile":
-        return self
-
-    def __exit__(self, kind: object, *_: object) -> None:
-        if self._writer is not None:
-            self._writer.close()
-        self._file.close()
-        if kind is not None:
-            self._path.unlink()
-
-    def write(self, table: Any) -> None:
-        """Add rows."""
-        if self._writer is None:
-            is_csv = self._path.suffix == ".csv"
-            make: Any = pacsv.CSVWriter if is_csv else pq.ParquetWriter
-            self._writer = make(self._file, table.schema)
-        self._writer.write_table(table)
+        try:
+            yield write
+        except BaseException:
+            path.unlink()
+            raise
