@@ -100,7 +100,10 @@ def _routes(settings: ReceiverSettings) -> Iterator[Route]:
 def _receiver(
     settings: ReceiverSettings, name: str, address: str, carrier: Webhook | Mail
 ) -> Receiver:
-    quiet = settings.quiet
+    quiet = None
+    if settings.quiet is not None:
+        start, end = (time.fromisoformat(t) for t in (settings.quiet.start, settings.quiet.end))
+        quiet = QuietHours(start, end, ZoneInfo(settings.quiet.time_zone))
     return Receiver(
         name=name,
         kind=settings.kind,
@@ -108,12 +111,7 @@ def _receiver(
         carrier=carrier,
         max_retry_s=settings.max_retry_s,
         max_age_s=SECONDS_PER_HOUR * settings.max_age_h,
-        quiet=quiet
-        and QuietHours(
-            time.fromisoformat(quiet.start),
-            time.fromisoformat(quiet.end),
-            ZoneInfo(quiet.time_zone),
-        ),
+        quiet=quiet,
     )
 
 
