@@ -1,9 +1,9 @@
-"""`padwatch acquire` and `padwatch analyse`: measuring shared between processes."""
+"""`padwatch acquire` and `padwatch analyse`: measuring divided between processes."""
 
 import asyncio
 import socket
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 
 from prometheus_client.metrics_core import Metric
 from prometheus_client.process_collector import ProcessCollector
@@ -11,12 +11,10 @@ from prometheus_client.process_collector import ProcessCollector
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
 from core.monitor.monitor import UnitMonitor
-from core.samples.gaps import Reach
-from service.api.http.listening import url_of
-from service.app.health_page import Health, HealthServer
+from service.app.health_page import Health, health_server
 from service.app.measuring_process import Analysis, analysis_on, reporting_loops
 from service.app.notifications import router_of
-from service.app.process import Ground, Supervision, live_view
+from service.app.process import ProcessContext, Supervision, live_view, start_loops
 from service.app.service_health import recording_error
 from service.app.storage import database_path, open_store
 from service.cluster.consumer import Consumer, consumer_metrics
@@ -27,21 +25,19 @@ from service.cluster.session import identity_of
 from service.cluster.silent_units import SilenceWatch, SilentUnits, silences_s
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Acquirer, Bus
-from service.measuring.analyser import BUS_CAPACITY, UnitMemory
+from service.measuring.analyser import BUS_CAPACITY
 from service.measuring.metrics import store_info
 from service.measuring.reported_alarms import SHARED
 from service.measuring.service_alarms import StreamStatus
 from service.measuring.sources import WatchedUnit
 from service.measuring.timings import TimedMonitor, Timings
 from service.notifications.message import LiveContext
-from service.runtime.heartbeats import Heartbeats, Loop, Pulse
-from service.runtime.process import stop_on_signals
+from service.runtime.heartbeats import Heartbeats, Pulse
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
 from service.settings.storage import Origin
 from service.store.holds import only_one
-from service.store.sharing import StreamPosition
 
 DRAIN_S = 3.0
 """Time for the servers to accept waiting blocks when the process stops."""
@@ -62,41 +58,29 @@ async def run_acquire(
     ----------
     units
         Units whose devices are read; their monitors are not used.
-    listener
-        Where the health page is served.
-    announce
-        Called with its URL once it answers.
+    listener, announce
+        As in `ProcessServer`, for the health page.
     """
     beats, live = Heartbeats(clock), live_view(plant, clock)
     identities = {unit.id: identity_of(plant, unit) for unit in plant.unit if unit.id in units}
     publisher = Publisher(plant, settings, identities, clock)
     acquirer = Acquirer(units, live, clock, publisher.publish, publisher.publish_link, beats)
-    health = HealthServer(_health(publisher, live, beats, list(units)), listener, clock)
     supervision = Supervision(manager, beats, live, units, clock)
-    stopped = stop_on_signals()
-    async with asyncio.TaskGroup() as tasks:
-        acquiring = tasks.create_task(acquirer.run(), name="acquire")
-        publishing = tasks.create_task(beats.tend("publish", publisher.run), name="publish")
-        server = health.start(tasks, beats)
-        await health.started()
-        supervision.ready()
-        announce(url_of(listener))
-        supervising = tasks.create_task(supervision.run(), name="supervise")
-        await stopped.wait()
-        supervision.stopping()
-        health.stop()
-        supervising.cancel()
-        acquiring.cancel()
-        await _drain(publisher)
-        publishing.cancel()
-        await asyncio.wait([server])
+    acquiring: list[asyncio.Task[None]] = []
 
+    def begin(tasks: asyncio.TaskGroup, _: asyncio.Event) -> list[asyncio.Task[None]]:
+        acquiring.append(tasks.create_task(acquirer.run(), name="acquire"))
+        return [*acquiring, *start_loops({"publish": publisher.run}, beats, tasks)]
 
-async def _drain(publisher: Publisher) -> None:
-    try:
-        await asyncio.wait_for(publisher.waiting.drained(), DRAIN_S)
-    except TimeoutError:
-        return  # the devices' rings may still hold the samples; otherwise the index shows the gap
+    async def drain() -> None:
+        for task in acquiring:
+            task.cancel()
+        with suppress(TimeoutError):  # then the rings of the devices may still hold the samples
+            await asyncio.wait_for(publisher.waiting.drained(), DRAIN_S)
+
+    health = _health(publisher, live, beats, list(units))
+    server = health_server(health, listener, clock, announce)
+    await server.run(supervision, beats, begin, drain)
 
 
 def _health(publisher: Publisher, live: LiveView, beats: Heartbeats, units: list[str]) -> Health:
@@ -135,10 +119,8 @@ async def run_analyse(
         The whole plant.
     monitors
         Monitors of the units of the partition.
-    listener
-        Where the health page is served.
-    announce
-        Called with its URL once it answers.
+    listener, announce
+        As in `ProcessServer`, for the health page.
 
     Raises
     ------
@@ -155,18 +137,24 @@ async def run_analyse(
             stack.enter_context(only_one(database_path(plant)))
         store = open_store(part, Origin.LIVE, router_of(part, Origin.LIVE, alarm_context, clock))
         stack.callback(store.close)
-        ground = Ground(
+        process = ProcessContext(
             part, Origin.LIVE, clock, store, live, Heartbeats(clock), Timings(monitors, clock)
         )
-        analysing = Analysing(plant, partition, settings, monitors, ground, alarm_context)
+        analysing = Analysing(plant, partition, settings, monitors, process, alarm_context)
+        server = health_server(analysing.health(), listener, clock, announce)
+        supervision = Supervision(manager, process.beats, live, monitors, clock)
         try:
-            await analysing.run(listener, announce, manager)
+            await server.run(
+                supervision,
+                process.beats,
+                lambda tasks, _: [tasks.create_task(analysing.run(), name="analyse")],
+            )
         finally:
             await analysing.close()
 
 
 class Analysing:
-    """The process while it stands by, analyses and stops."""
+    """Analysis of the units of a partition: stand by, analyse, stop."""
 
     def __init__(
         self,
@@ -174,41 +162,15 @@ class Analysing:
         partition: Partition,
         settings: StreamSettings,
         monitors: Mapping[str, UnitMonitor],
-        ground: Ground,
+        process: ProcessContext,
         alarm_context: LiveContext,
     ) -> None:
         self._share, self._settings = partition.share_of(plant), settings
-        self._monitors, self._ground, self._alarm_context = monitors, ground, alarm_context
+        self._monitors, self._process, self._around = monitors, process, alarm_context
         self._plant = plant
-        self._holds = Holds(ground.store, monitors, ground.clock)
-        self._stored: dict[str, StreamPosition] = {}
-        self._memories: dict[str, UnitMemory] = {}
+        self._holds = Holds(process.store, monitors, process.clock)
         self._analysis: Analysis | None = None
         self._consumer: Consumer | None = None
-        self._silence: SilenceWatch | None = None
-        self._silent_units: SilentUnits | None = None
-
-    async def run(
-        self, listener: socket.socket, announce: Callable[[str], None], manager: ServiceManager
-    ) -> None:
-        """Stand by, analyse, stop."""
-        ground = self._ground
-        health = HealthServer(self._health(), listener, ground.clock)
-        supervision = Supervision(manager, ground.beats, ground.live, self._monitors, ground.clock)
-        stopped = stop_on_signals()
-        async with asyncio.TaskGroup() as tasks:
-            server = health.start(tasks, ground.beats)
-            await health.started()
-            supervision.ready()
-            announce(url_of(listener))
-            supervising = tasks.create_task(supervision.run(), name="supervise")
-            analysing = tasks.create_task(self._analyse(), name="analyse")
-            await stopped.wait()
-            supervision.stopping()
-            health.stop()
-            supervising.cancel()
-            analysing.cancel()
-            await asyncio.wait([server])
 
     async def close(self) -> None:
         """Write all pending data, then release the units to other processes."""
@@ -216,52 +178,77 @@ class Analysing:
             await self._analysis.close()
         self._holds.release()
 
-    async def _analyse(self) -> None:
-        ground = self._ground
+    async def run(self) -> None:
+        """Wait for the units of this process, then analyse until cancelled."""
+        process = self._process
+        store, clock = process.store, process.clock
         await self._holds.take()
-        bus = Bus(BUS_CAPACITY, ground.clock)  # always empty: blocks wait in the stream
-        timings, untimed = ground.timings, self._monitors.items()
+        bus = Bus(BUS_CAPACITY, clock)  # always empty: blocks wait in the stream
+        timings, untimed = process.timings, self._monitors.items()
         monitors = {unit: TimedMonitor(monitor, timings) for unit, monitor in untimed}
-        self._stored = {
+        stored = {
             unit: found
             for unit in monitors
-            if (found := await asyncio.to_thread(ground.store.position, unit)) is not None
+            if (found := await asyncio.to_thread(store.position, unit)) is not None
         }
-        self._memories = memories_of(self._stored.values())
+        memories = memories_of(stored.values())
         stream = StreamStatus(self._trouble, self._behind_s)
-        analysis = await analysis_on(
-            ground, monitors, bus, self._alarm_context, self._share, self._memories, stream
+        analysis = self._analysis = await analysis_on(
+            process, monitors, bus, self._around, self._share, memories, stream
         )
-        self._analysis = analysis
-        consumer = Consumer(
-            self._plant, self._settings, self._begin, analysis.recorder, ground.clock
-        )
+
+        async def begin(stream: str, newest: int) -> dict[str, UnitProgress]:
+            """Return where each unit resumes."""
+            parts = (analysis.analyser, process.live, analysis.recorder, clock)
+            progress = {}
+            for unit in process.plant.unit:
+                reach = await asyncio.to_thread(store.reach, unit.id)
+                position = usable(stored.get(unit.id), stream, newest)
+                identity, memory = identity_of(self._plant, unit), memories.get(unit.id)
+                done = reach if position is None else None
+                progress[unit.id] = UnitProgress(identity, stream, position, memory, *parts, done)
+            return progress
+
+        consumer = Consumer(self._plant, self._settings, begin, analysis.recorder, clock)
         self._consumer = consumer
         everywhere = [unit.id for unit in self._plant.unit]
-        silent = SilentUnits(everywhere, analysis.alarms, ground.store, ground.clock)
-        self._silent_units = silent
-        after_s = silences_s(ground.plant.unit, self._settings.silent_after_s)
-        self._silence = SilenceWatch(after_s, analysis.analyser, ground.live, ground.clock)
-        tend = ground.beats.tend
+        silent = SilentUnits(everywhere, analysis.alarms, store, clock)
+        after_s = silences_s(process.plant.unit, self._settings.silent_after_s)
+        silence = SilenceWatch(after_s, analysis.analyser, process.live, clock)
+
+        async def watch(pulse: Pulse) -> None:
+            """Check that this process still holds its units, and which units are silent."""
+            while True:
+                pulse.beat(WATCH_EVERY_S)
+                await asyncio.to_thread(self._holds.require)
+                silence.look(consumer.units, consumer.trouble, consumer.waiting)
+                await clock.sleep(WATCH_EVERY_S)
+
+        def held() -> list[str]:
+            """Return the units and shared parts that this process publishes now."""
+            service = [PLANT] if self._share.leads else []
+            return [*self._monitors, *service, *([SHARED] if silent.is_watching else [])]
+
+        async def deliver(pulse: Pulse) -> None:
+            pulse.rest()  # each sender has its own heartbeat
+            await analysis.deliveries.run(process.beats)
+            await asyncio.Event().wait()  # without receivers there is nothing to do
+
+        shared = {**analysis.shared_loops, "deliver": deliver, "silent units": silent.run}
+        leadership = Leadership(store.hold, shared, process.beats, clock)
+        loops = {
+            "lead": leadership.run,
+            "record": analysis.recorder.run,
+            "stream": consumer.run,
+            "watch": watch,
+            **reporting_loops(analysis, held),
+        }
         async with asyncio.TaskGroup() as tasks:
             analysis.start(tasks)
-            shared = {**shared_work(analysis), "silent units": silent.run}
-            leading = Leadership(ground.store.hold, shared, ground.beats, ground.clock)
-            tasks.create_task(tend("lead", leading.run), name="lead")
-            tasks.create_task(tend("record", analysis.recorder.run), name="record")
-            tasks.create_task(tend("stream", consumer.run), name="stream")
-            tasks.create_task(tend("watch", self._watch), name="watch")
-            for name, loop in reporting_loops(analysis, self._held).items():
-                tasks.create_task(tend(name, loop), name=name)
-
-    def _held(self) -> list[str]:
-        """Return the units and shared parts that this process publishes now."""
-        is_watching = self._silent_units is not None and self._silent_units.is_watching
-        service = [PLANT] if self._share.leads else []
-        return [*self._monitors, *service, *([SHARED] if is_watching else [])]
+            start_loops(loops, process.beats, tasks)
 
     def _trouble(self) -> str | None:
-        """Why no blocks come over the stream."""
+        """Return why no blocks arrive from the stream, or None."""
         return None if self._consumer is None else self._consumer.trouble
 
     def _behind_s(self) -> float:
@@ -269,81 +256,38 @@ class Analysing:
         units = self._consumer.units if self._consumer else {}
         return max((progress.behind_s for progress in units.values()), default=0.0)
 
-    async def _begin(self, stream: str, newest: int) -> dict[str, UnitProgress]:
-        """Return where each unit resumes."""
-        reaches = {
-            unit: await asyncio.to_thread(self._ground.store.reach, unit) for unit in self._monitors
-        }
-        return {
-            unit: self._progress(unit, stream, newest, reach) for unit, reach in reaches.items()
-        }
+    def health(self) -> Health:
+        """Return the contents of the health page."""
 
-    def _progress(self, unit: str, stream: str, newest: int, reach: Reach | None) -> UnitProgress:
-        ground, analysis = self._ground, self._analysis
-        if analysis is None:
-            raise RuntimeError("there is no analysis yet")
-        stored = usable(self._stored.get(unit), stream, newest)
-        settings = next(its for its in ground.plant.unit if its.id == unit)
-        identity = identity_of(self._plant, settings)
-        parts = (analysis.analyser, ground.live, analysis.recorder, ground.clock)
-        done = reach if stored is None else None
-        return UnitProgress(identity, stream, stored, self._memories.get(unit), *parts, done)
-
-    async def _watch(self, pulse: Pulse) -> None:
-        """Check that this process still holds its units, and which units are silent."""
-        while True:
-            pulse.beat(WATCH_EVERY_S)
-            await asyncio.to_thread(self._holds.require)
-            consumer, silence = self._consumer, self._silence
-            if consumer is not None and silence is not None:
-                silence.look(consumer.units, consumer.trouble, consumer.waiting)
-            await self._ground.clock.sleep(WATCH_EVERY_S)
-
-    def _health(self) -> Health:
         def checks() -> dict[str, str | None]:
             consumer = self._consumer
             waits_for = self._holds.waits_for
-            loops = {f"loop {name}": t for name, t in self._ground.beats.look().items()}
+            loops = {f"loop {name}": t for name, t in self._process.beats.look().items()}
             return {
                 "units": None if waits_for is None else f"standing by: {waits_for}",
-                "store": self._ground.live.store_error,
+                "store": self._process.live.store_error,
                 "stream": "not begun" if consumer is None else self._trouble(),
                 **loops,
             }
 
         def shown() -> dict[str, str]:
-            units = {u: self._ground.live.status(u).state.value for u in self._monitors}
-            shown = {f"unit {unit}": state for unit, state in units.items()}
-            shown["database"] = self._ground.store.kind
-            if self._analysis is not None:  # the plant has one alarm of each kind
-                shown |= _of_this_host(self._analysis)
+            live = self._process.live
+            shown = {f"unit {unit}": live.status(unit).state.value for unit in self._monitors}
+            shown["database"] = self._process.store.kind
+            if (parts := self._analysis) is not None:
+                # conditions of this host; only the leading process raises alarms about them
+                shown |= {
+                    "disk": str(parts.space),
+                    "stored data": parts.soundness.trouble or "ok",
+                    "captures": parts.captures.trouble or "ok",
+                    "recordings": recording_error(parts.tape, parts.recordings) or "ok",
+                }
             return shown
 
         def metrics() -> Iterator[Metric]:
             if self._consumer is not None:
                 yield from consumer_metrics(self._consumer)
-            yield store_info(self._ground.store.kind)
+            yield store_info(self._process.store.kind)
             yield from ProcessCollector(registry=None).collect()
 
         return Health(checks, shown, metrics)
-
-
-def _of_this_host(analysis: Analysis) -> dict[str, str]:
-    """Return conditions of this host; only the leading process raises alarms about them."""
-    troubles = {
-        "stored data": analysis.soundness.trouble,
-        "captures": analysis.captures.trouble,
-        "recordings": recording_error(analysis.tape, analysis.recordings),
-    }
-    return {"disk": str(analysis.space), **{name: why or "ok" for name, why in troubles.items()}}
-
-
-def shared_work(analysis: Analysis) -> dict[str, Loop]:
-    """Return the loops that one process runs for the whole plant."""
-
-    async def deliver(pulse: Pulse) -> None:
-        pulse.rest()  # each sender has its own heartbeat
-        await analysis.deliveries.run(analysis.ground.beats)
-        await asyncio.Event().wait()  # without receivers there is nothing to do
-
-    return {**analysis.shared_loops, "deliver": deliver}

@@ -1,10 +1,9 @@
 """Health page of a process without an API: /livez, /readyz and /metrics."""
 
-import asyncio
 import socket
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from types import SimpleNamespace
 
 from fastapi import FastAPI, Response
 from fastapi.responses import JSONResponse
@@ -14,7 +13,7 @@ from prometheus_client.metrics_core import Metric
 from acquisition.clock import Clock
 from service.api.http.protocol import GuardedConfig
 from service.api.http.server import GuardedServer
-from service.runtime.heartbeats import Heartbeats
+from service.app.process import ProcessServer
 from service.settings.processes import HttpLimitSettings
 
 TEXT = exposition.CONTENT_TYPE_PLAIN_0_0_4
@@ -37,17 +36,6 @@ class Health:
     checks: Callable[[], Mapping[str, str | None]]
     shown: Callable[[], Mapping[str, str]]
     metrics: Callable[[], Iterable[Metric]]
-
-
-@dataclass(frozen=True)
-class _Families:
-    """Collector of the families, in place of a registry."""
-
-    families: Callable[[], Iterable[Metric]]
-
-    def collect(self) -> Iterable[Metric]:
-        """Return all families."""
-        return self.families()
 
 
 def health_app(health: Health) -> FastAPI:
@@ -74,9 +62,8 @@ def health_app(health: Health) -> FastAPI:
     @app.get("/metrics")
     async def metrics() -> Response:
         """Return the metrics in the text format of Prometheus."""
-        return Response(
-            exposition.generate_latest(_Families(health.metrics)), headers={"content-type": TEXT}
-        )
+        families = SimpleNamespace(collect=health.metrics)  # in place of a registry
+        return Response(exposition.generate_latest(families), headers={"content-type": TEXT})
 
     return app
 
@@ -85,23 +72,9 @@ HOST = "127.0.0.1"
 """Loopback only; other hosts use a proxy or an agent on this computer."""
 
 
-class HealthServer:
-    """Serves the health page on a socket."""
-
-    def __init__(self, health: Health, listener: socket.socket, clock: Clock) -> None:
-        config = GuardedConfig(health_app(health), HttpLimitSettings(), [HOST], clock.monotonic_s)
-        self._server, self._listener = GuardedServer(config), listener
-
-    def start(self, tasks: asyncio.TaskGroup, beats: Heartbeats) -> asyncio.Task[None]:
-        """Start the server; the task ends after `stop`."""
-        serve = partial(self._server.run_on, self._listener)
-        return tasks.create_task(beats.tend("health", serve), name="health")
-
-    async def started(self) -> None:
-        """Wait until the server answers."""
-        while not self._server.started:
-            await asyncio.sleep(0.01)
-
-    def stop(self) -> None:
-        """Stop accepting requests."""
-        self._server.should_exit = True
+def health_server(
+    health: Health, listener: socket.socket, clock: Clock, announce: Callable[[str], None]
+) -> ProcessServer:
+    """Build the server of the health page on a socket."""
+    config = GuardedConfig(health_app(health), HttpLimitSettings(), [HOST], clock.monotonic_s)
+    return ProcessServer("health", GuardedServer(config), listener, announce)

@@ -10,7 +10,7 @@ from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.api.load import LoadWatch
 from service.app.notifications import receivers_of
-from service.app.process import Ground
+from service.app.process import ProcessContext, start_loops
 from service.app.service_health import Pressure, health_of
 from service.app.storage import (
     captures_of,
@@ -24,7 +24,7 @@ from service.app.storage import (
 from service.cluster.reported_commands import CommandWorker
 from service.cluster.reported_state import Reporter, process_name
 from service.measuring.acquirer import Bus
-from service.measuring.alarm_engine import WHOLE, AlarmEngine, Listener, PlantPart, alarm_engine
+from service.measuring.alarm_engine import WHOLE, AlarmEngine, PlantPart, alarm_engine
 from service.measuring.analyser import NO_MEMORIES, Analyser, UnitMemory
 from service.measuring.films import FilmMonitor, film_monitor
 from service.measuring.integrity import IntegrityMonitor
@@ -48,7 +48,7 @@ from service.store.loops import Retaining, Rolling, Scrubbing
 class Analysis:
     """Parts of the analysis; the caller feeds `analyser` and runs `recorder`."""
 
-    ground: Ground
+    process: ProcessContext
     part: PlantPart
     analyser: Analyser
     recorder: Recorder
@@ -68,13 +68,12 @@ class Analysis:
 
     def start(self, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
         """Start the background loops; they run until they are cancelled."""
-        beats, loops = self.ground.beats, self.own_loops
-        if self.part == WHOLE:  # no other process shares the plant
-            loops = {**loops, **self.shared_loops}
-        begun = [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
-        if self.part == WHOLE:
-            begun.append(tasks.create_task(self.deliveries.run(beats), name="deliver"))
-        return begun
+        beats, loops = self.process.beats, self.own_loops
+        if self.part != WHOLE:
+            return start_loops(loops, beats, tasks)
+        # no other process shares the plant
+        begun = start_loops(loops | self.shared_loops, beats, tasks)
+        return [*begun, tasks.create_task(self.deliveries.run(beats), name="deliver")]
 
     @property
     def own_loops(self) -> dict[str, Loop]:
@@ -89,7 +88,7 @@ class Analysis:
             "load": self.load.run,
             "soundness": self.soundness.run,
         }
-        if self.ground.origin is Origin.LIVE:  # a replay is not the history of a machine
+        if self.process.origin is Origin.LIVE:  # a replay is not the history of a machine
             loops |= {"learn": self.films.run, "recordings": self.recordings.run}
         return loops
 
@@ -97,9 +96,9 @@ class Analysis:
     def shared_loops(self) -> dict[str, Loop]:
         """Loops that one process runs for the whole plant, besides the delivery of messages."""
         loops: dict[str, Loop] = {"gather": self.rolling.run}
-        if self.ground.origin is Origin.LIVE:
+        if self.process.origin is Origin.LIVE:
             loops["retain"] = self.retaining.run
-            loops["scrub"] = Scrubbing(self.ground.store.integrity, self.ground.clock).run
+            loops["scrub"] = Scrubbing(self.process.store.integrity, self.process.clock).run
         return loops
 
     async def close(self) -> None:
@@ -112,7 +111,7 @@ class Analysis:
 
 
 async def analysis_on(
-    ground: Ground,
+    process: ProcessContext,
     monitors: Mapping[str, UnitMonitor],
     bus: Bus,
     alarm_context: LiveContext,
@@ -140,15 +139,15 @@ async def analysis_on(
     StoreError
         If stored state cannot be read; a start without it would lose it.
     """
-    plant, origin, store, clock = ground.plant, ground.origin, ground.store, ground.clock
-    live = ground.live
+    plant, origin, store, clock = process.plant, process.origin, process.store, process.clock
+    live = process.live
     soundness = IntegrityMonitor(store, clock, live)
     await soundness.look()  # before anything is written
     if origin is Origin.LIVE:  # a replay starts anew and has no gap
         for unit, monitor in monitors.items():
             monitor.go_on(await asyncio.to_thread(store.reach, unit))
     deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)
-    commits = ground.timings.commits
+    commits = process.timings.commits
     recorder = Recorder(
         store,
         live,
@@ -167,13 +166,18 @@ async def analysis_on(
     look = health_of(
         monitors, live, recorder, captures, bus, space, load, tape, recordings, soundness, stream
     )
+
+    def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:
+        captures.take(block, news)
+        tape.take(block)
+
     alarms = await alarm_engine(
         plant,
         origin,
         store,
         recorder.put,
         clock,
-        _listener(captures, tape),
+        listen,
         vector_rows(plant),
         look,
         part,
@@ -189,7 +193,7 @@ async def analysis_on(
     references = ReferencesInForce(monitors, store, clock)
     await references.look()  # before the first result
     return Analysis(
-        ground=ground,
+        process=process,
         part=part,
         analyser=Analyser(monitors, live, recorder, alarms, films),
         recorder=recorder,
@@ -209,16 +213,6 @@ async def analysis_on(
     )
 
 
-def _listener(captures: Captures, tape: ContinuousRecorder) -> Listener:
-    """Return a listener that passes every judged block to both recorders of samples."""
-
-    def listen(block: SampleBlock, news: Sequence[AlarmNews]) -> None:
-        captures.take(block, news)
-        tape.take(block)
-
-    return listen
-
-
 def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> Mapping[str, Loop]:
     """Return the loops that publish the state of units and carry out operators' commands.
 
@@ -228,10 +222,10 @@ def reporting_loops(analysis: Analysis, held: Callable[[], Collection[str]]) -> 
         Returns the units of this process; `PLANT` if it also publishes alarms without a unit, and
         `SHARED` if it does the shared work.
     """
-    ground, process = analysis.ground, process_name()
-    store, parts = ground.store, (analysis.alarms, analysis.films)
+    process, name = analysis.process, process_name()
+    store, parts = process.store, (analysis.alarms, analysis.films)
     reporter = Reporter(
-        process, ground.plant.unit, held, ground.live, *parts, store.unit_states, ground.clock
+        name, process.plant.unit, held, process.live, *parts, store.unit_states, process.clock
     )
-    carrying_out = CommandWorker(process, held, *parts, analysis.recorder, store, ground.clock)
+    carrying_out = CommandWorker(name, held, *parts, analysis.recorder, store, process.clock)
     return {"report": reporter.run, "commands": carrying_out.run}

@@ -1,15 +1,21 @@
-"""Parts that every process of a plant shares: context, live view, supervision."""
+"""Parts that every process of a plant shares: context, live view, supervision, server."""
 
-from collections.abc import Iterable
+import asyncio
+import socket
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import structlog
 
 from acquisition.clock import Clock
+from service.api.http.listening import url_of
+from service.api.http.server import GuardedServer
 from service.live.live_view import LinkState, LiveView, UnitStatus
 from service.measuring.timings import Timings
-from service.runtime.heartbeats import Heartbeats
+from service.runtime.heartbeats import Heartbeats, Loop
+from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import ServiceManager
 from service.settings.core_values import analysis_of
 from service.settings.plant import PlantFile
@@ -22,7 +28,7 @@ STALE_HOPS = 2.5
 
 
 @dataclass(frozen=True)
-class Ground:
+class ProcessContext:
     """Context of one process: plant, store, live view, heartbeats and timings.
 
     Parameters
@@ -41,11 +47,6 @@ class Ground:
     beats: Heartbeats
     timings: Timings
 
-    @property
-    def refresh_s(self) -> float:
-        """Seconds between results of the slowest unit."""
-        return refresh_s(self.plant)
-
 
 def live_view(plant: PlantFile, clock: Clock) -> LiveView:
     """Return the live view of a plant before its first samples."""
@@ -60,6 +61,13 @@ def refresh_s(plant: PlantFile) -> float:
         / unit.sampling_hz
         for unit in plant.unit
     )
+
+
+def start_loops(
+    loops: Mapping[str, Loop], beats: Heartbeats, tasks: asyncio.TaskGroup
+) -> list[asyncio.Task[None]]:
+    """Start loops as tasks with their names; their heartbeats are recorded."""
+    return [tasks.create_task(beats.tend(name, loop), name=name) for name, loop in loops.items()]
 
 
 log = structlog.get_logger()
@@ -91,7 +99,7 @@ class Supervision:
     ) -> None:
         self._manager, self._beats, self._live, self._clock = manager, beats, live, clock
         self._units = tuple(units)
-        self._told: set[str] = set()
+        self._logged: set[str] = set()
         half_s = LOOK_EVERY_S if manager.watchdog_s is None else manager.watchdog_s / 2.0
         self._every_s = min(LOOK_EVERY_S, half_s)
 
@@ -113,9 +121,12 @@ class Supervision:
         """Check the loops once."""
         troubles = self._beats.troubles
         words = [f"{name} {trouble}" for name, trouble in troubles.items()]
-        if set(troubles) != self._told:
-            self._told = set(troubles)
-            _log(words)
+        if set(troubles) != self._logged:
+            self._logged = set(troubles)
+            if words:
+                log.error("a loop of the program is not alive", loops=words)
+            else:
+                log.info("all loops are alive again")
         if words:
             self._manager.notify(STATUS="; ".join(words))
         else:
@@ -126,8 +137,69 @@ class Supervision:
         return f"{states.count(LinkState.CONNECTED)} of {len(states)} units connected"
 
 
-def _log(words: list[str]) -> None:
-    if words:
-        log.error("a loop of the program is not alive", loops=words)
-    else:
-        log.info("all loops are alive again")
+Begin = Callable[[asyncio.TaskGroup, asyncio.Event], list[asyncio.Task[None]]]
+"""Starts the tasks of a process; setting the event stops the process."""
+
+
+async def _nothing() -> None:
+    """Do nothing."""
+
+
+@dataclass(frozen=True)
+class ProcessServer:
+    """HTTP server of a process; the process runs from its start to its end.
+
+    Parameters
+    ----------
+    name
+        Name of the server's heartbeat.
+    announce
+        Called with the URL once the server answers.
+    prepare
+        Preparation that can follow the first answers.
+    """
+
+    name: str
+    server: GuardedServer
+    listener: socket.socket
+    announce: Callable[[str], None]
+    prepare: Callable[[], Awaitable[None]] = _nothing
+
+    async def run(
+        self,
+        supervision: Supervision,
+        beats: Heartbeats,
+        begin: Begin,
+        drain: Callable[[], Awaitable[None]] = _nothing,
+    ) -> None:
+        """Serve, and run the tasks of the process, until SIGINT or SIGTERM.
+
+        Parameters
+        ----------
+        begin
+            Starts the tasks of the process, which are cancelled at its end.
+        drain
+            Awaited before the tasks are cancelled.
+        """
+        stopped = stop_on_signals()
+        async with asyncio.TaskGroup() as tasks:
+            begun = begin(tasks, stopped)
+            serve: Loop = partial(self.server.run_on, self.listener)
+            [serving] = start_loops({self.name: serve}, beats, tasks)
+            begun.append(tasks.create_task(self._announce(supervision), name="announce"))
+            supervising = tasks.create_task(supervision.run(), name="supervise")
+            await stopped.wait()
+            supervision.stopping()
+            supervising.cancel()
+            self.server.should_exit = True
+            await drain()
+            for task in begun:
+                task.cancel()
+            await asyncio.wait([serving])
+
+    async def _announce(self, supervision: Supervision) -> None:
+        while not self.server.started:
+            await asyncio.sleep(0.01)
+        supervision.ready()
+        self.announce(url_of(self.listener, has_tls=self.server.config.is_ssl))
+        await self.prepare()

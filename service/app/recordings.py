@@ -1,21 +1,25 @@
-"""Recordings of a unit: writers, readers, and recordings as sources."""
+"""Recordings of a plant's units: writers, selection, and replay in place of the sources."""
 
-from collections.abc import Iterable
+import threading
+from collections.abc import AsyncGenerator, AsyncIterator, Iterable
+from contextlib import AsyncExitStack, aclosing, asynccontextmanager
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 from acquisition.clock import Clock
-from acquisition.errors import ConfigError
+from acquisition.errors import ConfigError, LinkError
 from acquisition.recordings.manifest import read_manifest
 from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.source import RecordingSource, Selection, select
 from acquisition.recordings.writer import RecordingWriter
-from acquisition.simulated.devices.recorded import RecordedFeed
-from acquisition.simulated.feed import SampleFeed
 from acquisition.source import SampleSource
+from core.samples.blocks import SampleBlock
+from core.units import NS_PER_S
 from service.settings.adapter_values import recorded_unit
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.plant import PlantFile
+from service.settings.storage import StoreSettings
 from service.settings.units import UnitSettings
 
 ANALYSED_S = 10.0
@@ -31,17 +35,6 @@ def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> Recordin
         If the folder exists or cannot be created.
     """
     return RecordingWriter(folder, recorded_unit(unit), made_by, first_decides=True)
-
-
-def recording_of(folder: Path) -> Recording:
-    """Open a finished recording and check all of it.
-
-    Raises
-    ------
-    ConfigError
-        If the recording is damaged.
-    """
-    return open_recording(folder)
 
 
 def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, Path]:
@@ -77,21 +70,6 @@ def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
     return select(recording.manifest, machine, slow_units)
 
 
-def recording_source(
-    recording: Recording, selection: Selection, unit: UnitSettings | None, clock: Clock
-) -> SampleSource:
-    """Return a recording as an unpaced source.
-
-    Parameters
-    ----------
-    unit
-        Unit whose calibration replaces the recorded one, if given.
-    """
-    if unit is not None:
-        selection = replace(selection, calibration=calibration_of(unit))
-    return RecordingSource(recording, clock, selection, block_s=ANALYSED_S)
-
-
 def replay_source(
     folder: Path, unit: UnitSettings, clock: Clock, speed: float | None
 ) -> SampleSource:
@@ -112,13 +90,78 @@ def replay_source(
     return RecordingSource(recording, clock, selection, speed)
 
 
-def recorded_feed(folder: Path, unit: UnitSettings) -> SampleFeed:
-    """Return a recording as the feed of a simulated DAQ.
+REPLAYS = "replays"
+"""Folder below the plant's data folder, separate from its live database."""
 
-    Raises
-    ------
-    ConfigError
-        If it is damaged or does not fit the unit.
+
+def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> PlantFile:
+    """Return the replayed part of a plant: own folder, SQLite, reachable from this host only."""
+    closed = {"host": "127.0.0.1", "socket": None, "tls": None}
+    service = plant.service.model_copy(update={"data_folder": str(folder), **closed})
+    chosen = tuple(unit for unit in plant.unit if unit.id in set(units))
+    alone = {"unit": chosen, "service": service, "store": StoreSettings()}
+    return plant.model_copy(update=alone)
+
+
+def replay_folder(plant: PlantFile, recordings: Iterable[Path], now_ns: int) -> Path:
+    """Return the folder of the results of one replay, named after recordings and time."""
+    moment = datetime.fromtimestamp(now_ns // NS_PER_S, UTC).strftime("%Y%m%dT%H%M%SZ")
+    name = "+".join(path.resolve().name for path in recordings)[:80]
+    return Path(plant.service.data_folder) / REPLAYS / f"{name}-{moment}"
+
+
+class PlayedOut:
+    """Source behind a simulated DAQ that plays a recording; it ends when the recording has ended.
+
+    The DAQ still answers after the end, like a device whose converter has stopped. Its reader
+    reports a lost link, which ends the stream here.
+
+    Parameters
+    ----------
+    over
+        Set when the DAQ has reported the end of the recording.
+    gone
+        Set when the DAQ process has ended, which also ends the stream; None to wait for the DAQ.
     """
-    recording = open_recording(folder)
-    return RecordedFeed(recording, selection_of(recording, unit))
+
+    def __init__(
+        self, source: SampleSource, over: threading.Event, gone: threading.Event | None = None
+    ) -> None:
+        self._source, self._over, self._gone = source, over, gone
+
+    @asynccontextmanager
+    async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
+        """Open the link; see :class:`acquisition.source.SampleSource`.
+
+        Raises
+        ------
+        LinkError, ConfigError
+            As the source does, until the recording is over.
+        """
+        async with AsyncExitStack() as stack:
+            try:
+                blocks = await stack.enter_async_context(self._source.connect())
+            except LinkError:
+                if not self._is_over:
+                    raise
+                blocks = _no_blocks()
+            yield await stack.enter_async_context(aclosing(self._until_over(blocks)))
+
+    async def _until_over(
+        self, blocks: AsyncIterator[SampleBlock]
+    ) -> AsyncGenerator[SampleBlock, None]:
+        try:
+            async for block in blocks:
+                yield replace(block, clock=None)  # the device's times are those of the recording
+        except LinkError:
+            if not self._is_over:
+                raise
+
+    @property
+    def _is_over(self) -> bool:
+        return self._over.is_set() or (self._gone is not None and self._gone.is_set())
+
+
+async def _no_blocks() -> AsyncIterator[SampleBlock]:
+    return
+    yield

@@ -3,15 +3,16 @@
 import asyncio
 import socket
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from core.alarms.alarm import PLANT
-from service.app.measuring_process import Analysis, analysis_on, reporting_loops
+from service.app.measuring_process import analysis_on, reporting_loops
 from service.app.notifications import router_of
-from service.app.process import Ground, Supervision, live_view
+from service.app.process import ProcessContext, Supervision, live_view, start_loops
 from service.app.service_audit import ServiceTrail
-from service.app.serving_process import Serving, context_of, serving_of
+from service.app.serving_process import context_of, serving_of
 from service.app.storage import database_path, evidence_desk, open_store
 from service.app.web import access_desk
 from service.measuring.acquirer import Bus
@@ -19,8 +20,7 @@ from service.measuring.analyser import BUS_CAPACITY, Runner
 from service.measuring.sources import WatchedUnit
 from service.measuring.timings import Timings, timed, timed_sources
 from service.notifications.message import LiveContext
-from service.runtime.heartbeats import Heartbeats
-from service.runtime.process import stop_on_signals
+from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -28,7 +28,7 @@ from service.store.holds import only_one
 
 
 @dataclass(frozen=True)
-class Performance:
+class ServiceRun:
     """Configuration of a service run: a live plant, or recordings of it.
 
     Parameters
@@ -51,7 +51,7 @@ class Performance:
 
 
 async def run_service(
-    performance: Performance,
+    service_run: ServiceRun,
     listener: socket.socket,
     clock: Clock,
     announce: Callable[[str], None],
@@ -61,10 +61,8 @@ async def run_service(
 
     Parameters
     ----------
-    listener
-        Socket of the HTTP server.
-    announce
-        Called with the URL once the server answers, then with the set-up token if there is no
+    listener, announce
+        As in `ProcessServer`; `announce` is also called with the set-up token if there is no
         account.
     manager
         Notified when the service is ready, alive and stopping.
@@ -76,97 +74,42 @@ async def run_service(
     ClosedError
         If the service would be reachable from other hosts without TLS or accounts.
     """
-    plant, origin = performance.plant, performance.origin
-    live = live_view(plant, clock)
-    alarm_context = LiveContext(live)
-    with only_one(database_path(plant)):
-        store = open_store(plant, origin, router_of(plant, origin, alarm_context, clock))
-        beats, timings = Heartbeats(clock), Timings(performance.units, clock)
-        ground = Ground(plant, origin, clock, store, live, beats, timings)
-        try:
-            await _run(performance, ground, alarm_context, listener, announce, manager)
-        finally:
-            store.close()
-
-
-async def _run(
-    performance: Performance,
-    ground: Ground,
-    alarm_context: LiveContext,
-    listener: socket.socket,
-    announce: Callable[[str], None],
-    manager: ServiceManager,
-) -> None:
-    plant, clock = ground.plant, ground.clock
-    desk = access_desk(plant, ground.store.access, clock, performance.is_demo)
-    units = timed(performance.units, ground.timings)
-    bus = Bus(BUS_CAPACITY, clock)
-    monitors = {unit: watched.monitor for unit, watched in units.items()}
-    analysis = await analysis_on(ground, monitors, bus, alarm_context)
-    runner = _runner(units, analysis, bus)
-    audit = ServiceTrail(plant, ground.origin, ground.store.audit, clock)
-    await audit.begin()
-    context = context_of(analysis, desk, audit.refusals, bus, timed_sources(units))
-    evidence = evidence_desk(plant, ground.store, analysis.evidence, clock, context.downloads)
-    serving = serving_of(context, ground, listener, desk, announce, evidence)
-    supervision = Supervision(manager, ground.beats, ground.live, units, clock)
-    try:
-        await _perform(runner, analysis, audit, serving, supervision, ends=performance.ends)
-    finally:
-        desk.close()
-        await analysis.close()
-        await audit.end()
-
-
-def _reporting(analysis: Analysis, tasks: asyncio.TaskGroup) -> list[asyncio.Task[None]]:
-    """Start the loops that serve replicas; only PostgreSQL and live data have replicas."""
-    ground = analysis.ground
-    if ground.plant.store.postgresql is None or ground.origin is not Origin.LIVE:
-        return []
-    held = [*(unit.id for unit in ground.plant.unit), PLANT]
-    loops = reporting_loops(analysis, lambda: held)
-    beats = ground.beats
-    return [tasks.create_task(beats.tend(name, loops[name]), name=name) for name in loops]
-
-
-def _runner(units: Mapping[str, WatchedUnit], analysis: Analysis, bus: Bus) -> Runner:
-    ground = analysis.ground
-    return Runner(
-        units,
-        ground.live,
-        analysis.recorder,
-        ground.clock,
-        analysis.alarms,
-        analysis.films,
-        bus,
-        ground.beats,
+    plant, origin = service_run.plant, service_run.origin
+    live, beats, timings = (
+        live_view(plant, clock),
+        Heartbeats(clock),
+        Timings(service_run.units, clock),
     )
+    alarm_context = LiveContext(live)
+    router = router_of(plant, origin, alarm_context, clock)
+    with only_one(database_path(plant)), closing(open_store(plant, origin, router)) as store:
+        process = ProcessContext(plant, origin, clock, store, live, beats, timings)
+        desk = access_desk(plant, store.access, clock, service_run.is_demo)
+        units = timed(service_run.units, timings)
+        bus = Bus(BUS_CAPACITY, clock)
+        monitors = {unit: watched.monitor for unit, watched in units.items()}
+        analysis = await analysis_on(process, monitors, bus, alarm_context)
+        parts = (analysis.alarms, analysis.films, bus, beats)
+        runner = Runner(units, live, analysis.recorder, clock, *parts)
+        audit = ServiceTrail(plant, origin, store.audit, clock)
+        await audit.begin()
+        context = context_of(analysis, desk, audit.refusals, bus, timed_sources(units))
+        evidence = evidence_desk(plant, store, analysis.evidence, clock, context.downloads)
+        server = serving_of(context, process, listener, desk, announce, evidence)
 
+        def begin(tasks: asyncio.TaskGroup, stopped: asyncio.Event) -> list[asyncio.Task[None]]:
+            running = tasks.create_task(runner.run(), name="run")
+            if service_run.ends:
+                running.add_done_callback(lambda _: stopped.set())
+            loops: dict[str, Loop] = {"clock": audit.watch_clock}
+            if plant.store.postgresql is not None and origin is Origin.LIVE:  # may have replicas
+                held = [*(unit.id for unit in plant.unit), PLANT]
+                loops |= reporting_loops(analysis, lambda: held)
+            return [running, *analysis.start(tasks), *start_loops(loops, beats, tasks)]
 
-async def _perform(
-    runner: Runner,
-    analysis: Analysis,
-    audit: ServiceTrail,
-    serving: Serving,
-    supervision: Supervision,
-    *,
-    ends: bool,
-) -> None:
-    """Run all parts until the service is stopped or its sources have ended."""
-    stopped = stop_on_signals()
-    watching = analysis.ground.beats.tend("clock", audit.watch_clock)
-    async with asyncio.TaskGroup() as tasks:
-        running = tasks.create_task(runner.run(), name="run")
-        beside = [*analysis.start(tasks), *_reporting(analysis, tasks)]
-        beside.append(tasks.create_task(watching, name="clock"))
-        server = serving.start(tasks)
-        announcing = tasks.create_task(serving.tell(supervision), name="announce")
-        supervising = tasks.create_task(supervision.run(), name="supervise")
-        if ends:
-            running.add_done_callback(lambda _: stopped.set())
-        await stopped.wait()
-        supervision.stopping()
-        serving.stop()
-        for task in (running, *beside, announcing, supervising):
-            task.cancel()
-        await asyncio.wait([server])
+        try:
+            await server.run(Supervision(manager, beats, live, units, clock), beats, begin)
+        finally:
+            desk.close()
+            await analysis.close()
+            await audit.end()

@@ -2,9 +2,7 @@
 
 import asyncio
 import json
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping
 from importlib.metadata import version
 
 import structlog
@@ -12,9 +10,9 @@ import structlog
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival
 from service.api.auth.refusals import Refusals
+from service.app.storage import built_configuration
 from service.measuring.service_alarms import STEP_S
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.settings.configuration import built_from, configuration_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditEntry, Deed
@@ -26,23 +24,8 @@ STARTED, STOPPED, CHANGED = "service.started", "service.stopped", "configuration
 STEPPED = "clock.stepped"
 
 
-@dataclass(frozen=True)
-class Release:
-    """Program version, configuration and data origin of a run.
-
-    Parameters
-    ----------
-    version
-        Version of padwatch.
-    configuration
-        Version of the configuration, as stored beside the evidence.
-    origin
-        Live or replay.
-    """
-
-    version: str
-    configuration: str
-    origin: str
+Release = Mapping[str, str]
+"""Version of padwatch, version of its configuration, and origin of its data."""
 
 
 def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[Deed]:
@@ -53,13 +36,12 @@ def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) ->
     last_start
         Newest entry of a start; None if there is none.
     """
-    before = _configuration_of(last_start)
-    started = Deed(now_ns, PADWATCH, STARTED, SERVICE, after=vars(release))
-    if before is None or before == release.configuration:
+    before, now = _configuration_of(last_start), release[CONFIGURATION]
+    started = Deed(now_ns, PADWATCH, STARTED, SERVICE, after=release)
+    if before is None or before == now:
         return [started]
-    versions = ({CONFIGURATION: before}, {CONFIGURATION: release.configuration})
-    changed = Deed(now_ns, PADWATCH, CHANGED, CONFIGURATION, *versions)
-    return [changed, started]
+    versions = ({CONFIGURATION: before}, {CONFIGURATION: now})
+    return [Deed(now_ns, PADWATCH, CHANGED, CONFIGURATION, *versions), started]
 
 
 def stop_deed(release: Release, refusals: int, now_ns: int) -> Deed:
@@ -71,12 +53,7 @@ def stop_deed(release: Release, refusals: int, now_ns: int) -> Deed:
         Refused requests without an entry of their own since the last one with an entry.
     """
     after = {"n_refused_more": refusals} if refusals else None
-    return Deed(now_ns, PADWATCH, STOPPED, SERVICE, before=vars(release), after=after)
-
-
-def step_deed(step_s: float, now_ns: int) -> Deed:
-    """Return the entry of a step of the host's clock; `now_ns` is the time after the step."""
-    return Deed(now_ns, PADWATCH, STEPPED, CLOCK, after={"by_s": round(step_s, 3)})
+    return Deed(now_ns, PADWATCH, STOPPED, SERVICE, before=release, after=after)
 
 
 def _configuration_of(start: AuditEntry | None) -> str | None:
@@ -90,28 +67,26 @@ LOOK_S = 1.0
 
 
 class ServiceTrail:
-    """Records starts, stops and clock steps; a failure to record does not stop the service.
-
-    Parameters
-    ----------
-    audit
-        Audit trail.
-    """
+    """Records starts, stops and clock steps; a failure to record does not stop the service."""
 
     def __init__(self, plant: PlantFile, origin: Origin, audit: AuditStore, clock: Clock) -> None:
-        program = version("padwatch")
-        configuration = configuration_of(plant, program, built_from())
-        self._release = Release(program, configuration.version, origin.value)
+        configuration = built_configuration(plant).version
+        self._release = {
+            "version": version("padwatch"),
+            CONFIGURATION: configuration,
+            "origin": origin.value,
+        }
         self._audit, self._clock = audit, clock
         self.refusals = Refusals(audit, clock)
 
     async def begin(self) -> None:
         """Record the start, and a changed configuration."""
-        await asyncio.to_thread(self._tell, self._start)
+        await self._attempt(self._record_start)
 
     async def end(self) -> None:
         """Record the stop."""
-        await asyncio.to_thread(self._tell, self._stop)
+        deed = stop_deed(self._release, self.refusals.n_more, self._clock.now_ns())
+        await self._attempt(self._audit.record, [deed])
 
     async def watch_clock(self, pulse: Pulse = UNHEARD) -> None:
         """Record steps of the host's clock until cancelled; times before and after differ."""
@@ -122,20 +97,17 @@ class ServiceTrail:
             before, seen = seen, Arrival.now(self._clock)
             step_s = seen.step_s_since(before)
             if abs(step_s) > STEP_S:
-                deed = step_deed(step_s, seen.host_ns)
-                await asyncio.to_thread(self._tell, partial(self._audit.record, [deed]))
+                step = {"by_s": round(step_s, 3)}
+                deed = Deed(seen.host_ns, PADWATCH, STEPPED, CLOCK, after=step)
+                await self._attempt(self._audit.record, [deed])
 
-    def _start(self) -> None:
+    def _record_start(self) -> None:
         last = self._audit.entries(AuditQuery(limit=1, action=STARTED))
         now_ns = self._clock.now_ns()
         self._audit.record(start_deeds(self._release, last[0] if last else None, now_ns))
 
-    def _stop(self) -> None:
-        deed = stop_deed(self._release, self.refusals.n_more, self._clock.now_ns())
-        self._audit.record([deed])
-
-    def _tell(self, write: Callable[[], None]) -> None:
+    async def _attempt(self, write: Callable[..., None], *arguments: object) -> None:
         try:
-            write()
+            await asyncio.to_thread(write, *arguments)
         except StoreError as error:
             log.error("the audit trail cannot be written", reason=str(error))

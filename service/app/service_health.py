@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable
 
-from core.limits import WITHIN
 from service.api.load import LoadWatch
 from service.live.live_view import LiveView
 from service.measuring.acquirer import Bus
@@ -21,11 +20,11 @@ def health_of(
     recorder: Recorder,
     captures: Captures,
     bus: Bus,
-    space: SpaceWatch | None = None,
-    load: LoadWatch | None = None,
-    tape: ContinuousRecorder | None = None,
-    recordings: RecordingIndexer | None = None,
-    soundness: IntegrityMonitor | None = None,
+    space: SpaceWatch,
+    load: LoadWatch,
+    tape: ContinuousRecorder,
+    recordings: RecordingIndexer,
+    soundness: IntegrityMonitor,
     stream: StreamStatus | None = None,
 ) -> HealthProbe:
     """Return a function that reads the health of the running service."""
@@ -37,14 +36,14 @@ def health_of(
             store_behind_s=recorder.behind_s,
             n_unstored=live.n_unstored,
             unstored_reason=live.unstored_reason,
-            n_recordings_damaged=recordings.n_lost if recordings else 0,
+            n_recordings_damaged=recordings.n_lost,
             readings={
                 "waiting_share": bus.depth / bus.capacity,
                 "analysis_delay_s": max(bus.oldest_wait_s, stream.behind_s() if stream else 0.0),
                 "captures_error": captures.trouble,
                 "recording_error": recording_error(tape, recordings),
-                "refused": load.words if load else None,
-                "stored_trouble": soundness.trouble if soundness else None,
+                "refused": load.words,
+                "stored_trouble": soundness.trouble,
                 "stream_trouble": stream.trouble() if stream else None,
             },
             accounts={
@@ -52,18 +51,15 @@ def health_of(
                 for unit in names
                 if (status := live.status(unit)).last_sample_ns is not None
             },
-            disk=space.condition if space else lambda _: WITHIN,
+            disk=space.condition,
         )
 
     return look
 
 
-def recording_error(
-    tape: ContinuousRecorder | None, recordings: RecordingIndexer | None
-) -> str | None:
+def recording_error(tape: ContinuousRecorder, recordings: RecordingIndexer) -> str | None:
     """Return why samples are not recorded or recordings not maintained; None if neither."""
-    now = tape.trouble if tape else None
-    return now or (recordings.lasting_trouble if recordings else None)
+    return tape.trouble or recordings.lasting_trouble
 
 
 BEHIND_S = 3.0
@@ -87,12 +83,7 @@ class Pressure:
         Returns whether requests are refused already; they are shed before waveforms.
     """
 
-    def __init__(
-        self,
-        bus: Bus,
-        is_full: Callable[[], bool] = lambda: False,
-        has_shed: Callable[[], bool] = lambda: True,
-    ) -> None:
+    def __init__(self, bus: Bus, is_full: Callable[[], bool], has_shed: Callable[[], bool]) -> None:
         self._bus, self._is_full, self._has_shed = bus, is_full, has_shed
         self._is_behind = False
 

@@ -3,7 +3,6 @@
 import asyncio
 import json
 import os
-import signal
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import AsyncExitStack, suppress
@@ -22,6 +21,7 @@ from acquisition.simulated.devices.server import DaqServer
 from acquisition.simulated.feed import SampleFeed
 from core.machine.unit import Unit
 from core.samples.calibration import UnitCalibration
+from service.runtime.process import stop_on_signals
 from service.settings.adapter_values import can_daq_of
 from service.settings.core_values import calibration_of, machine_of
 from service.settings.plant import PlantFile
@@ -37,15 +37,15 @@ from service.settings.sources.devices import (
 from service.settings.sources.modbus import ModbusLinkSettings
 from service.settings.units import UnitSettings
 
-Tell = Callable[[str], None]
+Print = Callable[[str], None]
 
 MAX_COUNT = 1_000_000
-"""Largest count of one command; each fault takes a place in a queue."""
+"""Largest count of one command; each fault is queued."""
 
 _STANDARD_INPUT = 0
 
 
-async def run_daq(servers: Mapping[str, DaqServer], tell: Tell, *, controlled: bool) -> None:
+async def run_daq(servers: Mapping[str, DaqServer], print_line: Print, *, controlled: bool) -> None:
     """Serve until SIGINT or SIGTERM, or until standard input ends.
 
     Prints lines of JSON: first the endpoint of each unit, later ``{"ended": unit}`` when the
@@ -61,60 +61,57 @@ async def run_daq(servers: Mapping[str, DaqServer], tell: Tell, *, controlled: b
     AcquisitionError
         If a server cannot listen, or fails later.
     """
-    stopped = asyncio.Event()
-    loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        loop.add_signal_handler(number, stopped.set)
+    stopped = stop_on_signals()
     async with AsyncExitStack() as stack:
         for server in servers.values():
             await stack.enter_async_context(server)
-        tell(json.dumps({unit: dict(server.endpoint) for unit, server in servers.items()}))
+        print_line(json.dumps({unit: dict(server.endpoint) for unit, server in servers.items()}))
         try:
-            await _serve_all(servers, tell, stopped, controlled)
+            async with asyncio.TaskGroup() as tasks:
+                running = [
+                    tasks.create_task(_serve(*entry, print_line)) for entry in servers.items()
+                ]
+                if controlled:
+                    running.append(
+                        tasks.create_task(_execute_commands(servers, print_line, stopped))
+                    )
+                await stopped.wait()
+                for task in running:
+                    task.cancel()
         except ExceptionGroup as errors:
             _, others = errors.split(AcquisitionError)
             raise errors if others else errors.exceptions[0] from None
 
 
-async def _serve_all(
-    servers: Mapping[str, DaqServer], tell: Tell, stopped: asyncio.Event, controlled: bool
-) -> None:
-    async with asyncio.TaskGroup() as tasks:
-        running = [tasks.create_task(_serve(*entry, tell)) for entry in servers.items()]
-        if controlled:
-            running.append(tasks.create_task(_obey(servers, tell, stopped)))
-        await stopped.wait()
-        for task in running:
-            task.cancel()
-
-
-async def _serve(unit: str, server: DaqServer, tell: Tell) -> None:
+async def _serve(unit: str, server: DaqServer, print_line: Print) -> None:
     await server.run()
-    tell(json.dumps({"ended": unit}))
+    print_line(json.dumps({"ended": unit}))
 
 
-async def _obey(servers: Mapping[str, DaqServer], tell: Tell, stopped: asyncio.Event) -> None:
+async def _execute_commands(
+    servers: Mapping[str, DaqServer], print_line: Print, stopped: asyncio.Event
+) -> None:
     lines: asyncio.Queue[str] = asyncio.Queue()
     reading = (asyncio.get_running_loop(), lines.put_nowait)
     threading.Thread(target=_read_lines, args=reading, daemon=True, name="commands").start()
     while line := await lines.get():
-        tell(json.dumps(obeyed(servers, line)))
+        print_line(json.dumps(execute_command(servers, line)))
     stopped.set()
 
 
-def _read_lines(loop: asyncio.AbstractEventLoop, hear: Callable[[str], None]) -> None:
-    """Pass standard input on line by line, then an empty line; event loops cannot read files.
+def _read_lines(loop: asyncio.AbstractEventLoop, put: Callable[[str], None]) -> None:
+    """Pass on lines of standard input, then an empty line; event loops cannot read files.
 
     Lines are dropped once the event loop is closed.
     """
     with suppress(RuntimeError):
         with suppress(OSError), open(os.dup(_STANDARD_INPUT), errors="replace") as lines:
             for line in lines:
-                loop.call_soon_threadsafe(hear, line)
-        loop.call_soon_threadsafe(hear, "")
+                loop.call_soon_threadsafe(put, line)
+        loop.call_soon_threadsafe(put, "")
 
 
-def obeyed(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
+def execute_command(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
     """Execute one command: ``UNIT FAULT [COUNT]``.
 
     Returns
@@ -129,7 +126,7 @@ def obeyed(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
     if count and int(count[0]) > MAX_COUNT:
         return {"refused": f"COUNT is {count[0]}, at most {MAX_COUNT}"}
     if unit not in servers:
-        return {"refused": f"no unit {unit} here; there are {', '.join(servers)}"}
+        return {"refused": f"no unit {unit} here; known are {', '.join(servers)}"}
     try:
         servers[unit].inject(fault, *map(int, count))
     except LookupError as error:
@@ -207,7 +204,7 @@ def modbus_server(
     Parameters
     ----------
     clock
-        Paces the device; without one it produces as fast as its reader reads.
+        As in `daq_of`.
     patient
         Whether time starts with the reader's first request.
     """
@@ -277,11 +274,11 @@ _LOOPBACK = "127.0.0.1"
 
 
 STALE_AFTER_S = 5.0
-"""Silence after which a finished run ends; longer than a start takes."""
+"""SilenceWatch that ends a finished run; longer than a start."""
 
 
 class Wire(StrEnum):
-    """Protocol and transport."""
+    """Protocol and transport of a simulated DAQ."""
 
     MODBUS_TCP = "modbus_tcp"
     MODBUS_RTU = "modbus_rtu"
@@ -290,9 +287,9 @@ class Wire(StrEnum):
 
 
 def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
-    """Return the plant with all units behind DAQs on this wire, at addresses still to be set."""
+    """Return the plant with all units behind DAQs on a wire; their addresses are set later."""
     units = tuple(
-        # where each sample is a poll, the recording has the rate of the polls
+        # a source with one sample per poll is recorded at the rate of its polls
         unit.model_copy(update={"source": _source(wire), "rate_hz": unit.sampling_hz})
         for unit in plant.unit
     )
@@ -300,7 +297,7 @@ def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
 
 
 def _source(wire: Wire) -> SourceSettings:
-    """Polls follow each other quickly: how long a replay takes is a matter of its speed."""
+    """Return the source; it polls fast, so that the speed of a replay limits its duration."""
     if wire in (Wire.CAN, Wire.CAN_FD):
         return CanSettings(
             kind="can",

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from acquisition.clock import Clock
-from acquisition.recordings.writer import RecordingWriter
 from core.units import DAY_NS
 from service.api.downloads import Downloads
 from service.app.recordings import recording_writer
@@ -20,7 +19,7 @@ from service.recordings.folders import place_of
 from service.recordings.index import Index
 from service.recordings.keeper import RecordingIndexer, RecordingLock
 from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
-from service.recordings.segment import MakeWriter, SegmentSettings
+from service.recordings.segment import SegmentSettings
 from service.reports.archive import EvidenceArchive
 from service.reports.capture_link import captures_in_use
 from service.reports.keeper import EvidenceFolders, EvidenceKeeper
@@ -146,7 +145,7 @@ def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
     return Captures(
         Path(plant.service.data_folder) / CAPTURES,
         settings,
-        {unit.id: _writer_of(unit) for unit in units},
+        {unit.id: partial(recording_writer, unit) for unit in units},
         {unit.id: unit.sampling_hz for unit in units},
         clock,
     )
@@ -159,11 +158,6 @@ def _window_s(plant: PlantFile, unit: UnitSettings) -> float:
     analysis = analysis_of(plant.analysis)
     n_samples = analysis.segment_samples + (analysis.n_segments - 1) * analysis.hop_samples
     return n_samples / unit.sampling_hz
-
-
-def _writer_of(unit: UnitSettings) -> MakeWriter:
-    make: partial[RecordingWriter] = partial(recording_writer, unit)
-    return make
 
 
 RECORDINGS = "recordings"
@@ -302,7 +296,7 @@ def retention_rules(plant: PlantFile) -> RetentionRules:
 
 
 def retention_limits(settings: RetentionSettings) -> RetentionLimits:
-    """Return the retention limits of the plant file; an age of 0 keeps data for ever."""
+    """Return the retention limits of the plant file; an age of 0 is no limit."""
     return RetentionLimits(
         readings_ns=_age_ns(settings.readings_days),
         minutes_ns=_age_ns(settings.minutes_days),

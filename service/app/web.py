@@ -79,7 +79,7 @@ def _names(plant: PlantFile) -> list[str]:
 
 
 class ClosedError(Exception):
-    """The service does not start at this address; the message says why."""
+    """The service must not start at this address, for the reason in the message."""
 
 
 def access_desk(

@@ -6,6 +6,7 @@ from service.cli import audit, config, notifications, probe, recording, referenc
 from service.cli.accounts import keys_app, users_app
 from service.cli.backtest import backtest
 from service.cli.daq import daq
+from service.cli.options import CommandGroup
 from service.cli.reanalyse import reanalyse
 from service.cli.record import record
 from service.cli.replay import replay
@@ -15,24 +16,17 @@ from service.cli.validate import validate
 from service.runtime.process import set_up_logging
 
 app = typer.Typer(
+    cls=CommandGroup,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,  # as markup, a word in brackets would vanish from a help text or end it
 )
-app.command()(run)
-app.command()(demo)
-app.command()(acquire)
-app.command()(analyse)
-app.command()(serve)
-app.command()(daq)
-app.command()(record)
-app.command()(replay)
-app.command()(reanalyse)
-app.command()(backtest)
-app.command()(validate)
-app.command()(backup)
-app.command()(restore)
+for command in (
+    *(run, demo, acquire, analyse, serve, daq, record, replay),
+    *(reanalyse, backtest, validate, backup, restore),
+):
+    app.command()(command)
 app.add_typer(config.app, name="config")
 app.add_typer(reference.app, name="reference")
 app.add_typer(audit.app, name="audit")

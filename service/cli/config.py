@@ -1,25 +1,29 @@
 """`padwatch config`: check a plant file, print its schema or an example."""
 
 import json
-from typing import Annotated
 
 import typer
 
 from acquisition.errors import ConfigError
-from service.cli.options import EXAMPLE, PlantPath, example_path, fail, read_plant_file
+from service.cli.options import (
+    EXAMPLE,
+    JsonOutput,
+    PlantPath,
+    command_group,
+    example_path,
+    fail,
+    print_result,
+)
 from service.settings.adapter_values import require_dbc_fits
-from service.settings.loading import plant_file_schema
+from service.settings.loading import load_plant_file, plant_file_schema
 
-app = typer.Typer(no_args_is_help=True, help="Check a plant file, print its schema or an example.")
+app = command_group("Check a plant file, print its schema or an example.")
 
 
 @app.command()
-def check(
-    plant_file: PlantPath,
-    json_output: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
-) -> None:
+def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     """Check a plant file; every mistake is named with its line, exit code 2."""
-    plant = read_plant_file(plant_file)
+    plant = load_plant_file(plant_file)
     try:
         for unit in plant.unit:
             require_dbc_fits(unit)
@@ -27,14 +31,12 @@ def check(
         fail(f"{plant_file}: {error}", code=2)
     n_bearings = sum(len(unit.bearing) for unit in plant.unit)
     n_channels = sum(len(unit.channel) for unit in plant.unit)
-    if json_output:
-        counts = {"units": len(plant.unit), "bearings": n_bearings, "channels": n_channels}
-        typer.echo(json.dumps({"plant": plant.plant.name, **counts}))
-        return
-    typer.echo(
+    counts = {"units": len(plant.unit), "bearings": n_bearings, "channels": n_channels}
+    line = (
         f"{plant_file} is fine: {plant.plant.name}; units: {len(plant.unit)},"
         f" bearings: {n_bearings}, waveform channels: {n_channels}"
     )
+    print_result({"plant": plant.plant.name, **counts}, [line], json_output, indent=None)
 
 
 @app.command()

@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,13 +15,17 @@ import typer
 import uvloop
 
 from acquisition.clock import FastClock, SystemClock
-from acquisition.errors import AcquisitionError
+from acquisition.errors import ConfigError
+from acquisition.recordings.reader import open_recording
+from acquisition.simulated.devices.recorded import RecordedFeed
 from acquisition.simulated.feed import SampleFeed
-from service.app.recordings import recorded_feed, recordings_by_unit
+from service.app.recordings import recordings_by_unit, selection_of
 from service.app.simulated_daq import Wire, daq_of, over_wire, run_daq
-from service.cli.options import PlantPath, fail, read_plant_file
+from service.cli.options import PlantPath, fail, option
 from service.measuring.simulated_sources import simulated_feed
+from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
+from service.settings.units import UnitSettings
 
 SpeedOption = Annotated[
     float,
@@ -35,49 +39,53 @@ def daq(
         list[Path] | None,
         typer.Option(help="Play this recording of a unit instead of simulations; repeatable."),
     ] = None,
-    through: Annotated[
-        Wire | None,
-        typer.Option(help="Serve over this wire on loopback instead.", show_default=False),
-    ] = None,
+    through: Annotated[Wire | None, option("Serve over this wire on loopback instead.")] = None,
     speed: SpeedOption = 1.0,
     control: Annotated[
         bool,
         typer.Option(help="Read commands UNIT FAULT [COUNT] from standard input; its end ends it."),
     ] = False,
 ) -> None:
-    """Serve units over the protocol of their sources, where these look for them.
+    """Serve units over the protocol of their sources, at the addresses that these read.
 
-    Prints one JSON line that says where each unit is found, then runs until Ctrl-C or SIGTERM.
+    Prints one JSON line with the address of each unit, then runs until Ctrl-C or SIGTERM.
     Unpaced, a device produces as fast as its reader reads.
     """
-    plant = read_plant_file(plant_file)
+    plant = load_plant_file(plant_file)
     if through is not None:
         plant = over_wire(plant, through)
     clock = FastClock(SystemClock(), speed) if speed else None
+    feeds = _recorded_feeds(plant, recording) if recording else _simulated_feeds(plant)
     try:
-        feeds = _feeds(plant, recording or [])
         servers = {
             unit.id: daq_of(unit, feeds[unit.id], clock, recorded=bool(recording))
             for unit in plant.unit
             if unit.id in feeds
         }
-        uvloop.run(run_daq(servers, typer.echo, controlled=control))
-    except (AcquisitionError, LookupError) as error:
-        fail(f"padwatch daq: {error.args[0]}")
+    except LookupError as error:
+        fail(str(error))
+    uvloop.run(run_daq(servers, typer.echo, controlled=control))
 
 
-def _feeds(plant: PlantFile, recordings: list[Path]) -> Mapping[str, SampleFeed]:
-    if recordings:
-        played = recordings_by_unit(recordings, plant)
-        return {u.id: recorded_feed(played[u.id], u) for u in plant.unit if u.id in played}
+def _recorded_feeds(plant: PlantFile, recordings: list[Path]) -> dict[str, SampleFeed]:
+    played = recordings_by_unit(recordings, plant)
+
+    def feed(unit: UnitSettings) -> SampleFeed:
+        recording = open_recording(played[unit.id])
+        return RecordedFeed(recording, selection_of(recording, unit))
+
+    return {unit.id: feed(unit) for unit in plant.unit if unit.id in played}
+
+
+def _simulated_feeds(plant: PlantFile) -> dict[str, SampleFeed]:
     clock = SystemClock()
     feeds = {unit.id: simulated_feed(unit, clock) for unit in plant.unit if unit.simulation}
     if not feeds:
-        raise LookupError("no unit of this plant file has a [unit.simulation] table")
+        raise ConfigError("no unit of this plant file has a [unit.simulation] table")
     now_ns = clock.now_ns()  # the first feed was built seconds ago
     for feed in feeds.values():
         feed.begin_at(now_ns)
-    return feeds
+    return {**feeds}
 
 
 STOP_S = 3.0
@@ -95,7 +103,7 @@ class RunningDaq:
     endpoints
         Address of each unit, as keys and values of its source's settings.
     over
-        For each unit, set when its recording has been played to the end.
+        Events by unit, set when its recording has been played to the end.
     gone
         Set when the process has ended.
     """
@@ -130,14 +138,13 @@ def held_lines(endpoints: Endpoints) -> Iterator[None]:
         for place in places:
             if isinstance(place, str) and place.startswith(TERMINALS):
                 with suppress(OSError):  # the DAQ has ended; its reader reports that
-                    held = os.open(place, os.O_RDWR | os.O_NOCTTY)
-                    stack.callback(os.close, held)
+                    stack.callback(os.close, os.open(place, os.O_RDWR | os.O_NOCTTY))
         yield
 
 
 @contextmanager
 def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
-    """Run ``padwatch daq`` with arguments; it ends when this process ends in any way."""
+    """Run ``padwatch daq`` as a child process that ends with this one, however this one ends."""
     with subprocess.Popen(  # noqa: S603  our own program
         [sys.executable, "-m", "service.cli.main", "daq", *arguments, "--control"],
         stdin=subprocess.PIPE,
@@ -148,7 +155,7 @@ def daq_process(arguments: Sequence[str]) -> Iterator[RunningDaq]:
         try:
             line = process.stdout.readline() if process.stdout else b""
             if not line or process.stdout is None:
-                fail("padwatch: the simulated DAQ did not start; its own message stands above")
+                fail("the simulated DAQ did not start; see its message above")
             endpoints: Endpoints = json.loads(line)
             daq = RunningDaq(endpoints, {unit: threading.Event() for unit in endpoints})
             news = threading.Thread(target=_listen, args=(process.stdout, daq), daemon=True)

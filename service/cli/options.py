@@ -1,42 +1,166 @@
-"""Shared arguments of commands: plant file, unit, password, terminal, example files."""
+"""Shared parts of commands: arguments, errors, results, progress, and the plant's store."""
 
 import os
 import signal
 import sys
 import sysconfig
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+from pydantic_core import to_json
+from typer.core import TyperGroup
 
-from service.settings.loading import load_plant_file
+from acquisition.errors import AcquisitionError
+from service.api.auth.passwords import PasswordRefusedError
+from service.api.http.listening import CertificateError, PortInUseError
+from service.app.storage import has_store, open_store, store_name
+from service.app.web import ClosedError
+from service.cli.offline.backtest_cells import ReadingsError
+from service.cluster.session import StreamAnewError
 from service.settings.plant import PlantFile
-from service.settings.processes import StreamSettings
 from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
+from service.store.access.identities import NameRefusedError
+from service.store.access.port import AccessRefusedError
+from service.store.backup import BackupError
+from service.store.port import Store, StoreError
 
-PlantPath = Annotated[Path, typer.Argument(help="The plant file (TOML).", show_default=False)]
+
+def option(meaning: str, *names: str, **limits: Any) -> Any:
+    """Declare an option whose help shows no default."""
+    return typer.Option(*names, help=meaning, show_default=False, **limits)
 
 
-def read_plant_file(path: Path) -> PlantFile:
-    """Read a plant file, or end with exit code 2 and a line for each mistake."""
-    try:
-        return load_plant_file(path)
-    except TomlFileError as error:
-        fail(str(error), code=2)
+def argument(meaning: str, **settings: Any) -> Any:
+    """Declare an argument whose help shows no default."""
+    return typer.Argument(help=meaning, show_default=False, **settings)
+
+
+PlantPath = Annotated[Path, argument("The plant file (TOML).")]
+PlantOption = Annotated[Path, option("The plant file (TOML).", "--plant")]
+UnitOption = Annotated[str | None, option("Unit of the plant file.", "--unit")]
+PortOption = Annotated[
+    int | None, typer.Option("--port", min=0, max=65535, help="HTTP port instead of the file's.")
+]
+RecordingFolder = Annotated[Path, argument("Folder of the recording.")]
+NewRecording = Annotated[
+    Path, typer.Option("--out", help="Folder of the recording; must not exist yet.")
+]
+JsonOutput = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+FILE_ERRORS = (TomlFileError, TomlFileError)
+"""Errors that name file, line and key; exit code 2."""
+
+USAGE_ERRORS = (
+    *(AccessRefusedError, NameRefusedError, PasswordRefusedError),
+    *(ClosedError, CertificateError),
+)
+"""Errors that a second try does not cure; exit code 2."""
+
+FAILURES = (
+    *(AcquisitionError, StoreError, BackupError, ReadingsError),
+    *(PortInUseError, StreamAnewError),
+)
+"""Errors of devices, files, databases and ports; exit code 1."""
+
+
+class CommandError(Exception):
+    """A command cannot do its work; the message follows the name of the command.
+
+    Parameters
+    ----------
+    code
+        Exit code.
+    """
+
+    def __init__(self, message: str, code: int = 1) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class CommandGroup(TyperGroup):
+    """Group of commands; an expected error ends its command with a message and an exit code."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the chosen command."""
+        try:
+            return super().invoke(ctx)
+        except FILE_ERRORS as error:
+            _end(str(error), 2)
+        except CommandError as error:
+            _end(f"{_command_name(ctx)}: {error}", error.code)
+        except USAGE_ERRORS as error:
+            _end(f"{_command_name(ctx)}: {error}", 2)
+        except FAILURES as error:
+            _end(f"{_command_name(ctx)}: {error}", 1)
+
+
+def _command_name(ctx: Any) -> str:
+    names = [ctx.invoked_subcommand]
+    while ctx.parent is not None:
+        names.append(ctx.info_name)
+        ctx = ctx.parent
+    return " ".join(["padwatch", *reversed(names)])
+
+
+def _end(message: str, code: int) -> NoReturn:
+    typer.echo(message, err=True)
+    raise typer.Exit(code) from None
+
+
+def command_group(meaning: str) -> typer.Typer:
+    """Create a group of commands."""
+    return typer.Typer(no_args_is_help=True, help=meaning, cls=CommandGroup)
 
 
 def fail(message: str, code: int = 1) -> NoReturn:
-    """End the command with a message."""
-    typer.echo(message, err=True)
-    raise typer.Exit(code)
+    """End the command with a message.
+
+    Raises
+    ------
+    CommandError
+        Always.
+    """
+    raise CommandError(message, code)
 
 
-UnitOption = Annotated[
-    str | None, typer.Option("--unit", help="Unit of the plant file.", show_default=False)
-]
+def print_result(
+    document: object, lines: Iterable[str], json_output: bool, indent: int | None = 1
+) -> None:
+    """Print a result as JSON, or as lines of text."""
+    shown = (
+        [to_json(document, indent=indent, inf_nan_mode="null").decode()] if json_output else lines
+    )
+    for line in shown:
+        typer.echo(line)
+
+
+def progress(label: str, length: int) -> Any:
+    """Create a progress bar on standard error, shown only on a terminal."""
+    return typer.progressbar(
+        length=length, label=label, file=sys.stderr, hidden=not sys.stderr.isatty()
+    )
+
+
+@contextmanager
+def plant_store(plant: PlantFile, creates: bool = False) -> Iterator[Store]:
+    """Open the plant's database.
+
+    Parameters
+    ----------
+    creates
+        Whether a missing database is created; otherwise it ends the command.
+    """
+    if not has_store(plant):  # the data folder may be relative to another folder
+        if not creates:
+            fail(f"{store_name(plant)}: there is no such database")
+        notice = f"{store_name(plant)}: a new database; is that where the service runs?"
+        typer.echo(notice, err=True)
+    with closing(open_store(plant)) as store:
+        yield store
 
 
 def one_unit(plant: PlantFile, id_: str | None, path: Path) -> UnitSettings:
@@ -48,17 +172,6 @@ def one_unit(plant: PlantFile, id_: str | None, path: Path) -> UnitSettings:
     if not chosen:
         fail(f"{path}: has no unit {id_}, it has {known}", code=2)
     return chosen[0]
-
-
-def stream_settings(plant: PlantFile) -> StreamSettings:
-    """Return the plant file's [stream], or end the command."""
-    if plant.stream is None:
-        fail(
-            "padwatch: the plant file has no [stream]: give it one, with the servers of NATS, or"
-            " use `padwatch run`, which needs none",
-            2,
-        )
-    return plant.stream
 
 
 @contextmanager
@@ -90,29 +203,24 @@ PasswordFd = Annotated[
 ]
 
 
-def password_from(descriptor: int | None, command: str) -> str:
-    """Read a new password, or end the command with exit code 2."""
-    if descriptor is not None:
-        return _read(descriptor, command)
-    if not sys.stdin.isatty():
-        fail(f"{command}: there is no terminal to ask on; use --password-fd", 2)
-    asked: str = typer.prompt("Password", hide_input=True, confirmation_prompt=True)
-    return asked
-
-
-def _read(descriptor: int, command: str) -> str:
+def password_from(descriptor: int | None) -> str:
+    """Read a new password from a file descriptor or the terminal, or end with exit code 2."""
+    if descriptor is None:
+        if not sys.stdin.isatty():
+            fail("there is no terminal to ask on; use --password-fd", 2)
+        asked: str = typer.prompt("Password", hide_input=True, confirmation_prompt=True)
+        return asked
     found = b""
     try:
         while len(found) <= MAX_BYTES and (more := os.read(descriptor, MAX_BYTES)):
             found += more
-    except OSError as error:
-        fail(f"{command}: file descriptor {descriptor}: {error.strerror}", 2)
-    if len(found) > MAX_BYTES:
-        fail(f"{command}: file descriptor {descriptor} holds more than a password", 2)
-    try:
+        if len(found) > MAX_BYTES:
+            fail(f"file descriptor {descriptor} holds more than a password", 2)
         return found.decode().removesuffix("\n").removesuffix("\r")
+    except OSError as error:
+        fail(f"file descriptor {descriptor}: {error.strerror}", 2)
     except UnicodeDecodeError:
-        fail(f"{command}: file descriptor {descriptor} holds no UTF-8 text", 2)
+        fail(f"file descriptor {descriptor} holds no UTF-8 text", 2)
 
 
 DEMO = "demo.toml"

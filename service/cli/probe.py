@@ -1,16 +1,14 @@
-"""`padwatch probe`: contents of the registers of a Modbus device, without storing anything."""
+"""`padwatch probe`: registers of a Modbus device, read once and not stored."""
 
 import asyncio
-import json
-from collections.abc import Coroutine, Iterator
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import typer
 from pydantic import ValidationError
 
-from acquisition.errors import AcquisitionError
 from acquisition.modbus.cells import ByteOrder
 from core.machine.channel import Measurand
 from service.cli.offline.probing import (
@@ -26,18 +24,22 @@ from service.cli.offline.probing import (
     ring_look,
     value_looks,
 )
-from service.cli.options import UnitOption, fail, one_unit, read_plant_file
+from service.cli.options import (
+    JsonOutput,
+    UnitOption,
+    command_group,
+    fail,
+    one_unit,
+    print_result,
+)
 from service.runtime.times import rfc3339
+from service.settings.loading import load_plant_file
 from service.settings.sources.devices import MappedDeviceSettings
 from service.settings.sources.modbus import ModbusLinkSettings
-from service.settings.sources.register_map import RegisterMapSettings, load_map_file
-from service.settings.toml_file import TomlFileError
+from service.settings.sources.register_map import load_map_file
 from service.settings.units import UnitSettings
 
-app = typer.Typer(
-    no_args_is_help=True, help="Look into a device: read once, print everything, store nothing."
-)
-
+app = command_group("Look into a device: read once, print everything, store nothing.")
 
 MAX_COUNT = 1000
 MAX_IN_FLIGHT = 16
@@ -52,12 +54,10 @@ MEASURAND_UNITS = {
     Measurand.KEY_PHASE_V: "V",
 }
 
-Result = TypeVar("Result")
 DevicePlace = Annotated[
     str,
     typer.Argument(help="HOST[:PORT], or the path of a serial port.", metavar="HOST[:PORT]|/dev/…"),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 UnitIdOption = Annotated[int, typer.Option("--unit-id", min=1, max=255, help="Modbus unit id.")]
 TimeoutOption = Annotated[float, typer.Option(min=0.05, max=60.0, help="Wait for a reply, s.")]
 BaudOption = Annotated[int, typer.Option(help="Bits per second of a serial port.")]
@@ -74,22 +74,22 @@ def modbus(
     timeout_s: TimeoutOption = 1.0,
     baudrate: BaudOption = 115_200,
     parity: ParityOption = "even",
-    json_output: JsonOption = False,
+    json_output: JsonOutput = False,
 ) -> None:
-    """Print registers raw, and read in every type and byte order.
+    """Print registers raw, and decoded in every type and byte order.
 
-    A float between 0.001 and 1,000,000 is marked: in its byte order the map may be right.
+    A float between 0.001 and 1,000,000 is marked, since its byte order is plausible.
     """
     place = _place(device, unit_id, timeout_s, baudrate, parity)
-    data = _done(read_once(place, function, address, count))
+    data = asyncio.run(read_once(place, function, address, count))
     if function in BIT_FUNCTIONS:
         bits = [data[n // 8] >> n % 8 & 1 for n in range(count)]
         rows: list[Any] = [{"address": address + n, "bit": bit} for n, bit in enumerate(bits)]
         lines = [f"{row['address']:>6} {row['bit']}" for row in rows]
     else:
         found = looks(data, address)
-        rows, lines = [asdict(look) for look in found], list(_register_table(found))
-    typer.echo(json.dumps(rows, indent=1) if json_output else "\n".join(lines))
+        rows, lines = [*found], list(_register_table(found))
+    print_result(rows, lines, json_output)
 
 
 @app.command("map")
@@ -104,23 +104,22 @@ def map_(
     timeout_s: TimeoutOption = 1.0,
     baudrate: BaudOption = 115_200,
     parity: ParityOption = "even",
-    json_output: JsonOption = False,
+    json_output: JsonOutput = False,
 ) -> None:
     """Read a configured map once; print each value with its unit, raw registers and flags."""
     if at is None:
-        settings = one_unit(read_plant_file(file), unit, file)
+        settings = one_unit(load_plant_file(file), unit, file)
         device = _mapped_device(settings, slow)
-        units, registers = _units_of(settings), device.registers
+        units = {channel.id: MEASURAND_UNITS[channel.measurand] for channel in settings.channel}
+        units |= {channel.id: channel.unit for channel in settings.slow_channel}
+        registers = device.registers
         place: ModbusLinkSettings = device
     else:
-        units, registers = {}, _map_of(file).register_map()
+        units, registers = {}, load_map_file(file).register_map()
         place = _place(at, unit_id, timeout_s, baudrate, parity)
-    found = value_looks(*_done(read_map_once(place, registers)))
-    if json_output:
-        rows = [asdict(look) | {"unit": _unit(look, units)} for look in found]
-        typer.echo(json.dumps(rows, indent=1))
-    else:
-        typer.echo("\n".join(_value_table(found, units)))
+    found = value_looks(*asyncio.run(read_map_once(place, registers)))
+    rows = [asdict(look) | {"unit": _unit(look, units)} for look in found]
+    print_result(rows, _value_table(found, units), json_output)
 
 
 @app.command()
@@ -132,12 +131,12 @@ def ring(
     timeout_s: TimeoutOption = 1.0,
     baudrate: BaudOption = 115_200,
     parity: ParityOption = "even",
-    json_output: JsonOption = False,
+    json_output: JsonOutput = False,
 ) -> None:
     """Print a block ring's layout, and slow values and counts of its newest slot."""
     place = _place(device, unit_id, timeout_s, baudrate, parity)
-    look = ring_look(*_done(read_ring_once(place, base_address, function)))
-    typer.echo(json.dumps(asdict(look), indent=1) if json_output else "\n".join(_ring_lines(look)))
+    look = ring_look(*asyncio.run(read_ring_once(place, base_address, function)))
+    print_result(look, _ring_lines(look), json_output)
 
 
 @app.command()
@@ -147,36 +146,29 @@ def identity(
     timeout_s: TimeoutOption = 1.0,
     baudrate: BaudOption = 115_200,
     parity: ParityOption = "even",
-    json_output: JsonOption = False,
+    json_output: JsonOutput = False,
 ) -> None:
-    """Print vendor, product code and revision that a device gives by function 43/14."""
+    """Print vendor, product code and revision of a device (function 43/14)."""
     place = _place(device, unit_id, timeout_s, baudrate, parity)
-    found = asdict(_done(identify_once(place)))
+    found = asdict(asyncio.run(identify_once(place)))
     lines = [f"{name.replace('_', ' ')}: {text}" for name, text in found.items()]
-    typer.echo(json.dumps(found) if json_output else "\n".join(lines))
+    print_result(found, lines, json_output, indent=None)
 
 
 @app.command("in-flight")
 def in_flight(
     device: DevicePlace,
-    address: Annotated[int, typer.Option(min=0, max=65535, help="Of a register it has.")] = 0,
+    address: Annotated[int, typer.Option(min=0, max=65535, help="Of an existing register.")] = 0,
     function: Annotated[int, typer.Option(min=3, max=4, help="Function code 3 or 4.")] = 3,
     unit_id: UnitIdOption = 1,
     timeout_s: TimeoutOption = 1.0,
 ) -> None:
-    """Try how many requests a device answers when they are sent at once (Modbus TCP)."""
+    """Measure how many simultaneous requests a device answers (Modbus TCP)."""
     place = _place(device, unit_id, timeout_s, 115_200, "even")
     if place.host is None:
-        fail("padwatch probe: a serial line carries one request at a time", code=2)
-    found = _done(measure_in_flight(place, address, function, MAX_IN_FLIGHT))
+        fail("a serial line carries one request at a time", code=2)
+    found = asyncio.run(measure_in_flight(place, address, function, MAX_IN_FLIGHT))
     typer.echo(f"requests_in_flight = {found}")
-
-
-def _done(look: Coroutine[Any, Any, Result]) -> Result:
-    try:
-        return asyncio.run(look)
-    except AcquisitionError as error:
-        fail(f"padwatch probe: {error}")
 
 
 def _place(
@@ -195,14 +187,7 @@ def _place(
     except ValidationError as error:
         what = error.errors()[0]
         key = what["loc"][-1] if what["loc"] else "device"
-        fail(f"padwatch probe: {device}: {key}: {what['msg']}", code=2)
-
-
-def _map_of(path: Path) -> RegisterMapSettings:
-    try:
-        return load_map_file(path)
-    except TomlFileError as error:
-        fail(str(error), code=2)
+        fail(f"{device}: {key}: {what['msg']}", code=2)
 
 
 def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
@@ -210,14 +195,8 @@ def _mapped_device(unit: UnitSettings, slow: bool) -> MappedDeviceSettings:
     device = getattr(unit, "slow_source", None) if slow else unit.source
     if not isinstance(device, MappedDeviceSettings):
         key = "slow_source" if slow else "source"
-        fail(f"padwatch probe: the {key} of unit {unit.id} has no register map", code=2)
+        fail(f"the {key} of unit {unit.id} has no register map", code=2)
     return device
-
-
-def _units_of(unit: UnitSettings) -> dict[str, str]:
-    """Return the engineering unit of each channel."""
-    waveforms = {channel.id: MEASURAND_UNITS[channel.measurand] for channel in unit.channel}
-    return waveforms | {c.id: c.unit for c in unit.slow_channel}
 
 
 def _unit(look: ValueLook, units: dict[str, str]) -> str:

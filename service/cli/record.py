@@ -3,22 +3,31 @@
 import asyncio
 import random
 import signal
-import sys
 from contextlib import suppress
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 import uvloop
 
 from acquisition.clock import Clock, SystemClock
 from acquisition.errors import AcquisitionError, LinkError
+from acquisition.recordings.reader import open_recording
 from acquisition.recordings.writer import RecordingWriter
 from acquisition.source import SampleSource
-from service.app.recordings import recording_of, recording_writer
-from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
+from service.app.recordings import recording_writer
+from service.cli.options import (
+    JsonOutput,
+    NewRecording,
+    PlantPath,
+    UnitOption,
+    fail,
+    one_unit,
+    print_result,
+    progress,
+)
 from service.measuring.sources import source_of
 from service.runtime.process import made_by
+from service.settings.loading import load_plant_file
 from service.settings.sources.devices import ModbusVectorSettings
 
 MAX_SECONDS = 7 * 86_400.0
@@ -29,51 +38,44 @@ RETRY_S = 0.5
 
 def record(
     plant_file: PlantPath,
-    out: Annotated[Path, typer.Option(help="Folder of the recording; must not exist yet.")],
+    out: NewRecording,
     unit: UnitOption = None,
     seconds: Annotated[
         float, typer.Option(min=0.1, max=MAX_SECONDS, help="Length of the recording.")
     ] = 600.0,
     reconnect: Annotated[
-        bool, typer.Option("--reconnect", help="Go on after a lost link; what it cost is a gap.")
+        bool, typer.Option("--reconnect", help="Continue after a lost link, with a gap.")
     ] = False,
-    json_output: Annotated[
-        bool, typer.Option("--json", help="Print the manifest instead of a sentence.")
-    ] = False,
+    json_output: JsonOutput = False,
 ) -> None:
     """Record a unit's samples exactly as its DAQ delivers them.
 
     Ctrl-C and SIGTERM end the recording early and keep it. So does a lost link, with exit code 1,
     unless --reconnect is given: then the recording ends when its length has passed.
     """
-    settings = one_unit(read_plant_file(plant_file), unit, plant_file)
+    settings = one_unit(load_plant_file(plant_file), unit, plant_file)
     if isinstance(settings.source, ModbusVectorSettings):
-        fail(f"padwatch record: the rack of unit {settings.id} gives vectors, not samples", code=2)
+        fail(f"the rack of unit {settings.id} delivers vectors, not samples", code=2)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        fail(f"padwatch record: {out.parent}: {error.strerror}")
-    try:
-        writer = recording_writer(settings, out, made_by())
-        clock = SystemClock()
-        patience = Patience(seconds, clock) if reconnect else None
-        problem = uvloop.run(record_blocks(source_of(settings, clock), writer, seconds, patience))
-        manifest = recording_of(out).manifest
-    except AcquisitionError as error:
-        fail(f"padwatch record: {error}")
-    if json_output:
-        typer.echo(manifest.model_dump_json(indent=1))
-    else:
-        n_bytes = sum(file.size for file in manifest.files.values())
-        typer.echo(
-            f"{out}: {manifest.n_samples / manifest.rate_hz:.1f} s of unit {manifest.unit},"
-            f" {len(manifest.channels)} channels, {n_bytes / 1e6:.1f} MB"
-        )
+        fail(f"{out.parent}: {error.strerror}")
+    writer = recording_writer(settings, out, made_by())
+    clock = SystemClock()
+    policy = ReconnectPolicy(seconds, clock) if reconnect else None
+    problem = uvloop.run(record_blocks(source_of(settings, clock), writer, seconds, policy))
+    manifest = open_recording(out).manifest
+    n_bytes = sum(file.size for file in manifest.files.values())
+    line = (
+        f"{out}: {manifest.n_samples / manifest.rate_hz:.1f} s of unit {manifest.unit},"
+        f" {len(manifest.channels)} channels, {n_bytes / 1e6:.1f} MB"
+    )
+    print_result(manifest, [line], json_output)
     if problem:
-        fail(f"padwatch record: ended early: {problem}")
+        fail(f"ended early: {problem}")
 
 
-class Patience:
+class ReconnectPolicy:
     """Waits before a lost link is opened again, until the planned end of the recording."""
 
     def __init__(self, seconds: float, clock: Clock) -> None:
@@ -92,14 +94,14 @@ async def record_blocks(
     source: SampleSource,
     writer: RecordingWriter,
     seconds: float,
-    patience: Patience | None = None,
+    policy: ReconnectPolicy | None = None,
 ) -> str | None:
-    """Record until enough has passed, SIGINT or SIGTERM comes, or the link is lost.
+    """Record until the length has passed, SIGINT or SIGTERM arrives, or the link is lost.
 
     Parameters
     ----------
-    patience
-        Given if a lost link is to be opened again.
+    policy
+        Reopens a lost link; without it, a lost link ends the recording.
 
     Returns
     -------
@@ -111,7 +113,7 @@ async def record_blocks(
         If nothing could be recorded; no files remain.
     """
     with writer:
-        reading = asyncio.create_task(_read(source, writer, seconds, patience))
+        reading = asyncio.create_task(_read(source, writer, seconds, policy))
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, reading.cancel)
@@ -126,29 +128,23 @@ async def record_blocks(
 
 
 async def _read(
-    source: SampleSource, writer: RecordingWriter, seconds: float, patience: Patience | None
+    source: SampleSource,
+    writer: RecordingWriter,
+    seconds: float,
+    policy: ReconnectPolicy | None,
 ) -> None:
-    on_terminal = sys.stderr.isatty()
-    with typer.progressbar(
-        length=round(seconds), label="Recording", file=sys.stderr, hidden=not on_terminal
-    ) as bar:
-        while True:
+    with progress("Recording", round(seconds)) as bar:
+        while writer.duration_s < seconds:
             try:
-                await _read_once(source, writer, seconds, bar)
+                async with source.connect() as blocks:
+                    async for block in blocks:
+                        writer.write_block(block)
+                        bar.update(round(min(writer.duration_s, seconds)) - bar.pos)
+                        if writer.duration_s >= seconds:
+                            break
+                    else:
+                        return  # the source has ended
             except LinkError as error:
-                if patience is None:
+                if policy is None:
                     raise
-                await patience.wait(error)
-            else:
-                return
-
-
-async def _read_once(
-    source: SampleSource, writer: RecordingWriter, seconds: float, bar: Any
-) -> None:
-    async with source.connect() as blocks:
-        async for block in blocks:
-            writer.write_block(block)
-            bar.update(round(min(writer.duration_s, seconds)) - bar.pos)
-            if writer.duration_s >= seconds:
-                return
+                await policy.wait(error)

@@ -1,10 +1,7 @@
 """`padwatch recording`: describe, list, verify, check, export and import recordings."""
 
-import json
-import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,68 +9,81 @@ import typer
 
 from acquisition.clock import SystemClock
 from acquisition.delivery.units import UNIT_OF
-from acquisition.errors import AcquisitionError
 from acquisition.recordings.export import ExportFormat, export_recording
-from acquisition.recordings.reader import Recording
+from acquisition.recordings.reader import Recording, open_recording
 from acquisition.recordings.summary import RecordingSummary, summary_of
-from service.app.recordings import recording_of
-from service.app.storage import has_store, open_store, retention_rules
+from service.app.storage import has_store, retention_rules
 from service.cli.offline.importing import import_recording
-from service.cli.options import PlantPath, UnitOption, fail, one_unit, read_plant_file
+from service.cli.options import (
+    JsonOutput,
+    NewRecording,
+    PlantOption,
+    PlantPath,
+    RecordingFolder,
+    UnitOption,
+    argument,
+    command_group,
+    fail,
+    one_unit,
+    option,
+    plant_store,
+    print_result,
+    progress,
+)
 from service.recordings.folders import place_of
 from service.recordings.index import CheckResult, RecordingCheck, RecordingState
 from service.runtime.process import made_by
 from service.runtime.times import rfc3339
+from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.sources.mapping import ImportMapping
-from service.settings.toml_file import TomlFileError, load_toml
-from service.store.port import StoreError
+from service.settings.toml_file import load_toml
 from service.store.waveform_port import WaveformFile, WaveformKind
 
-WRONG = (RecordingState.DAMAGED, RecordingState.MISSING)
+app = command_group("Look into recordings, check them, export and import them.")
 
 
-def check(
-    plant_file: PlantPath,
-    json_output: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
-) -> None:
+@app.command()
+def check(plant_file: PlantPath, json_output: JsonOutput = False) -> None:
     """Read all recordings that the service keeps, and compare them with the index.
 
-    Changes nothing; the service may go on running. Exit code 1 if a recording is damaged or
+    Changes nothing; the service may keep running. Exit code 1 if a recording is damaged or
     missing. `padwatch recording verify` checks one that was made with `--out` elsewhere.
     """
-    plant = read_plant_file(plant_file)
+    plant = load_plant_file(plant_file)
     roots = retention_rules(plant).roots
     try:
         verdicts = _verdicts(plant, roots)
-    except (OSError, StoreError) as error:
-        fail(f"padwatch recording check: {error}")
+    except OSError as error:
+        fail(str(error))
     counts = Counter(verdict.found for verdict in verdicts)
     others = [verdict for verdict in verdicts if verdict.found is not RecordingState.SOUND]
-    if json_output:
-        folders = [str(root) for root in roots.values()]
-        typer.echo(json.dumps(_document(counts, others) | {"folders": folders}, indent=1))
-    else:
-        for verdict in others:
-            words = verdict.found.value.replace("_", " ")
-            typer.echo(f"{verdict.kind.value} {verdict.name}: {words}: {verdict.reason}")
-        typer.echo(", ".join(f"{counts[f]} {f.value.replace('_', ' ')}" for f in RecordingState))
-        if not verdicts:
-            typer.echo(
-                f"no recordings in {' or '.join(map(str, roots.values()))};"
-                " padwatch recording verify FOLDER checks one that was made elsewhere (--out)"
-            )
-    if any(verdict.found in WRONG for verdict in verdicts):
+    document = {
+        **{found.value: counts[found] for found in RecordingState},
+        "recordings": [
+            {"kind": v.kind, "name": v.name, "found": v.found, "reason": v.reason} for v in others
+        ],
+        "folders": [str(root) for root in roots.values()],
+    }
+    lines = [
+        f"{verdict.kind.value} {verdict.name}: {_words(verdict.found)}: {verdict.reason}"
+        for verdict in others
+    ]
+    lines.append(", ".join(f"{counts[found]} {_words(found)}" for found in RecordingState))
+    if not verdicts:
+        lines.append(
+            f"no recordings in {' or '.join(map(str, roots.values()))};"
+            " padwatch recording verify FOLDER checks one that was made elsewhere (--out)"
+        )
+    print_result(document, lines, json_output)
+    if counts[RecordingState.DAMAGED] or counts[RecordingState.MISSING]:
         raise typer.Exit(1)
 
 
 def _verdicts(plant: PlantFile, roots: Mapping[WaveformKind, Path]) -> list[CheckResult]:
     checking = RecordingCheck(roots, _index(plant), SystemClock().now_ns())
     found = []
-    hidden = not sys.stderr.isatty()
-    with typer.progressbar(
-        length=checking.n_to_read, label="Checking", file=sys.stderr, hidden=hidden
-    ) as bar:
+    with progress("Checking", checking.n_to_read) as bar:
         for verdict in checking.results():
             found.append(verdict)
             bar.update(1)
@@ -83,19 +93,20 @@ def _verdicts(plant: PlantFile, roots: Mapping[WaveformKind, Path]) -> list[Chec
 def _index(plant: PlantFile) -> Sequence[WaveformFile]:
     if not has_store(plant):
         return []
-    with closing(open_store(plant)) as store:
+    with plant_store(plant) as store:
         return store.waveforms.files(place_of(Path(plant.service.data_folder)))
 
 
-def _document(counts: Counter[RecordingState], others: Sequence[CheckResult]) -> dict[str, object]:
-    listed = [
-        {"kind": v.kind.value, "name": v.name, "found": v.found.value, "reason": v.reason}
-        for v in others
-    ]
-    return {found.value: counts[found] for found in RecordingState} | {"recordings": listed}
+def _words(found: RecordingState) -> str:
+    return found.value.replace("_", " ")
 
 
 GAPS_PRINTED = 20
+DESCRIBED = {
+    *("unit", "version", "made_by", "sample_type", "rate_hz", "block_samples"),
+    *("slow_channels", "files"),
+}
+"""Fields of the manifest in the description of a recording."""
 
 
 def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
@@ -103,12 +114,7 @@ def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
     manifest = recording.manifest
     return {
         "folder": str(recording.folder),
-        "unit": manifest.unit,
-        "version": manifest.version,
-        "made_by": manifest.made_by,
-        "sample_type": manifest.sample_type,
-        "rate_hz": manifest.rate_hz,
-        "block_samples": manifest.block_samples,
+        **manifest.model_dump(mode="json", include=DESCRIBED),
         "start": rfc3339(summary.start_ns),
         "end": rfc3339(summary.stop_ns),
         "samples": summary.n_samples,
@@ -131,8 +137,6 @@ def json_of(recording: Recording, summary: RecordingSummary) -> dict[str, Any]:
             channel.model_dump(mode="json") | {"unit": UNIT_OF[channel.measurand]}
             for channel in manifest.channels
         ],
-        "slow_channels": [channel.model_dump(mode="json") for channel in manifest.slow_channels],
-        "files": {name: file.model_dump() for name, file in manifest.files.items()},
     }
 
 
@@ -168,71 +172,50 @@ def _losses(summary: RecordingSummary) -> Iterator[str]:
         yield f"  not OK       {n_samples} samples of {id_}"
 
 
-app = typer.Typer(
-    no_args_is_help=True, help="Look into recordings, check them, export and import them."
-)
-app.command()(check)
+@app.command()
+def info(folder: RecordingFolder, json_output: JsonOutput = False) -> None:
+    """Describe a recording: channels, length, gaps, restarts, rejections, checksums."""
+    _print_recording(folder, json_output)
 
-Folder = Annotated[Path, typer.Argument(help="Folder of the recording.", show_default=False)]
-JsonOutput = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+def _print_recording(folder: Path, json_output: bool) -> None:
+    recording = open_recording(folder)
+    summary = summary_of(recording)
+    print_result(json_of(recording, summary), lines_of(recording, summary), json_output)
 
 
 @app.command()
-def info(folder: Folder, json_output: JsonOutput = False) -> None:
-    """Show what is in a recording: channels, length, gaps, restarts, rejections, checksums."""
-    try:
-        recording = recording_of(folder)
-        summary = summary_of(recording)
-    except AcquisitionError as error:
-        fail(f"padwatch recording info: {error}")
-    if json_output:
-        typer.echo(json.dumps(json_of(recording, summary), indent=1))
-    else:
-        typer.echo("\n".join(lines_of(recording, summary)))
-
-
-@app.command()
-def verify(folder: Folder, json_output: JsonOutput = False) -> None:
+def verify(folder: RecordingFolder, json_output: JsonOutput = False) -> None:
     """Read all of a recording: checksums, lengths and every page. Exit code 1 if it is damaged."""
-    try:
-        recording = recording_of(folder)
-        n_samples = 0
-        with _bar("Verifying", recording.manifest.n_samples) as bar:
-            for block in recording.raw_blocks():
-                n_samples += block.n_samples
-                bar.update(block.n_samples)
-    except AcquisitionError as error:
-        fail(f"padwatch recording verify: {error}")
-    if json_output:
-        typer.echo(json.dumps({"folder": str(folder), "sound": True, "samples": n_samples}))
-    else:
-        typer.echo(f"{folder}: sound, {n_samples} samples of each channel")
+    recording, n_samples = open_recording(folder), 0
+    with progress("Verifying", recording.manifest.n_samples) as bar:
+        for block in recording.raw_blocks():
+            n_samples += block.n_samples
+            bar.update(block.n_samples)
+    document = {"folder": str(folder), "sound": True, "samples": n_samples}
+    line = f"{folder}: sound, {n_samples} samples of each channel"
+    print_result(document, [line], json_output, indent=None)
 
 
 @app.command()
 def export(
-    folder: Folder,
-    format_: Annotated[
-        ExportFormat, typer.Option("--format", help="Of the file.", show_default=False)
-    ],
+    folder: RecordingFolder,
+    format_: Annotated[ExportFormat, option("Of the file.", "--format")],
     out: Annotated[Path, typer.Option(help="File to write; must not exist yet.")],
 ) -> None:
     """Write a recording as a file for other tools: engineering units, UTC, no rows in gaps."""
-    try:
-        recording = recording_of(folder)
-        with _bar("Exporting", recording.manifest.n_samples) as bar:
-            export_recording(recording, format_, out, bar.update)
-    except AcquisitionError as error:
-        fail(f"padwatch recording export: {error}")
+    recording = open_recording(folder)
+    with progress("Exporting", recording.manifest.n_samples) as bar:
+        export_recording(recording, format_, out, bar.update)
     typer.echo(f"{out}: {recording.manifest.n_samples} samples of each channel")
 
 
 @app.command("import")
 def import_(
-    file: Annotated[Path, typer.Argument(help="The file to import.", show_default=False)],
+    file: Annotated[Path, argument("The file to import.")],
     mapping: Annotated[Path, typer.Option(help="Which column is which channel (TOML).")],
-    plant: Annotated[Path, typer.Option(help="The plant file (TOML).")],
-    out: Annotated[Path, typer.Option(help="Folder of the recording; must not exist yet.")],
+    plant: PlantOption,
+    out: NewRecording,
     unit: UnitOption = None,
     json_output: JsonOutput = False,
 ) -> None:
@@ -240,32 +223,12 @@ def import_(
 
     Units are converted exactly or refused, missing stretches become gaps, nothing is resampled.
     """
-    settings = one_unit(read_plant_file(plant), unit, plant)
-    try:
-        mapped = load_toml(mapping, ImportMapping)
-    except TomlFileError as error:
-        fail(str(error), code=2)
-    try:
-        with _bar("Importing", 100) as bar:
-            import_recording(
-                file,
-                mapped,
-                settings,
-                out,
-                made_by(),
-                advanced=lambda done: bar.update(round(100 * done) - bar.pos),
-            )
-        recording = recording_of(out)
-        summary = summary_of(recording)
-    except AcquisitionError as error:
-        fail(f"padwatch recording import: {error}")
-    if json_output:
-        typer.echo(json.dumps(json_of(recording, summary), indent=1))
-    else:
-        typer.echo("\n".join(lines_of(recording, summary)))
+    settings = one_unit(load_plant_file(plant), unit, plant)
+    mapped = load_toml(mapping, ImportMapping)
+    with progress("Importing", 100) as bar:
 
+        def advanced(share: float) -> None:
+            bar.update(round(100 * share) - bar.pos)
 
-def _bar(label: str, length: int) -> Any:
-    return typer.progressbar(
-        length=length, label=label, file=sys.stderr, hidden=not sys.stderr.isatty()
-    )
+        import_recording(file, mapped, settings, out, made_by(), advanced=advanced)
+    _print_recording(out, json_output)

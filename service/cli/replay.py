@@ -1,6 +1,5 @@
 """`padwatch replay`: recordings through the whole service, straight or over a real wire."""
 
-import json
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,81 +9,74 @@ from typing import Annotated
 import typer
 
 from acquisition.clock import SystemClock
-from acquisition.errors import AcquisitionError, LinkError
-from service.api.http.listening import PortInUseError
-from service.app.recordings import recordings_by_unit, replay_source
-from service.app.replay import PlayedOut, replay_folder, replayed_plant
-from service.app.service import Performance, run_service
+from acquisition.errors import LinkError
+from service.app.recordings import (
+    PlayedOut,
+    recordings_by_unit,
+    replay_folder,
+    replay_source,
+    replayed_plant,
+)
+from service.app.service import ServiceRun, run_service
 from service.app.simulated_daq import Wire, over_wire
 from service.app.storage import database_path
 from service.app.web import listener_of
 from service.cli.daq import RunningDaq, SpeedOption, daq_process
-from service.cli.options import fail, read_plant_file
+from service.cli.options import JsonOutput, PlantOption, fail, option, print_result
 from service.cli.run import announce
 from service.measuring.sources import source_of, watched_units
 from service.runtime.process import run_to_its_end
+from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
-from service.store.port import StoreError
 
 
 def replay(
     recordings: Annotated[list[Path], typer.Argument(help="Folders of the recordings.")],
-    plant: Annotated[Path, typer.Option(help="The plant file (TOML).", show_default=False)],
-    through: Annotated[
-        Wire | None,
-        typer.Option(help="Play through a simulated DAQ over this wire.", show_default=False),
-    ] = None,
+    plant: PlantOption,
+    through: Annotated[Wire | None, option("Play through a simulated DAQ over this wire.")] = None,
     speed: SpeedOption = 1.0,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="Folder of the results [<data folder>/replays/…]", show_default=False),
-    ] = None,
+    out: Annotated[Path | None, option("Folder of the results [<data folder>/replays/…]")] = None,
     serve: Annotated[
-        bool, typer.Option(help="Go on serving the results until Ctrl-C when all is played.")
+        bool, typer.Option(help="Keep serving the results until Ctrl-C after the replay.")
     ] = False,
     port: Annotated[int, typer.Option(min=0, max=65535, help="HTTP port; 0: any free one.")] = 0,
-    json_output: Annotated[
-        bool, typer.Option("--json", help="Print where the results are as JSON.")
-    ] = False,
+    json_output: JsonOutput = False,
 ) -> None:
     """Play recordings through acquisition, analysis, store and dashboard, as if they happened now.
 
-    All of it says that it is a replay, and its results have a database of their own.
+    All pages and answers show that it is a replay, and its results have a database of their own.
     """
-    file = read_plant_file(plant)
-    try:
-        units = recordings_by_unit(recordings, file)
-        folder = out or replay_folder(file, units.values(), SystemClock().now_ns())
-        played = replayed_plant(file, units, folder)
-        _require_new(database_path(played))
-        database = database_path(played)
-        line = json.dumps({"database": str(database)}) if json_output else f"results: {database}"
-        with (
-            _performance(played, plant, units, through, speed, serve) as (performance, daq),
-            listener_of(performance.plant, port) as listener,
-        ):
-            run_to_its_end(_play(performance, listener, daq, line))
-    except (PortInUseError, StoreError, AcquisitionError, LookupError) as error:
-        fail(f"padwatch replay: {error.args[0]}")
+    file = load_plant_file(plant)
+    units = recordings_by_unit(recordings, file)
+    folder = out or replay_folder(file, units.values(), SystemClock().now_ns())
+    played = replayed_plant(file, units, folder)
+    database = database_path(played)
+    if database.exists():  # its alarms would be resumed
+        fail(f"{database} holds results already; a replay needs a folder of its own")
+    with (
+        _service_run(played, plant, units, through, speed, serve) as (service_run, daq),
+        listener_of(service_run.plant, port) as listener,
+    ):
+        run_to_its_end(_play(service_run, listener, daq, database, json_output))
 
 
 @contextmanager
-def _performance(
+def _service_run(
     plant: PlantFile,
     plant_path: Path,
     units: Mapping[str, Path],
     through: Wire | None,
     speed: float,
     serve: bool,
-) -> Iterator[tuple[Performance, RunningDaq | None]]:
+) -> Iterator[tuple[ServiceRun, RunningDaq | None]]:
     """Build the service run, and start the DAQ that plays the recordings, if there is one."""
     clock = SystemClock()
     if through is None:
         watched = watched_units(
             plant, lambda unit: replay_source(units[unit.id], unit, clock, speed or None)
         )
-        yield Performance(plant, watched, Origin.REPLAY, ends=not serve), None
+        yield ServiceRun(plant, watched, Origin.REPLAY, ends=not serve), None
         return
     arguments = [str(plant_path), "--through", through.value, "--speed", str(speed)]
     for folder in units.values():
@@ -95,23 +87,15 @@ def _performance(
         watched = watched_units(
             attached, lambda unit: PlayedOut(source_of(unit, clock), daq.over[unit.id], gone)
         )
-        yield Performance(attached, watched, Origin.REPLAY, ends=not serve), daq
-
-
-def _require_new(database: Path) -> None:
-    """Refuse a folder with results: its alarms would be resumed.
-
-    Raises
-    ------
-    LookupError
-        If the database exists.
-    """
-    if database.exists():
-        raise LookupError(f"{database} holds results already; a replay needs a folder of its own")
+        yield ServiceRun(attached, watched, Origin.REPLAY, ends=not serve), daq
 
 
 async def _play(
-    performance: Performance, listener: socket, daq: RunningDaq | None, line: str
+    service_run: ServiceRun,
+    listener: socket,
+    daq: RunningDaq | None,
+    database: Path,
+    json_output: bool,
 ) -> None:
     """Run the service and print the place of the results, before the process may exit.
 
@@ -120,9 +104,10 @@ async def _play(
     LinkError
         If the DAQ ended before its recordings.
     """
-    await run_service(performance, listener, SystemClock(), announce)
+    await run_service(service_run, listener, SystemClock(), announce)
     if daq is not None and daq.has_failed:
         raise LinkError(
             "the simulated DAQ has ended before its recordings did: results are incomplete"
         )
-    typer.echo(line)
+    results = {"database": str(database)}
+    print_result(results, [f"results: {database}"], json_output, indent=None)

@@ -64,11 +64,9 @@ def _amplitude_table(title: str, rows: list[Row]) -> Iterator[str]:
     header = "".join(f"{name.removesuffix('_um_pk'):>24}" for name in QUANTITIES)
     yield f"{'condition':>9}{header}"
     for condition, cells in groupby(rows, key=lambda row: row.condition):
-        yield f"{condition:>9}" + "".join(_amplitude_cell(row) for row in cells)
-
-
-def _amplitude_cell(row: Row) -> str:
-    return f"{row.paper:>8.1f} /{row.padwatch:>6.2f} ({row.error_percent:+.1f}%)"
+        yield f"{condition:>9}" + "".join(
+            f"{row.paper:>8.1f} /{row.padwatch:>6.2f} ({row.error_percent:+.1f}%)" for row in cells
+        )
 
 
 def _stiffness_table(title: str, pairs: Iterable[tuple[Row, MeasuredRow]]) -> Iterator[str]:

@@ -66,7 +66,7 @@ class Index:
             self._store.put(list(found.values()))
             self._files |= found
             for key in found:
-                self._removed.pop(key, None)  # the name is in use again
+                self._removed.pop(key, None)  # the name is in use reinspected
 
     def remove(self, file: WaveformFile, reason: str, now_ns: int) -> None:
         """Remove an entry; `store_removals` writes this to the store."""

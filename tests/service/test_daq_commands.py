@@ -7,7 +7,7 @@ import os
 import pytest
 
 from acquisition.errors import LinkError
-from service.app.simulated_daq import obeyed, run_daq
+from service.app.simulated_daq import execute_command, run_daq
 from service.cli.daq import held_lines
 
 
@@ -45,8 +45,8 @@ def devices() -> dict[str, Device]:
 
 
 def test_a_fault_is_injected_where_and_as_often_as_told(devices) -> None:
-    assert obeyed(devices, "U2 drop 3\n") == {"done": "U2 drop 3"}
-    assert obeyed(devices, "U2 tear") == {"done": "U2 tear"}
+    assert execute_command(devices, "U2 drop 3\n") == {"done": "U2 drop 3"}
+    assert execute_command(devices, "U2 tear") == {"done": "U2 tear"}
     assert devices["U2"].faults == [("drop", 3), ("tear", 1)]
     assert devices["U1"].faults == []
 
@@ -60,12 +60,12 @@ def test_a_fault_is_injected_where_and_as_often_as_told(devices) -> None:
         ("U1 drop -1", "'U1 drop -1' is not UNIT FAULT [COUNT]"),
         ("U1 drop 1000001", "COUNT is 1000001, at most 1000000"),
         ("U1 drop 1 2", "'U1 drop 1 2' is not UNIT FAULT [COUNT]"),
-        ("U3 drop", "no unit U3 here; there are U1, U2"),
+        ("U3 drop", "no unit U3 here; known are U1, U2"),
         ("U1 melt", "unknown fault melt; there are drop, tear"),
     ],
 )
 def test_a_line_that_is_no_command_changes_nothing_and_says_why(devices, line, words) -> None:
-    assert obeyed(devices, line) == {"refused": words}
+    assert execute_command(devices, line) == {"refused": words}
     assert devices["U1"].faults == []
 
 

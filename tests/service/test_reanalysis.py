@@ -9,15 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic_core import to_json
 
 from acquisition.delivery.blocks import BlockAssembler, RawBlock, sample_block
+from acquisition.recordings.reader import open_recording
+from acquisition.recordings.source import RecordingSource
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import Rejection
-from service.app.recordings import recording_of, recording_source, recording_writer, selection_of
+from service.app.recordings import recording_writer, selection_of
 from service.cli.offline.reanalysis import (
     LastAverages,
-    assessment_model,
+    assessment_document,
     assessments,
     calibration_differences,
 )
@@ -71,8 +74,8 @@ async def test_a_recording_analysed_equals_what_was_seen_live_to_the_last_bit(
             live += live_monitor.ingest(block)
             writer.write_block(block)
 
-    recording = recording_of(tmp_path / "run")
-    source = recording_source(recording, selection_of(recording, unit), None, stepped_clock)
+    recording = open_recording(tmp_path / "run")
+    source = RecordingSource(recording, stepped_clock, selection_of(recording, unit))
     monitor, n_passed = UnitMonitor(machine, ANALYSIS), []
     again = [found async for found in assessments(source, monitor, n_passed.append)]
 
@@ -110,7 +113,7 @@ def test_the_last_full_average_is_kept_and_the_last_of_all_until_there_is_one(
 
 
 def test_an_assessment_has_every_digit_in_json(sample: Assessment) -> None:
-    found = json.loads(assessment_model(sample).model_dump_json())
+    found = json.loads(to_json(assessment_document(sample)))
     for name, reading in sample.readings.items():
         assert found["readings"][name]["value"] == reading.value
         assert found["readings"][name]["reason"] == reading.quality.reason.value

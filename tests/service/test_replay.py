@@ -11,7 +11,7 @@ from rigs.blocks import given_block
 from acquisition.errors import LinkError
 from core.quality import GOOD
 from core.samples.blocks import DeviceClock, SampleBlock
-from service.app.replay import PlayedOut, replay_folder, replayed_plant
+from service.app.recordings import PlayedOut, replay_folder, replayed_plant
 from service.settings.loading import load_plant_file
 
 NEW_YEAR_NS = 1_767_225_600 * 1_000_000_000

@@ -1,16 +1,16 @@
-"""The back-test of all units of a file: run, list and export."""
+"""Back-test of all units of a file: run, print and export."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 
 from core.baseline.baseline import BearingBaseline
-from core.baseline.history import ReadingOutcome, StiffnessHistory
+from core.baseline.history import ReadingOutcome
 from core.change.shaft_response import ShaftResponse
 from core.condition.operating_state import STEADY
 from core.units import DAY_NS
@@ -33,16 +33,17 @@ from service.cli.offline.backtest_report import (
     alarm_reports,
     film_reports,
 )
+from service.runtime.times import EPOCH
 from service.store.documents import to_json
 
 YEAR_NS = 365.25 * DAY_NS
-APART = 2.0
-"""Largest ratio of a reading's length to the time between readings without a warning."""
+MAX_PERIOD_RATIO = 2.0
+"""Largest ratio of a reading's nominal period to the time between readings without a warning."""
 
 
 @dataclass
-class Found:
-    """Results of a back-test so far."""
+class BackTestResult:
+    """Result of a back-test."""
 
     films: list[FilmReport] = field(default_factory=list)
     alarms: list[AlarmReport] = field(default_factory=list)
@@ -51,14 +52,24 @@ class Found:
     doubts: list[str] = field(default_factory=list)
     unit_years: float = 0.0
 
-    def rate(self) -> RateReport:
-        """Return the rate of alarms."""
-        n_alarms = len(self.alarms)
-        return RateReport(
-            unit_years=self.unit_years,
-            n_alarms=n_alarms,
-            n_danger=sum(alarm.level == "danger" for alarm in self.alarms),
-            alarms_per_unit_year=n_alarms / self.unit_years if self.unit_years else None,
+    def report(self, file: str, n_rows: int, duration_s: float) -> BackTestReport:
+        """Return the report of a file."""
+        n_alarms, n_danger = len(self.alarms), sum(a.level == "danger" for a in self.alarms)
+        per_year = n_alarms / self.unit_years if self.unit_years else None
+        return BackTestReport(
+            file=file,
+            rows=n_rows,
+            films=self.films,
+            alarms=self.alarms,
+            rate=RateReport(
+                unit_years=self.unit_years,
+                n_alarms=n_alarms,
+                n_danger=n_danger,
+                alarms_per_unit_year=per_year,
+            ),
+            doubts=self.doubts,
+            duration_s=duration_s,
+            readings_per_s=n_rows / max(duration_s, 1e-9),
         )
 
 
@@ -66,7 +77,7 @@ def run_back_test(
     histories: Mapping[Place, BearingRows],
     rules: BackTestRules,
     advanced: Callable[[int], object] = lambda _: None,
-) -> Found:
+) -> BackTestResult:
     """Learn and decide over all histories.
 
     Parameters
@@ -79,51 +90,53 @@ def run_back_test(
     ReadingsError
         If an event names a bearing without readings, or operating states are unknown.
     """
-    found = Found(doubts=list(_doubts(histories, rules)))
-    _check_events(histories, rules)
+    result = BackTestResult(doubts=list(_doubts(histories, rules)))
+    for event in rules.events:
+        if not any(event.is_about(*place) for place in histories):
+            name = event.unit + (f"/{event.bearing}" if event.bearing else "")
+            raise ReadingsError(f"event of {name}: there are no readings of it")
     for unit, places in groupby(sorted(histories), key=lambda place: place[0]):
         runs = []
         for place in places:
             runs.append(run_bearing(place, histories[place], rules))
             advanced(sum(histories[place].n_rows))
-        _take_unit(found, unit, runs, rules)
-    found.alarms.sort(key=lambda a: (a.begin, a.unit, a.bearing, a.direction))
-    return found
+        _add_unit(result, unit, runs, rules)
+    result.alarms.sort(key=lambda a: (a.begin, a.unit, a.bearing, a.direction))
+    return result
 
 
-def _take_unit(found: Found, unit: str, runs: Sequence[BearingRun], rules: BackTestRules) -> None:
+def _add_unit(
+    result: BackTestResult, unit: str, runs: Sequence[BearingRun], rules: BackTestRules
+) -> None:
     causes = UnitCauses(unit, runs, rules)
-    found.alarms += alarm_reports(runs, causes)
+    result.alarms += alarm_reports(runs, causes)
     for run in runs:
-        found.films += film_reports(run)
-        found.baselines += [p.baseline for p in run.periods if p.baseline is not None]
-        found.doubts += [
-            f"{' '.join(run.place)} baseline {p.period.version}: {p.doubt}; the service would leave"
-            " it to an engineer"
-            for p in run.periods
-            if p.doubt
-        ]
-        found.doubts += [
-            f"{' '.join(run.place)} baseline {p.period.version}: {p.far}"
-            for p in run.periods
-            if p.far
-        ]
-        found.doubts += _unsettled(run)
-    found.responses += [
+        result.films += film_reports(run)
+        result.baselines += [p.baseline for p in run.periods if p.baseline is not None]
+        result.doubts += _doubts_of(run)
+    result.responses += [
         (unit, number, response)
         for number, response in enumerate(causes.responses, start=1)
         if response is not None
     ]
-    found.unit_years += max(_compared_ns(run) for run in runs) / YEAR_NS
+    result.unit_years += max(_compared_ns(run) for run in runs) / YEAR_NS
 
 
-def _unsettled(run: BearingRun) -> Iterator[str]:
-    """Yield why nothing was learned or judged, if the bearing never warmed up."""
+def _doubts_of(run: BearingRun) -> Iterator[str]:
+    """Yield doubts about baselines, and the reason if the bearing never warmed up."""
+    place = " ".join(run.place)
+    for p in run.periods:
+        if p.doubt:
+            drift = f"{p.doubt}; the service would leave it to an engineer"
+            yield f"{place} baseline {p.period.version}: {drift}"
+    for p in run.periods:
+        if p.far:
+            yield f"{place} baseline {p.period.version}: {p.far}"
     n = int(np.isin(run.operation.state, [int(state) for state in STEADY]).sum())
     if n and not run.operation.is_settled.any():
         yield (
-            f"{' '.join(run.place)}: none of {n} readings at speed was settled, so that nothing was"
-            " learned or judged: each run ends before the oil temperature has settled"
+            f"{place}: none of {n} readings at speed was settled, so that nothing was learned or"
+            " judged: each run ends before the oil temperature has settled"
         )
 
 
@@ -137,42 +150,32 @@ def _compared_ns(run: BearingRun) -> int:
     )
 
 
-def _check_events(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> None:
-    for event in rules.events:
-        if not any(event.is_about(*place) for place in histories):
-            name = event.unit + (f"/{event.bearing}" if event.bearing else "")
-            raise ReadingsError(f"event of {name}: there are no readings of it")
-
-
 def _doubts(histories: Mapping[Place, BearingRows], rules: BackTestRules) -> Iterator[str]:
     """Yield warnings about the validity of the results."""
-    told_h = rules.baseline.reading_h
+    nominal_h = rules.baseline.reading_h
     for (unit, bearing), rows in histories.items():
         history = rows.history
         if len(history) > 1:
             apart_h = float(np.median(np.diff(history.time_ns))) / 3.6e12
-            if not told_h / APART <= apart_h <= told_h * APART:
+            ratio = apart_h / nominal_h
+            if not 1.0 / MAX_PERIOD_RATIO <= ratio <= MAX_PERIOD_RATIO:
                 yield (
-                    f"{unit} {bearing}: readings are {60 * apart_h:.3g} min apart and are taken to"
-                    f" stand for {60 * told_h:.3g} min each; set reading_period_s"
+                    f"{unit} {bearing}: readings are {60 * apart_h:.3g} min apart, but each counts"
+                    f" as {60 * nominal_h:.3g} min; set reading_period_s"
                 )
-        if n := _without_condition(history):
+        is_good = np.any(history.outcome == ReadingOutcome.MEASURED, axis=0)
+        is_known = np.isfinite(history.eccentricity_ratio) & np.isfinite(history.oil_temperature_c)
+        if n := int(np.sum(is_good & ~is_known)):
             yield (
                 f"{unit} {bearing}: {n} of {len(history)} readings have a good stiffness but no"
                 " eccentricity_ratio or no oil_temperature_c; they were neither learned nor judged"
             )
         if rules.baseline.uses_attitude and not np.isfinite(history.attitude_deg).any():
-            yield f"{unit} {bearing}: no attitude_deg, so that its baseline does without"
+            yield f"{unit} {bearing}: no attitude_deg, so its baseline does not use it"
 
 
-def _without_condition(history: StiffnessHistory) -> int:
-    is_good = np.any(history.outcome == ReadingOutcome.MEASURED, axis=0)
-    is_known = np.isfinite(history.eccentricity_ratio) & np.isfinite(history.oil_temperature_c)
-    return int(np.sum(is_good & ~is_known))
-
-
-def export_baselines(found: Found, folder: Path) -> int:
-    """Write everything that was learned into a new folder; return how many files.
+def export_baselines(result: BackTestResult, folder: Path) -> int:
+    """Write all baselines and responses into a new folder; return the number of files.
 
     Raises
     ------
@@ -180,18 +183,14 @@ def export_baselines(found: Found, folder: Path) -> int:
         If the folder exists, or cannot be written.
     """
     folder.mkdir(parents=True)
-    files = list(_files(found))
-    for name, text in files:
-        (folder / name).write_text(text, encoding="utf-8")
-    return len(files)
-
-
-def _files(found: Found) -> Iterator[tuple[str, str]]:
-    for baseline in found.baselines:
-        of = baseline.origin
-        yield f"{of.unit}-{of.bearing}-v{of.version}.json", to_json(baseline)
-    for unit, number, response in found.responses:
-        yield f"{unit}-shaft-response-v{number}.json", to_json(response)
+    documents: dict[str, BearingBaseline | ShaftResponse] = {
+        f"{b.origin.unit}-{b.origin.bearing}-v{b.origin.version}.json": b for b in result.baselines
+    }
+    for unit, number, response in result.responses:
+        documents[f"{unit}-shaft-response-v{number}.json"] = response
+    for name, document in documents.items():
+        (folder / name).write_text(to_json(document), encoding="utf-8")
+    return len(documents)
 
 
 VERDICTS = {
@@ -207,7 +206,7 @@ VERDICTS = {
 
 
 def lines_of(report: BackTestReport) -> Iterator[str]:
-    """All of it."""
+    """Yield the report as lines of text."""
     yield f"{report.file}: {report.rows} rows"
     yield from (f"  doubtful: {doubt}" for doubt in report.doubts)
     yield "\nReadings by verdict"
@@ -239,11 +238,11 @@ def _baseline_lines(films: Sequence[FilmReport]) -> Iterator[str]:
     for film in films:
         for found in film.baselines:
             event = f" after {found.event!r}" if found.event else ""
-            said = f"  {_name(film):<22}{found.learned_from} to {found.learned_until}{event}: "
+            period = f"  {_name(film):<22}{found.learned_from} to {found.learned_until}{event}: "
             if not found.is_learned:
-                yield said + "too few readings to learn from"
+                yield period + "too few readings to learn from"
                 continue
-            yield said + (
+            yield period + (
                 f"{found.cells_own} cells of its own, {found.cells_borrowed} borrowed,"
                 f" {found.cells_without_support} without support,"
                 f" scatter {found.scatter_percent:.2f} %, {found.rejected_percent:.1f} % rejected"
@@ -251,8 +250,8 @@ def _baseline_lines(films: Sequence[FilmReport]) -> Iterator[str]:
 
 
 def _alarm_lines(alarm: AlarmReport) -> Iterator[str]:
-    name = f"{alarm.unit} {alarm.bearing} {alarm.direction}"
-    yield f"  {alarm.begin} to {alarm.end or 'the last reading':<24} {name}, {alarm.level}"
+    end = alarm.end or "the last reading"
+    yield f"  {alarm.begin} to {end:<24} {_name(alarm)}, {alarm.level}"
     danger = f", danger from {alarm.danger}" if alarm.danger else ""
     yield f"    {_change(alarm.raised)}, at most {_change(alarm.largest)}{danger}"
     found = alarm.condition
@@ -273,11 +272,10 @@ def _number(value: float | None, form: str) -> str:
     return "—" if value is None else format(value, form)
 
 
-def _name(film: FilmReport) -> str:
-    return f"{film.unit} {film.bearing} {film.direction}"
+def _name(of: FilmReport | AlarmReport) -> str:
+    return f"{of.unit} {of.bearing} {of.direction}"
 
 
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _EVENT = re.compile(
     r"(?P<unit>[^\s/]+)(?:/(?P<bearing>[^\s/]+))?\s+(?P<time>\S+)(?:\s+(?P<text>.*))?"
 )
@@ -285,12 +283,12 @@ MAX_TEXT = 200
 
 
 def time_ns_of(text: str) -> int:
-    """Nanoseconds since 1970.
+    """Parse a time as nanoseconds since 1970.
 
     Raises
     ------
     ValueError
-        If it is no time of ISO 8601, or has no offset from UTC: local time would be a guess.
+        If it is not ISO 8601 or has no offset from UTC, which would have to be guessed.
     """
     try:
         moment = datetime.fromisoformat(text)
@@ -298,21 +296,21 @@ def time_ns_of(text: str) -> int:
         raise ValueError(f"{text!r:.60} is not a time like 2026-03-01T08:00:00Z") from error
     if moment.tzinfo is None:
         raise ValueError(f"{text!r:.60} needs an offset from UTC, such as a trailing Z")
-    return (moment - _EPOCH) // timedelta(microseconds=1) * 1000
+    return (moment - EPOCH) // timedelta(microseconds=1) * 1000
 
 
 def event_of(text: str) -> MachineEvent:
-    """Read an event, written ``UNIT[/BEARING] TIME [WORDS]``.
+    """Parse an event, written ``UNIT[/BEARING] TIME [TEXT]``.
 
     Raises
     ------
     ValueError
-        If it is written otherwise.
+        If it has another form.
     """
     found = _EVENT.fullmatch(text.strip())
     names = [found["unit"], found["bearing"]] if found else []
     if not found or not all(name is None or IDENTIFIER.fullmatch(name) for name in names):
         example = "'U1 2026-03-01T08:00:00Z overhaul' or 'U1/UJB 2026-03-01T08:00:00Z new pads'"
         raise ValueError(f"{text!r:.60} is not an event like {example}")
-    words = (found["text"] or "machine event")[:MAX_TEXT]
-    return MachineEvent(found["unit"], found["bearing"], time_ns_of(found["time"]), words)
+    text = (found["text"] or "machine event")[:MAX_TEXT]
+    return MachineEvent(found["unit"], found["bearing"], time_ns_of(found["time"]), text)

@@ -28,15 +28,18 @@ from service.measuring.baseline_learning import drifted
 from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
 
+UNSPECIFIED = "unspecified"
+"""Estimator of a baseline if the user names none."""
+
 
 @dataclass(frozen=True)
 class MachineEvent:
-    """What makes a new baseline necessary, such as an overhaul.
+    """Event that requires a new baseline, such as an overhaul.
 
     Parameters
     ----------
     bearing
-        None if it is about all of the unit.
+        None for all bearings of the unit.
     """
 
     unit: str
@@ -45,27 +48,27 @@ class MachineEvent:
     text: str
 
     def is_about(self, unit: str, bearing: str) -> bool:
-        """Whether it makes this bearing's baseline void."""
+        """Return whether the event invalidates the baseline of a bearing."""
         return self.unit == unit and self.bearing in (None, bearing)
 
 
 @dataclass(frozen=True)
 class Learning:
-    """For how long a baseline is learned.
+    """Length of learning periods.
 
     Parameters
     ----------
     days
-        After the first reading, and after the first behind each event.
+        Days from the first reading, and from the first reading after each event.
     until_ns
-        When learning ends the first time, instead; None if after so many days.
+        End of the first learning period, in place of `days`; None for `days`.
     """
 
     days: float
     until_ns: int | None = None
 
     def end_ns(self, begin_ns: int, is_first: bool) -> int:
-        """When learning ends that begins at some time."""
+        """Return the end of learning that begins at a time."""
         if is_first and self.until_ns is not None:
             return self.until_ns
         return begin_ns + round(self.days * DAY_NS)
@@ -73,14 +76,14 @@ class Learning:
 
 @dataclass(frozen=True)
 class Period:
-    """Rows of one bearing under one baseline.
+    """Range of rows of a bearing under one baseline.
 
     Parameters
     ----------
     begin, learned, end
-        Learned from the rows from `begin` up to `learned`; compared are those up to `end`.
+        Rows from `begin` to `learned` are learned from, rows to `end` are compared.
     event
-        What it began with; empty for the first.
+        Machine event at its beginning; empty for the first.
     """
 
     version: int
@@ -93,7 +96,7 @@ class Period:
 def periods_of(
     time_ns: TimeArray, events: Sequence[MachineEvent], learning: Learning
 ) -> list[Period]:
-    """Cut the readings of a bearing at its events; periods without readings are left out."""
+    """Divide the readings of a bearing at its events; periods without readings are omitted."""
     ordered = sorted(events, key=lambda event: event.time_ns)
     cuts = [0, *(int(np.searchsorted(time_ns, event.time_ns)) for event in ordered), time_ns.size]
     texts = ["", *(event.text for event in ordered)]
@@ -111,18 +114,18 @@ _Bools = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class BackTestRules:
-    """By what rules it is learned and decided.
+    """Rules of learning and deciding.
 
     Parameters
     ----------
     operating
-        Shares and times; rated figures are those of `rated`.
+        Shares and times; `rated` replaces its rated figures.
     rated
-        Speed in r/min and power in MW by unit; needed only where files do not tell states.
+        Speed in r/min and power in MW by unit; needed for files without operating states.
     bracket_n_per_m
-        Stiffness of brackets, where it is known.
+        Stiffness of brackets where known.
     author, created_ns, estimator
-        For the baselines.
+        Stored with the baselines.
     """
 
     learning: Learning
@@ -134,23 +137,23 @@ class BackTestRules:
     events: Sequence[MachineEvent] = ()
     author: str = "back-test"
     created_ns: int = 0
-    estimator: str = "not told"
+    estimator: str = UNSPECIFIED
 
 
 @dataclass(frozen=True, eq=False)
 class PeriodRun:
-    """A period with what was learned, and what was decided by direction.
+    """A period with its baseline, and its decisions by direction.
 
     Parameters
     ----------
     baseline
-        None if there was no reading to learn from.
+        None without readings to learn from.
     doubt
-        Why the service would leave the baseline to an engineer; empty if it would accept it.
+        Reason why the service would not accept the baseline by itself; empty if it would.
     far
-        How many readings are far from what was learned; empty if none are.
+        Number of readings far from the baseline, in words; empty if there are none.
     decided
-        Rows from `period.learned` on.
+        Decisions from row `period.learned` on.
     """
 
     period: Period
@@ -160,13 +163,13 @@ class PeriodRun:
     far: str = ""
 
     def stiffness(self, direction: str) -> QuantityBaseline | None:
-        """What was learned of a film."""
+        """Return the stiffness baseline of a direction."""
         return self.baseline.of(direction) if self.baseline else None
 
 
 @dataclass(frozen=True, eq=False)
 class BearingRun:
-    """All of one bearing."""
+    """Back-test of one bearing."""
 
     place: Place
     rows: BearingRows
@@ -175,12 +178,12 @@ class BearingRun:
 
 
 def run_bearing(place: Place, rows: BearingRows, rules: BackTestRules) -> BearingRun:
-    """Learn and decide.
+    """Learn and decide for one bearing.
 
     Raises
     ------
     ReadingsError
-        If operating states can be neither read nor followed.
+        If operating states are neither given nor derivable from speed and power.
     """
     operation = _operation(place, rows, rules)
     events = [event for event in rules.events if event.is_about(*place)]
@@ -215,8 +218,14 @@ def _run(
     baseline, doubt, far = None, None, None
     if learned > begin:
         healthy = history.rows(begin, learned)
-        settings = settings_for(history, rules.baseline)
-        origin = _origin(place, period, rules)
+        # no cell would be known with an attitude that was never measured
+        is_measured = bool(np.isfinite(history.attitude_deg).any())
+        uses_attitude = rules.baseline.uses_attitude and is_measured
+        settings = replace(rules.baseline, uses_attitude=uses_attitude)
+        origin = Origin(
+            *(*place, rules.estimator, period.version),
+            *(rules.author, rules.created_ns, period.event),
+        )
         baseline = learn(healthy, is_settled[begin:learned], origin, settings)
         limit = rules.change.alert_change
         doubt = drifted(healthy, is_settled[begin:learned], baseline, limit)
@@ -232,20 +241,8 @@ def _run(
     return replace(run, decided=decided)
 
 
-def settings_for(history: StiffnessHistory, settings: BaselineSettings) -> BaselineSettings:
-    """Without the attitude where it was never measured; with it nothing would be known at all."""
-    is_measured = bool(np.isfinite(history.attitude_deg).any())
-    return replace(settings, uses_attitude=settings.uses_attitude and is_measured)
-
-
-def _origin(place: Place, period: Period, rules: BackTestRules) -> Origin:
-    return Origin(
-        *place, rules.estimator, period.version, rules.author, rules.created_ns, period.event
-    )
-
-
 def places_of(plant: PlantFile) -> list[Place]:
-    """Units and bearings that there are."""
+    """Return the units and bearings of a plant."""
     return [(unit.id, bearing.id) for unit in plant.unit for bearing in unit.bearing]
 
 
@@ -258,32 +255,25 @@ def rules_of(
     created_ns: int,
     estimator: str,
 ) -> BackTestRules:
-    """Gather what learning and deciding need."""
+    """Build the rules from the settings and the rated figures of a plant."""
+    units = plant.unit if plant else ()
     return BackTestRules(
         learning=learning,
         change=settings.change.limits(),
         baseline=settings.baseline.settings(settings.reading_h),
         operating=settings.operating.limits(1.0, 1.0),
-        rated=_rated(plant) if plant else {},
-        bracket_n_per_m=_brackets(plant) if plant else {},
+        rated={
+            unit.id: (unit.rated_speed_rpm, unit.rated_power_mw)
+            for unit in units
+            if unit.rated_power_mw is not None
+        },
+        bracket_n_per_m={
+            (unit.id, bearing.id): bearing.bracket_stiffness_n_per_m
+            for unit in units
+            for bearing in unit.bearing
+        },
         events=events,
         author=author,
         created_ns=created_ns,
         estimator=estimator,
     )
-
-
-def _rated(plant: PlantFile) -> dict[str, tuple[float, float]]:
-    return {
-        unit.id: (unit.rated_speed_rpm, unit.rated_power_mw)
-        for unit in plant.unit
-        if unit.rated_power_mw is not None
-    }
-
-
-def _brackets(plant: PlantFile) -> dict[Place, float]:
-    return {
-        (unit.id, bearing.id): bearing.bracket_stiffness_n_per_m
-        for unit in plant.unit
-        for bearing in unit.bearing
-    }

@@ -1,13 +1,12 @@
-"""What the alarms of one unit are put down to, by the motion of its shaft in all bearings."""
+"""Causes of the alarms of one unit, from the motion of its shaft in all bearings."""
 
 from collections.abc import Sequence
-from functools import reduce
+from functools import cached_property, reduce
 
 import numpy as np
-import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
-from core.baseline.history import DIRECTIONS, StiffnessHistory
+from core.baseline.history import DIRECTIONS
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
 from core.change.shaft_response import MEAN_READINGS, ShaftResponse, film_columns, learn_response
 from service.cli.offline.backtest_bearing import BackTestRules, BearingRun, Period, periods_of
@@ -22,16 +21,16 @@ class UnitCauses:
     Parameters
     ----------
     runs
-        Of all its bearings. Only times count at which all of them have readings.
+        Runs of all its bearings. Only times at which all have readings are used.
     """
 
     def __init__(self, unit: str, runs: Sequence[BearingRun], rules: BackTestRules) -> None:
         self._runs, self._rules = runs, rules
         times = [run.rows.history.time_ns for run in runs]
         self._time_ns: TimeArray = reduce(np.intersect1d, times)
-        self._rows = [np.searchsorted(time_ns, self._time_ns) for time_ns in times]
+        self._rows = [np.isin(time_ns, self._time_ns) for time_ns in times]
         self._histories = {
-            run.place[1]: _taken(run.rows.history, rows)
+            run.place[1]: run.rows.history.where(rows)
             for run, rows in zip(runs, self._rows, strict=True)
         }
         self._has_amplitudes = all(
@@ -40,10 +39,9 @@ class UnitCauses:
         events = [event for event in rules.events if event.unit == unit]
         self._periods = periods_of(self._time_ns, events, rules.learning)
         self.responses = [self._learned(period) for period in self._periods]
-        self._columns: UnitReadings | None = None
 
     def of(self, bearing: str, direction: str, time_ns: int) -> Attribution:
-        """Cause of an alarm, judged with readings up to a time."""
+        """Return the cause of an alarm, judged with readings up to a time."""
         if not self._has_amplitudes:
             return NO_AMPLITUDES
         last = int(np.searchsorted(self._time_ns, time_ns, side="right"))
@@ -53,44 +51,39 @@ class UnitCauses:
             return NOT_LEARNED
         first = self._periods[number].learned
         place, rows = (bearing, direction), np.arange(first, last)
-        known = np.isfinite(self._readings().deviation[response.places.index(place), first:last])
-        newest = self._readings().columns(rows[known][-MEAN_READINGS:])
-        return attribute(place, response, newest, self._brackets())
-
-    def _brackets(self) -> FloatArray | None:
-        known = [self._rules.bracket_n_per_m.get(run.place) for run in self._runs]
-        if not all(known):
-            return None
-        return np.repeat(np.array(known, np.float64), len(DIRECTIONS))
+        known = np.isfinite(self._readings.deviation[response.places.index(place), first:last])
+        newest = self._readings.columns(rows[known][-MEAN_READINGS:])
+        known_n_per_m = [self._rules.bracket_n_per_m.get(run.place) for run in self._runs]
+        brackets = None
+        if all(known_n_per_m):
+            brackets = np.repeat(np.array(known_n_per_m, np.float64), len(DIRECTIONS))
+        return attribute(place, response, newest, brackets)
 
     def _learned(self, period: Period) -> ShaftResponse | None:
         if not self._has_amplitudes or period.learned == period.begin:
             return None
-        settled = np.logical_and.reduce(self._settled())[period.begin : period.learned]
+        pairs = zip(self._runs, self._rows, strict=True)
+        settled = np.logical_and.reduce([run.operation.is_settled[rows] for run, rows in pairs])
         return learn_response(
-            {b: h.rows(period.begin, period.learned) for b, h in self._histories.items()}, settled
+            {b: h.rows(period.begin, period.learned) for b, h in self._histories.items()},
+            settled[period.begin : period.learned],
         )
 
-    def _settled(self) -> list[npt.NDArray[np.bool_]]:
-        pairs = zip(self._runs, self._rows, strict=True)
-        return [run.operation.is_settled[rows] for run, rows in pairs]
-
+    @cached_property
     def _readings(self) -> UnitReadings:
-        if self._columns is None:
-            compared = [
-                [column[rows] for column in _compared_places(run, direction)]
-                for run, rows in zip(self._runs, self._rows, strict=True)
-                for direction in DIRECTIONS
-            ]
-            deviation, rise = (np.stack(columns) for columns in zip(*compared, strict=True))
-            attitude = [h.attitude_deg for h in self._histories.values() for _ in DIRECTIONS]
-            columns = (*film_columns(self._histories), deviation, rise, np.stack(attitude))
-            self._columns = UnitReadings(*columns)
-        return self._columns
+        compared = [
+            [column[rows] for column in _compared_places(run, direction)]
+            for run, rows in zip(self._runs, self._rows, strict=True)
+            for direction in DIRECTIONS
+        ]
+        deviation, rise = (np.stack(columns) for columns in zip(*compared, strict=True))
+        attitude = [h.attitude_deg for h in self._histories.values() for _ in DIRECTIONS]
+        columns = (*film_columns(self._histories), deviation, rise, np.stack(attitude))
+        return UnitReadings(*columns)
 
 
 def _compared_places(run: BearingRun, direction: str) -> tuple[FloatArray, FloatArray]:
-    """(n,) deviation from the baseline of each period, of settled readings; and its rise."""
+    """Return the (n,) deviation of settled readings, and the rise of the eccentricity ratio."""
     deviation, rise = np.full((2, len(run.rows.history)), np.nan)
     for period in run.periods:
         baseline = period.stiffness(direction)
@@ -101,11 +94,3 @@ def _compared_places(run: BearingRun, direction: str) -> tuple[FloatArray, Float
         deviation[rows] = baseline.compare_history(history).deviation
         rise[rows] = baseline.eccentricity_rise(history.conditions)
     return np.where(run.operation.is_settled, deviation, np.nan), rise
-
-
-def _taken(history: StiffnessHistory, rows: npt.NDArray[np.int64]) -> StiffnessHistory:
-    if rows.size == len(history):
-        return history
-    wanted = np.zeros(len(history), np.bool_)
-    wanted[rows] = True
-    return history.where(wanted)

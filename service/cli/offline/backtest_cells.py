@@ -1,6 +1,6 @@
-"""Columns of a file of readings, their values, and the errors found in them."""
+"""Columns of a file of readings: names, conversion and errors."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,14 +18,14 @@ MAX_SHOWN = 40
 
 
 class RowProblems:
-    """Problems by row, up to the number that an error names.
+    """Problems by row, limited to the number that an error names.
 
     Parameters
     ----------
     line : (n,)
         Number of each row in messages.
     word
-        What `line` counts: "line" or "row".
+        Unit of `line`: "line" or "row".
     """
 
     def __init__(self, line: TimeArray, word: str = "line") -> None:
@@ -39,7 +39,7 @@ class RowProblems:
         text: str,
         value: Callable[[int], Any] | None = None,
     ) -> None:
-        """Add a problem of some rows, given by mask or number, with the value in each row."""
+        """Add a problem of rows, given by mask or number, with the value in each row."""
         rows = np.flatnonzero(wrong) if wrong.dtype == np.bool_ else wrong
         self._n_found += rows.size
         lines = self._line[rows]
@@ -48,24 +48,24 @@ class RowProblems:
             self._found.append((int(lines[n]), words))
 
     def refuse(self) -> None:
-        """Raise if there is any problem.
+        """Raise an error if there is a problem.
 
         Raises
         ------
-        ValueError
-            With line numbers.
+        ReadingsError
+            If there is a problem; the message names the lines.
         """
         if not self._found:
             return
         found = sorted(self._found)[:MAX_NAMED]
-        said = [f"{self._word} {line}: {text}" for line, text in found]
+        messages = [f"{self._word} {line}: {text}" for line, text in found]
         if self._n_found > len(found):
-            said.append(f"and {self._n_found - len(found)} more")
-        raise ValueError("; ".join(said))
+            messages.append(f"and {self._n_found - len(found)} more")
+        raise ReadingsError("; ".join(messages))
 
 
 def shown(value: Any) -> str:
-    """Return a wrong value as messages show it."""
+    """Format a wrong value for messages."""
     text = repr(value)
     return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}…"
 
@@ -96,46 +96,37 @@ MAX_ROWS = 40_000_000
 """Rows of one file: 20 units of 3 bearings for 6 years; about 230 bytes of memory each."""
 
 
-class ReadingsError(Exception):
-    """A file of readings that cannot be used; the message says where it is wrong."""
+class ReadingsError(ValueError):
+    """A file of readings that cannot be used; the message names the place."""
 
 
 def check_headings(headings: Sequence[str]) -> None:
-    """Refuse headings that are missing, unknown or repeated.
+    """Refuse missing, unknown and repeated headings.
 
     Raises
     ------
     ReadingsError
-        Naming them.
+        If there are any; the message names them.
     """
     if len(headings) > MAX_COLUMNS:
         raise ReadingsError(f"{len(headings)} columns; at most {MAX_COLUMNS} are read")
-    problems = list(_problems(headings))
-    if problems:
-        raise ReadingsError("; ".join(problems))
-
-
-def schema_of(headings: Sequence[str]) -> Any:
-    """Schema of the rows of a file with these headings."""
-    texts = [(key, pa.string()) for key in TEXTS if key in headings]
-    numbers = [(key, pa.float64()) for key in NUMBERS if key in headings]
-    return pa.schema([(TIME_NS, pa.int64()), *texts, *numbers, (LINE, pa.int64())])
-
-
-def _problems(headings: Sequence[str]) -> Iterator[str]:
     missing = [key for key in REQUIRED if key not in headings]
     if TIME not in headings and TIME_NS not in headings:
         missing.insert(0, f"{TIME} or {TIME_NS}")
-    if missing:
-        yield f"missing columns: {', '.join(missing)}"
     unknown = [heading for heading in headings if heading not in (TIME_NS, *HEADINGS)]
-    if unknown:
-        yield f"unknown columns: {_listed(unknown)}; known are {TIME_NS}, {', '.join(HEADINGS)}"
     twice = sorted({heading for heading in headings if headings.count(heading) > 1})
+    problems = []
+    if missing:
+        problems.append(f"missing columns: {', '.join(missing)}")
+    if unknown:
+        known = ", ".join((TIME_NS, *HEADINGS))
+        problems.append(f"unknown columns: {_listed(unknown)}; known are {known}")
     if twice:
-        yield f"columns that are there twice: {_listed(twice)}"
+        problems.append(f"repeated columns: {_listed(twice)}")
     if TIME in headings and TIME_NS in headings:
-        yield f"both {TIME} and {TIME_NS}; one of them is the time"
+        problems.append(f"both {TIME} and {TIME_NS}; give one of them")
+    if problems:
+        raise ReadingsError("; ".join(problems))
 
 
 def _listed(names: list[str]) -> str:
@@ -158,14 +149,17 @@ def converted(table: Any, line: Any, word: str) -> Any:
     line : (n,)
         Number of each row in messages.
     word
-        What the numbers count: "line" or "row".
+        Unit of the numbers: "line" or "row".
 
     Raises
     ------
     ReadingsError
-        Naming lines and values.
+        If a value is wrong; the message names lines and values.
     """
-    schema, problems = schema_of(table.column_names), RowProblems(line, word)
+    texts = [(key, pa.string()) for key in TEXTS if key in table.column_names]
+    numbers = [(key, pa.float64()) for key in NUMBERS if key in table.column_names]
+    schema = pa.schema([(TIME_NS, pa.int64()), *texts, *numbers, (LINE, pa.int64())])
+    problems = RowProblems(line, word)
     columns = []
     for field in schema:
         if field.name == LINE:
@@ -175,10 +169,7 @@ def converted(table: Any, line: Any, word: str) -> Any:
         else:
             convert = _text if field.type == pa.string() else _number
             columns.append(convert(table.column(field.name), field.name, problems))
-    try:
-        problems.refuse()
-    except ValueError as error:
-        raise ReadingsError(str(error)) from error
+    problems.refuse()
     return pa.record_batch(columns, schema=schema)
 
 
@@ -196,7 +187,7 @@ def _time_ns(table: Any, problems: RowProblems) -> Any:
 
 
 def _number(column: Any, key: str, problems: RowProblems) -> Any:
-    """Return a column of numbers, NaN where a number is missing."""
+    """Return a column of numbers; missing ones are NaN."""
     column, kind = _flat(column), column.type
     is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)
     if not (is_number or _is_text(kind)):
@@ -218,14 +209,14 @@ def _text(column: Any, key: str, problems: RowProblems) -> Any:
 def _cast(
     column: Any, kind: Any, text: str, problems: RowProblems, may_be_empty: bool = False
 ) -> Any:
-    """Convert a column at once; if that fails, find the wrong values one by one."""
+    """Convert a column; if that fails, find the wrong values one by one."""
     if not may_be_empty:
         problems.add(_is_null(column), f"{text} nothing")
     try:
         found = pc.cast(column, kind)
     except pa.ArrowInvalid:
         fits = [_fits(column.slice(row, 1), kind) for row in range(len(column))]
-        problems.add(~np.array(fits), text, lambda row: _said(column[row]))
+        problems.add(~np.array(fits), text, lambda row: _python_value(column[row]))
         found = pa.nulls(len(column), kind)
     return found.fill_null(np.nan if pa.types.is_floating(kind) else 0)
 
@@ -238,8 +229,8 @@ def _fits(value: Any, kind: Any) -> bool:
     return True
 
 
-def _said(value: Any) -> Any:
-    """Return a value for a message; times may lie outside Python's range."""
+def _python_value(value: Any) -> Any:
+    """Return a value for a message; times may be outside Python's range."""
     is_stamp = pa.types.is_timestamp(value.type) and value.is_valid
     return f"{value.value} {value.type.unit} since 1970" if is_stamp else value.as_py()
 

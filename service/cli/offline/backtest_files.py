@@ -1,9 +1,9 @@
-"""Readings for a back-test: from a file, or from the store into a file."""
+"""Files of readings: read for a back-test, or exported from the store."""
 
 import re
 import stat
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import closing
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,8 @@ from service.cli.offline.backtest_cells import (
     ReadingsError,
     shown,
 )
-from service.cli.offline.backtest_child import WRONG_FILE
 from service.cli.offline.backtest_histories import BearingRows, Place, histories_of
-from service.cli.offline.backtest_tables import MAGIC
+from service.cli.offline.backtest_tables import MAGIC, WRONG_FILE
 from service.store.film_port import FilmHistory, FilmQuery, FilmStore
 
 MAX_NAMES = 2000
@@ -49,14 +48,14 @@ def read_histories(
     Parameters
     ----------
     places
-        Units and bearings that there are; any, if not given.
+        Existing units and bearings; None for any.
     advanced
-        Told how many more bytes of the file have been read.
+        Called with the number of further bytes read.
 
     Raises
     ------
     ReadingsError
-        If anything in it is wrong, with file and lines (CSV) or rows (Parquet), counted from 1.
+        If it is not valid; names the file and lines (CSV) or rows (Parquet), counted from 1.
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):
@@ -66,12 +65,12 @@ def read_histories(
         return histories_of(_columns(path, word, advanced), places, word)
     except OSError as error:
         raise ReadingsError(f"{path}: {error.strerror}") from error
-    except (ReadingsError, ValueError) as error:
+    except ReadingsError as error:
         raise ReadingsError(f"{path}: {error}") from error
 
 
 def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mapping[str, Any]:
-    module, file = "service.cli.offline.backtest_child", str(path.absolute())
+    module, file = "service.cli.offline.backtest_tables", str(path.absolute())
     with closing(ConfinedProcess(module, file)) as process:
         try:
             gathered = _gathered(process, word, advanced)
@@ -80,7 +79,7 @@ def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mappin
         if process.exit_code() != 0:
             raise ReadingsError(_why(process))
     columns = {}
-    for key in list(gathered):  # each is released as soon as it is joined
+    for key in list(gathered):  # parts are released as soon as they are joined
         parts = gathered.pop(key)
         if key in TEXTS:
             columns[key] = pa.chunked_array(parts).unify_dictionaries().combine_chunks()
@@ -92,29 +91,26 @@ def _columns(path: Path, word: str, advanced: Callable[[int], object]) -> Mappin
 def _gathered(
     process: ConfinedProcess, word: str, advanced: Callable[[int], object]
 ) -> dict[str, list[Any]]:
-    """Parts of each column: texts dictionary-encoded, numbers as numpy arrays."""
+    """Return parts of each column: texts dictionary-encoded, numbers as numpy arrays."""
     reader = pa.ipc.open_stream(process.output)
     parts: dict[str, list[Any]] = {key: [] for key in reader.schema.names}
     names: dict[str, set[str]] = {key: set() for key in parts if key in TEXTS}
     before = 0
-    try:
-        while True:
-            batch, metadata = reader.read_next_batch_with_custom_metadata()
-            for key in parts:
-                if key in names:
-                    parts[key].append(pc.dictionary_encode(batch.column(key)))
-                    _check_names(key, parts[key][-1], names[key], batch.column(LINE), word)
-                else:
-                    parts[key].append(batch.column(key).to_numpy().copy())
-            n_bytes = int(metadata["n_bytes"])
-            advanced(n_bytes - before)
-            before = n_bytes
-    except StopIteration:
-        return parts
+    for batch, metadata in reader.iter_batches_with_custom_metadata():
+        for key in parts:
+            if key in names:
+                parts[key].append(pc.dictionary_encode(batch.column(key)))
+                _check_names(key, parts[key][-1], names[key], batch.column(LINE), word)
+            else:
+                parts[key].append(batch.column(key).to_numpy().copy())
+        n_bytes = int(metadata["n_bytes"])
+        advanced(n_bytes - before)
+        before = n_bytes
+    return parts
 
 
 def _check_names(key: str, column: Any, names: set[str], line: Any, word: str) -> None:
-    """Refuse names that no unit or bearing can have, and too many different ones."""
+    """Refuse names that are not valid for units or bearings, and too many different names."""
     for code, name in enumerate(column.dictionary.to_pylist()):
         if key in ("unit", "bearing") and not IDENTIFIER.fullmatch(name):
             row = int(np.argmax(column.indices.to_numpy() == code))
@@ -135,7 +131,7 @@ def _why(process: ConfinedProcess) -> str:
 
 
 AT_ONCE_NS = 90 * DAY_NS
-"""Of one film, so that memory does not depend on how many years are stored."""
+"""Time span read at once, so that memory does not depend on the number of years stored."""
 
 SUFFIXES = (".csv", ".parquet")
 QUALITY = {
@@ -161,7 +157,7 @@ def stored_histories(
 
 
 def table_of(place: Place, found: FilmHistory) -> Any:
-    """Rows of both directions."""
+    """Return readings as rows of both directions."""
     return pa.concat_tables(_side(place, found, side) for side in range(len(DIRECTIONS)))
 
 
@@ -188,39 +184,31 @@ def _side(place: Place, found: FilmHistory, side: int) -> Any:
     )
 
 
-class ReadingsFile:
-    """A CSV or Parquet file to be written; a context that leaves nothing behind if it fails.
+@contextmanager
+def readings_file(path: Path) -> Iterator[Callable[[Any], None]]:
+    """Create a CSV or Parquet file and yield a function that adds rows; an error removes the file.
 
     Parameters
     ----------
     path
-        Whose suffix is one of `SUFFIXES`.
+        Path whose suffix is in `SUFFIXES`.
 
     Raises
     ------
     OSError
         If the file exists, or cannot be written.
     """
+    make: Any = pacsv.CSVWriter if path.suffix == ".csv" else pq.ParquetWriter
+    with path.open("xb") as file, ExitStack() as stack:
+        writers: list[Any] = []
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._writer: Any = None
-        self._file = path.open("xb")
+        def write(table: Any) -> None:
+            if not writers:
+                writers.append(stack.enter_context(make(file, table.schema)))
+            writers[0].write_table(table)
 
-    def __enter__(self) -> "ReadingsFile":
-        return self
-
-    def __exit__(self, kind: object, *_: object) -> None:
-        if self._writer is not None:
-            self._writer.close()
-        self._file.close()
-        if kind is not None:
-            self._path.unlink()
-
-    def write(self, table: Any) -> None:
-        """Add rows."""
-        if self._writer is None:
-            is_csv = self._path.suffix == ".csv"
-            make: Any = pacsv.CSVWriter if is_csv else pq.ParquetWriter
-            self._writer = make(self._file, table.schema)
-        self._writer.write_table(table)
+        try:
+            yield write
+        except BaseException:
+            path.unlink()
+            raise

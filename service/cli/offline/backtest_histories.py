@@ -1,4 +1,4 @@
-"""Rows of readings into one history per bearing, every row checked."""
+"""Histories of bearings from checked rows of readings."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -51,9 +51,9 @@ class BearingRows:
     Parameters
     ----------
     state : (n,)
-        Members of `OperatingState`; None if the rows do not give it.
+        Members of `OperatingState`; None without a column of states.
     n_rows
-        Rows of each direction.
+        Number of rows of each direction.
     """
 
     history: StiffnessHistory
@@ -64,23 +64,23 @@ class BearingRows:
 def histories_of(
     columns: Mapping[str, Any], places: Collection[Place] | None = None, word: str = "line"
 ) -> dict[Place, BearingRows]:
-    """Sort rows of many bearings and both directions into histories.
+    """Sort rows of several bearings and both directions into histories.
 
     Parameters
     ----------
     columns
-        Of one length (n,), with the names of `schema_of`: texts as `pyarrow.DictionaryArray`,
-        numbers as numpy arrays with NaN where there is no number.
+        Columns of one length (n,), named as by `converted`: texts as `pyarrow.DictionaryArray`,
+        numbers as numpy arrays with NaN for missing numbers.
     places
-        Units and bearings that exist; any, if not given.
+        Existing units and bearings; None for any.
     word
-        What the column `line` counts: "line" or "row".
+        Unit of the column `line`: "line" or "row".
 
     Raises
     ------
-    ValueError
-        If names are unknown, numbers are impossible, rows are out of order or repeated, or the two
-        directions of one time differ in a column of the bearing; with line numbers.
+    ReadingsError
+        If names are unknown, numbers invalid, rows out of order or repeated, or the directions of
+        one time differ in a column of the bearing; the message names the lines.
     """
     problems = RowProblems(columns[LINE], word)
     _check_names(columns, places, problems)

@@ -1,4 +1,4 @@
-"""Report of a back-test: units, alarms and changes."""
+"""Report of a back-test: films, alarms, changes and causes."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from core.change.cause import Attribution
 from core.change.decision import JUDGED, Verdict
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
-from core.units import NS_PER_S
+from core.units import DAY_NS
 from service.cli.offline.backtest_bearing import BearingRun, PeriodRun
 from service.cli.offline.backtest_causes import UnitCauses
 from service.runtime.times import rfc3339
@@ -29,28 +29,28 @@ class ChangeReport(_Part):
     """A change of stiffness with its uncertainty."""
 
     percent: float
-    """Of what the baseline says, under the same condition."""
+    """Change from the baseline under the same condition."""
 
     u_percent: float
-    """Standard uncertainty of that, of a healthy film's mean."""
+    """Standard uncertainty of the change, for the mean of a healthy film."""
 
     time_scale_h: float
-    """Running hours that were averaged over."""
+    """Running hours averaged over."""
 
 
 class ConditionReport(_Part):
-    """What a bearing ran under."""
+    """Operating condition of a bearing."""
 
     state: str
     eccentricity_ratio: float | None
     oil_temperature_c: float | None
     attitude_deg: float | None
     cell: tuple[int, ...] | None
-    """Bins of eccentricity ratio, oil temperature and, where it counts, attitude angle."""
+    """Bins of eccentricity ratio, oil temperature and, where it is used, attitude angle."""
 
 
 class CauseReport(_Part):
-    """What an alarm is put down to."""
+    """Probable cause of an alarm."""
 
     cause: str
     reason: str
@@ -65,38 +65,38 @@ class AlarmReport(_Part):
     bearing: str
     direction: str
     level: str
-    """The highest that it reached."""
+    """Highest level."""
 
     begin: str
     danger: str | None
-    """When it became a danger."""
+    """Time of the first danger."""
 
     end: str | None
-    """When it returned; null if it lasted to the end of readings or the next machine event."""
+    """Time of return; null if it lasted to the end of readings or the next machine event."""
 
     baseline_version: int
     raised: ChangeReport
     largest: ChangeReport
     condition: ConditionReport
-    """When it was raised."""
+    """Condition when it was raised."""
 
     cause: CauseReport
-    """When it was raised."""
+    """Cause when it was raised."""
 
     later_cause: CauseReport
-    """With the readings of the 24 hours after."""
+    """Cause judged with the readings of the next 24 hours."""
 
 
 class SupportReport(_Part):
-    """What a baseline knows."""
+    """Support of a baseline by readings."""
 
     version: int
     event: str
-    """Machine event that it began with; empty for the first."""
+    """Machine event at its beginning; empty for the first."""
 
     learned_from: str
     learned_until: str
-    """End of the readings that were learned from, this one not included."""
+    """End of the readings that were learned from, exclusive."""
 
     is_learned: bool
     """False if there were too few readings."""
@@ -105,34 +105,34 @@ class SupportReport(_Part):
     cells_borrowed: int
     cells_without_support: int
     scatter_percent: float | None
-    """Of single readings about what was learned."""
+    """Scatter of single readings about the baseline."""
 
     rejected_percent: float | None
-    """Of what was learned from, that fitted too badly to count."""
+    """Share of readings rejected as outliers while learning."""
 
 
 class FilmReport(_Part):
-    """One bearing in one direction."""
+    """Readings of one bearing in one direction."""
 
     unit: str
     bearing: str
     direction: str
     rows: int
-    """Of the file."""
+    """Rows of the file."""
 
     learning: int
     """Readings of learning periods; the others are counted by verdict."""
 
     verdicts: dict[str, int]
     judged_percent: float | None
-    """Of the settled readings after learning, those that were called normal, alert or danger."""
+    """Share of normal, alert and danger among the settled readings after learning."""
 
     n_alarms: int
     baselines: list[SupportReport]
 
 
 class RateReport(_Part):
-    """How often it alarmed: on a healthy plant, the rate of false alarms."""
+    """Rate of alarms; on a healthy plant, the rate of false alarms."""
 
     unit_years: float
     """From the end of learning to the end of readings, all units together."""
@@ -143,7 +143,7 @@ class RateReport(_Part):
 
 
 class BackTestReport(_Part):
-    """All of it."""
+    """Report of a back-test."""
 
     file: str
     rows: int
@@ -156,45 +156,26 @@ class BackTestReport(_Part):
 
 
 @dataclass(frozen=True)
-class Change:
-    """A mean deviation, as it was found at one reading.
-
-    Parameters
-    ----------
-    row
-        Of the decision.
-    change, std
-        ln of what was measured over what was learned, and the standard uncertainty of its mean.
-    """
-
-    row: int
-    change: float
-    std: float
-    time_scale_h: float
-
-
-@dataclass(frozen=True)
 class AlarmStretch:
-    """An alarm; rows are those of the decision.
+    """An alarm as rows of its decisions.
 
     Parameters
     ----------
     end
-        First row without it; None if it lasts.
+        First row without the alarm; None if it lasts.
     level
-        The highest that it reached.
+        Highest level.
     danger
-        First row of danger, if it came to that.
-    raised, largest
-        Change when it was raised, and the largest while it lasted.
+        First row of danger; None if it never was a danger.
+    largest
+        Row of the largest change.
     """
 
     begin: int
     end: int | None
     level: AlarmLevel
     danger: int | None
-    raised: Change
-    largest: Change
+    largest: int
 
 
 def alarm_stretches(decided: DecisionHistory) -> Iterator[AlarmStretch]:
@@ -204,29 +185,17 @@ def alarm_stretches(decided: DecisionHistory) -> Iterator[AlarmStretch]:
     for begin, end in edges.reshape(-1, 2).tolist():
         level = decided.level[begin:end]
         dangers = np.flatnonzero(level == AlarmLevel.DANGER)
-        largest = begin + int(np.nanargmax(np.abs(decided.change[begin:end])))
         yield AlarmStretch(
             begin=begin,
             end=end if end < decided.level.size else None,
             level=AlarmLevel(int(level.max())),
             danger=begin + int(dangers[0]) if dangers.size else None,
-            raised=_change(decided, begin),
-            largest=_change(decided, largest),
+            largest=begin + int(np.nanargmax(np.abs(decided.change[begin:end]))),
         )
 
 
-def _change(decided: DecisionHistory, row: int) -> Change:
-    change = float(decided.change[row])
-    significance = float(decided.significance[row])
-    return Change(row, change, abs(change) / significance, float(decided.time_scale_h[row]))
-
-
-LATER_NS = 24 * 3600 * NS_PER_S
-"""After an alarm, when its cause is looked at again."""
-
-
 def alarm_reports(runs: Sequence[BearingRun], causes: UnitCauses) -> Iterator[AlarmReport]:
-    """All alarms of a unit."""
+    """Report all alarms of a unit."""
     for run in runs:
         for period in run.periods:
             for direction, decided in period.decided.items():
@@ -235,7 +204,7 @@ def alarm_reports(runs: Sequence[BearingRun], causes: UnitCauses) -> Iterator[Al
 
 
 def film_reports(run: BearingRun) -> Iterator[FilmReport]:
-    """Both directions of a bearing."""
+    """Report both directions of a bearing."""
     for direction, n_rows in zip(DIRECTIONS, run.rows.n_rows, strict=True):
         counts = np.zeros(len(Verdict), np.int64)
         for period in run.periods:
@@ -259,33 +228,35 @@ def _alarm(
     run: BearingRun, period: PeriodRun, direction: str, found: AlarmStretch, causes: UnitCauses
 ) -> AlarmReport:
     unit, bearing = run.place
-    time_ns = run.rows.history.time_ns[period.period.learned : period.period.end]
-    begin_ns = int(time_ns[found.begin])
+    learned, decided = period.period.learned, period.decided[direction]
+    time_ns = run.rows.history.time_ns[learned : period.period.end].tolist()
+    begin_ns = time_ns[found.begin]
+    later_ns = min(begin_ns + DAY_NS, time_ns[-1])
     return AlarmReport(
         unit=unit,
         bearing=bearing,
         direction=direction,
         level=found.level.name.lower(),
         begin=rfc3339(begin_ns),
-        danger=None if found.danger is None else rfc3339(int(time_ns[found.danger])),
-        end=None if found.end is None else rfc3339(int(time_ns[found.end])),
+        danger=None if found.danger is None else rfc3339(time_ns[found.danger]),
+        end=None if found.end is None else rfc3339(time_ns[found.end]),
         baseline_version=period.period.version,
-        raised=_change_report(found.raised),
-        largest=_change_report(found.largest),
-        condition=_condition(run, period.period.learned + found.begin, period.stiffness(direction)),
+        raised=change_report(decided, found.begin),
+        largest=change_report(decided, found.largest),
+        condition=_condition(run, learned + found.begin, period.stiffness(direction)),
         cause=_cause(causes.of(bearing, direction, begin_ns)),
-        later_cause=_cause(
-            causes.of(bearing, direction, min(begin_ns + LATER_NS, int(time_ns[-1])))
-        ),
+        later_cause=_cause(causes.of(bearing, direction, later_ns)),
     )
 
 
-def _change_report(found: Change) -> ChangeReport:
-    share = float(np.exp(found.change))
+def change_report(decided: DecisionHistory, row: int) -> ChangeReport:
+    """Report the change of a reading, as a percentage; decisions are in logarithms."""
+    change = float(decided.change[row])
+    share, std = float(np.exp(change)), abs(change) / float(decided.significance[row])
     return ChangeReport(
         percent=100.0 * (share - 1.0),
-        u_percent=100.0 * share * found.std,
-        time_scale_h=found.time_scale_h,
+        u_percent=100.0 * share * std,
+        time_scale_h=float(decided.time_scale_h[row]),
     )
 
 

@@ -1,17 +1,23 @@
-"""Rows of CSV and Parquet files of readings, as checked Arrow tables."""
+"""Readers of CSV and Parquet files of readings, run in a child process.
+
+The child writes the checked rows as an Arrow stream. Its memory and time are limited and it cannot
+write files, so that a hostile file harms only this process.
+"""
 
 import csv
+import os
+import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
+from acquisition.recordings.confined import confine
 from core.arrays import TimeArray
 from service.cli.offline.backtest_cells import MAX_ROWS, ReadingsError, check_headings, converted
 
@@ -20,32 +26,19 @@ MAX_LINE_BYTES = 16_384
 """Longest line, for a hundred columns; padwatch's own lines have 300 bytes at most."""
 
 _BOM = b"\xef\xbb\xbf"
-_NUL, _LF, _CR, _QUOTE = 0, 10, 13, 34
 
 
-@dataclass(frozen=True, eq=False)
-class Lines:
-    """Consecutive lines.
-
-    Parameters
-    ----------
-    text
-        UTF-8, each line with its end.
-    number : (n,)
-        Numbers of the lines that are not empty, counted in the file.
-    """
-
-    text: bytes
-    number: TimeArray
+Lines = tuple[bytes, TimeArray]
+"""Text of consecutive lines, and the (n,) numbers in the file of those that are not empty."""
 
 
 def checked_lines(stream: BinaryIO) -> Iterator[Lines]:
-    """Read a file from its beginning.
+    """Yield the checked lines of a file.
 
     Raises
     ------
     ReadingsError
-        At a line that is not text, too long, or has a NUL, a lone carriage return or an open quote.
+        If a line is too long, is not UTF-8, or has a NUL, a lone carriage return or an open quote.
     """
     first, rest = 1, stream.read(len(_BOM)).removeprefix(_BOM)
     while chunk := stream.read(CHUNK_BYTES):
@@ -60,35 +53,30 @@ def checked_lines(stream: BinaryIO) -> Iterator[Lines]:
 
 
 def _checked(text: bytes, first: int) -> Lines:
-    byte = np.frombuffer(text, np.uint8)
-    end = np.flatnonzero(byte == _LF)
-    length = np.diff(end, prepend=-1) - 1
-    _refuse(length > MAX_LINE_BYTES, first, f"longer than {MAX_LINE_BYTES} bytes")
-    _refuse_at(np.flatnonzero(byte == _NUL), end, first, "has a NUL byte")
-    returns = np.flatnonzero(byte == _CR)
-    _refuse_at(returns[byte[returns + 1] != _LF], end, first, "a carriage return within the line")
-    quotes = np.searchsorted(np.flatnonzero(byte == _QUOTE), end)
-    _refuse(np.diff(quotes, prepend=0) % 2 == 1, first, "a quote is not closed")
+    lines = text.removesuffix(b"\n").split(b"\n")
+    for number, line in enumerate(lines, first):
+        if fault := _fault(line):
+            raise ReadingsError(f"line {number}: {fault}")
     try:
         text.decode()
     except UnicodeDecodeError as error:
-        _refuse_at(np.array([error.start]), end, first, "not UTF-8 text")
-    is_return = byte[np.maximum(end - 1, 0)] == _CR
-    return Lines(text, first + np.flatnonzero(length > is_return))
+        number = first + text.count(b"\n", 0, error.start)
+        raise ReadingsError(f"line {number}: not UTF-8 text") from error
+    return (text, np.array([n for n, line in enumerate(lines, first) if line.rstrip(b"\r")]))
 
 
-def _refuse_at(at: npt.NDArray[np.int64], end: npt.NDArray[np.int64], first: int, why: str) -> None:
-    if at.size:
-        raise ReadingsError(f"line {first + int(np.searchsorted(end, at[0]))}: {why}")
-
-
-def _refuse(is_wrong: npt.NDArray[np.bool_], first: int, why: str) -> None:
-    if is_wrong.any():
-        raise ReadingsError(f"line {first + int(np.argmax(is_wrong))}: {why}")
+def _fault(line: bytes) -> str | None:
+    if len(line) > MAX_LINE_BYTES:
+        return f"longer than {MAX_LINE_BYTES} bytes"
+    if b"\0" in line:
+        return "has a NUL byte"
+    if b"\r" in line.removesuffix(b"\r"):
+        return "a carriage return within the line"
+    return "a quote is not closed" if line.count(b'"') % 2 else None
 
 
 def csv_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
-    """Read a file.
+    """Read a CSV file.
 
     Yields
     ------
@@ -97,33 +85,33 @@ def csv_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
     Raises
     ------
     ReadingsError
-        Where it is wrong.
+        If it is not a valid file of readings; the message names the lines.
     """
     headings: list[str] = []
-    for lines in checked_lines(stream):
-        if not headings and lines.number.size:
-            headings, lines = _heading(lines)
-        if lines.number.size:
-            yield converted(_table(lines, headings), lines.number, "line"), stream.tell()
+    for text, numbers in checked_lines(stream):
+        if not headings and numbers.size:
+            headings, text = _heading(text, numbers[0])
+            numbers = numbers[1:]
+        if numbers.size:
+            yield converted(_table(text, numbers, headings), numbers, "line"), stream.tell()
     if not headings:
         raise ReadingsError("is empty: there is no heading")
 
 
-def _heading(lines: Lines) -> tuple[list[str], Lines]:
-    text = lines.text.lstrip(b"\r\n")
-    line, _, rest = text.partition(b"\n")
+def _heading(text: bytes, number: int) -> tuple[list[str], bytes]:
+    line, _, rest = text.lstrip(b"\r\n").partition(b"\n")
     try:
         names = next(csv.reader([line.decode()], strict=True))
     except csv.Error as error:
-        raise ReadingsError(f"line {lines.number[0]}: {error}") from error
+        raise ReadingsError(f"line {number}: {error}") from error
     if len(names) == 1 and {";", "\t"} & set(names[0]):
-        raise ReadingsError(f"line {lines.number[0]}: columns must be separated by commas")
+        raise ReadingsError(f"line {number}: columns must be separated by commas")
     headings = [name.strip() for name in names]
     check_headings(headings)
-    return headings, Lines(rest, lines.number[1:])
+    return headings, rest
 
 
-def _table(lines: Lines, headings: list[str]) -> Any:
+def _table(text: bytes, numbers: TimeArray, headings: list[str]) -> Any:
     misfits: list[tuple[int, int]] = []
 
     def note(row: Any) -> str:
@@ -132,10 +120,8 @@ def _table(lines: Lines, headings: list[str]) -> Any:
 
     try:
         table = pacsv.read_csv(
-            pa.BufferReader(lines.text),
-            pacsv.ReadOptions(
-                use_threads=False, block_size=len(lines.text) + 1, column_names=headings
-            ),
+            pa.BufferReader(text),
+            pacsv.ReadOptions(use_threads=False, block_size=len(text) + 1, column_names=headings),
             pacsv.ParseOptions(invalid_row_handler=note),
             pacsv.ConvertOptions(
                 column_types=dict.fromkeys(headings, pa.string()),
@@ -144,21 +130,19 @@ def _table(lines: Lines, headings: list[str]) -> Any:
             ),
         )
     except pa.ArrowInvalid as error:
-        raise ReadingsError(_misfit(misfits, lines, headings, error)) from error
-    if len(table) != lines.number.size:
-        raise ReadingsError(f"line {lines.number[0]} or one of those behind it: not a row")
-    return _trimmed(table) if b" " in lines.text else table
+        raise ReadingsError(_misfit(misfits, numbers, headings, error)) from error
+    if len(table) != numbers.size:
+        raise ReadingsError(f"line {numbers[0]} or a later one: not a row")
+    return _trimmed(table) if b" " in text else table
 
 
 def _misfit(
-    misfits: list[tuple[int, int]], lines: Lines, headings: list[str], error: Exception
+    misfits: list[tuple[int, int]], numbers: TimeArray, headings: list[str], error: Exception
 ) -> str:
     if not misfits:
-        return f"line {lines.number[0]} or one of those behind it: {str(error).splitlines()[0]}"
+        return f"line {numbers[0]} or a later one: {str(error).splitlines()[0]}"
     row, n_columns = misfits[0]
-    return (
-        f"line {lines.number[row - 1]}: {n_columns} columns where the heading has {len(headings)}"
-    )
+    return f"line {numbers[row - 1]}: {n_columns} columns where the heading has {len(headings)}"
 
 
 def _trimmed(table: Any) -> Any:
@@ -167,15 +151,13 @@ def _trimmed(table: Any) -> Any:
 
 
 MAGIC = b"PAR1"
-MAX_FOOTER_BYTES = 64_000_000
-_TAIL_BYTES = 8
 _ROWS = 65_536
 _BUFFER_BYTES = 1_000_000
 """Buffer of each column; without it a whole row group would be in memory."""
 
 
 def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
-    """Read a file; call it in a child process, which a malformed file may crash.
+    """Read a Parquet file; call it in a child process, which a malformed file may crash.
 
     Yields
     ------
@@ -184,27 +166,20 @@ def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
     Raises
     ------
     ReadingsError
-        Where it is wrong.
+        If it is not a valid file of readings; the message names the rows.
     """
-    size = stream.seek(0, 2)
-    stream.seek(max(0, size - _TAIL_BYTES))
-    tail = stream.read(_TAIL_BYTES)
-    n_footer = int.from_bytes(tail[:4], "little")
-    if tail[4:] != MAGIC or n_footer > size - _TAIL_BYTES - len(MAGIC):
-        raise ReadingsError("not a complete Parquet file")
-    if n_footer > MAX_FOOTER_BYTES:
-        raise ReadingsError(f"a footer of {n_footer} bytes, at most {MAX_FOOTER_BYTES} are read")
-    stream.seek(0)
     try:
-        yield from _batches(stream, size)
+        yield from _batches(stream)
     except pa.ArrowMemoryError:
         raise  # the process is out of memory; the file may be fine
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         words = str(error) or type(error).__name__
-        raise ReadingsError(f"not a sound Parquet file: {words.splitlines()[0][:200]}") from error
+        raise ReadingsError(f"damaged Parquet file: {words.splitlines()[0][:200]}") from error
 
 
-def _batches(stream: BinaryIO, size: int) -> Iterator[tuple[Any, int]]:
+def _batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(0)
     with pq.ParquetFile(stream, buffer_size=_BUFFER_BYTES) as file:
         headings = list(file.schema_arrow.names)
         check_headings(headings)
@@ -218,4 +193,47 @@ def _batches(stream: BinaryIO, size: int) -> Iterator[tuple[Any, int]]:
             if len(batch):
                 yield converted(pa.Table.from_batches([batch]), row, "row"), size * n_read // n_rows
         if n_read != n_rows:
-            raise ReadingsError(f"has {n_read} rows and says {n_rows}")
+            raise ReadingsError(f"has {n_read} rows, but its footer names {n_rows}")
+
+
+MEMORY_BYTES = 3 * 2**30
+WRONG_FILE = 3
+"""Exit code of a wrong file; standard error holds a message for the user."""
+
+
+def main() -> None:
+    """Read the file named by the first argument."""
+    confine(MEMORY_BYTES)
+    try:
+        with Path(sys.argv[1]).open("rb") as stream:
+            is_parquet = stream.read(len(MAGIC)) == MAGIC
+            stream.seek(0)
+            batches = parquet_batches(stream) if is_parquet else csv_batches(stream)
+            _send(batches, sys.stdout.buffer)
+    except (ReadingsError, OSError) as error:
+        words = error.strerror if isinstance(error, OSError) else str(error)
+        _end(words or str(error))
+    except MemoryError:  # pyarrow's error is a subclass
+        _end(f"needs more than {MEMORY_BYTES >> 30} GiB to read")
+
+
+def _send(batches: Iterator[tuple[Any, int]], out: BinaryIO) -> None:
+    n_rows, writer = 0, None
+    for batch, n_bytes in batches:
+        n_rows += len(batch)
+        if n_rows > MAX_ROWS:
+            raise ReadingsError(f"more than {MAX_ROWS} rows")
+        writer = writer or pa.ipc.new_stream(out, batch.schema)
+        writer.write_batch(batch, custom_metadata={"n_bytes": str(n_bytes)})
+    if writer is None:
+        raise ReadingsError("has no rows")
+    writer.close()
+
+
+def _end(words: str) -> None:
+    sys.stderr.write(words[:2000])
+    sys.exit(WRONG_FILE)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,6 +1,6 @@
-"""A year before the first start: simulated readings, a baseline learned from them, trends."""
+"""Simulated year before the first start: readings, a baseline learned from them, and trends."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -26,13 +26,18 @@ EVENT = "learned from a simulated year"
 
 
 def without_past(store: FilmStore, plant: PlantFile) -> list[UnitSettings]:
-    """Units whose films are watched, and of which the store knows nothing."""
-    rules = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
-    return [
-        unit
-        for unit in plant.unit
-        if isinstance(its := rules[unit.id], FilmRules) and not _is_known(store, unit, its)
-    ]
+    """Return the units with watched films that have no readings in the store."""
+    return [unit for unit, _ in _new_units(store, plant)]
+
+
+def _new_units(store: FilmStore, plant: PlantFile) -> Iterator[tuple[UnitSettings, FilmRules]]:
+    for unit in plant.unit:
+        rules = film_rules_of(unit, plant.films)
+        if isinstance(rules, FilmRules) and not any(
+            store.first_ns(unit.id, bearing, estimator) is not None
+            for bearing, estimator in rules.estimators.items()
+        ):
+            yield unit, rules
 
 
 def fill(
@@ -41,24 +46,16 @@ def fill(
     pasts: Mapping[str, Mapping[str, StiffnessHistory]],
     now_ns: int,
 ) -> None:
-    """Give units without a past the one that is simulated.
+    """Store simulated readings, a baseline and trends of units that have no readings.
 
     Parameters
     ----------
     pasts
-        Readings until now, by unit and bearing; a unit without any is left as it is.
+        Readings until now, by unit and bearing; a unit without readings is not changed.
     """
-    for unit in without_past(store, plant):
-        rules, past = film_rules_of(unit, plant.films), pasts.get(unit.id)
-        if past and isinstance(rules, FilmRules):
+    for unit, rules in list(_new_units(store, plant)):
+        if past := pasts.get(unit.id):
             _fill_unit(store, unit, rules, plant.films, past, now_ns)
-
-
-def _is_known(store: FilmStore, unit: UnitSettings, rules: FilmRules) -> bool:
-    return any(
-        store.first_ns(unit.id, bearing, estimator) is not None
-        for bearing, estimator in rules.estimators.items()
-    )
 
 
 def _fill_unit(
@@ -83,18 +80,14 @@ def _fill_unit(
         )
         films = judged(history, operation, learned, rules)
         store.add_past(unit.id, bearing, estimator, films, _trends(history, estimator))
-        store.add_baseline(learned, [_step(learned, step) for step in STEPS])
+        steps = [
+            StoredStep(unit.id, bearing, 1, step, now_ns, AUTHOR, EVENT)
+            for step in (BaselineStep.LEARNED, BaselineStep.ACCEPTED)
+        ]
+        store.add_baseline(learned, steps)
     response = learn_response(past, np.logical_and.reduce(settled))
     if response is not None:
         store.set_response(unit.id, response, now_ns)
-
-
-STEPS = (BaselineStep.LEARNED, BaselineStep.ACCEPTED)
-
-
-def _step(learned: BearingBaseline, step: BaselineStep) -> StoredStep:
-    origin = learned.origin
-    return StoredStep(origin.unit, origin.bearing, 1, step, origin.created_ns, AUTHOR, EVENT)
 
 
 def judged(
@@ -103,12 +96,12 @@ def judged(
     learned: BearingBaseline,
     rules: FilmRules,
 ) -> FilmHistory:
-    """A history with what would have been said of it under its own baseline."""
+    """Return a history with the decisions under its own baseline."""
     found = [learned.of(direction) for direction in DIRECTIONS]
     quantities = [quantity for quantity in found if quantity is not None]
     if len(quantities) < len(DIRECTIONS):
-        raise ValueError(f"nothing was learned of {learned.origin.bearing}: too few readings")
-    said = [
+        raise ValueError(f"no baseline of {learned.origin.bearing}: too few readings")
+    decided = [
         decide_all(WatchedReadings.of(history, operation.is_settled, q.direction), q, rules.change)
         for q in quantities
     ]
@@ -118,19 +111,19 @@ def judged(
         state=operation.state,
         is_settled=operation.is_settled,
         is_simulated=np.ones(len(history), np.bool_),
-        verdict=np.stack([one.verdict for one in said]),
-        level=np.stack([one.level for one in said]),
-        change=np.stack([one.change for one in said]),
-        change_std=np.stack([_std(one) for one in said]),
+        verdict=np.stack([one.verdict for one in decided]),
+        level=np.stack([one.level for one in decided]),
+        change=np.stack([one.change for one in decided]),
+        change_std=np.stack([_std(one) for one in decided]),
         deviation=np.stack([deviation for deviation, _ in deviations]),
         deviation_std=np.stack([std for _, std in deviations]),
         baseline_version=np.ones(len(history), np.int64),
     )
 
 
-def _std(said: DecisionHistory) -> FloatArray:
-    sure = np.where(said.significance > 0.0, said.significance, np.nan)
-    return np.asarray(np.abs(said.change) / sure)
+def _std(decided: DecisionHistory) -> FloatArray:
+    significance = np.where(decided.significance > 0.0, decided.significance, np.nan)
+    return np.asarray(np.abs(decided.change) / significance)
 
 
 def _deviation(
@@ -144,7 +137,7 @@ def _deviation(
 
 
 def _trends(history: StiffnessHistory, estimator: Estimator) -> dict[str, FloatArray]:
-    """Columns of the store's layout, as far as a life knows them."""
+    """Return the simulated columns of the store's layout."""
     columns = {
         "speed_rpm": history.speed_rpm,
         "power_mw": history.power_mw,

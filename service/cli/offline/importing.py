@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing
 from dataclasses import replace
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from itertools import chain
 from pathlib import Path
 
@@ -30,6 +30,7 @@ from acquisition.recordings.messages import MAX_DATA, Frames
 from acquisition.recordings.reading import imported_blocks, imported_frames
 from acquisition.recordings.writer import RecordingWriter
 from core.samples.calibration import UnitCalibration
+from service.runtime.times import EPOCH
 from service.settings.adapter_values import can_settings_of, recorded_unit
 from service.settings.core_values import calibration_of
 from service.settings.sources.can import CanSettings as CanSourceSettings
@@ -43,14 +44,14 @@ from service.settings.units import UnitSettings
 
 
 class CanLogDecoder:
-    """What a CAN source would have made of these frames, had it listened when they were logged.
+    """Decoder of logged CAN frames; the blocks are those of a CAN source at the time of the log.
 
-    A device that does not stamp its samples gets the stamps of the log.
+    Samples without a time stamp of the device get the time of the log.
 
     Raises
     ------
     ConfigError
-        If DBC, settings and calibration do not fit together.
+        If DBC, settings and calibration are inconsistent.
     """
 
     def __init__(self, settings: CanSettings, calibration: UnitCalibration) -> None:
@@ -64,7 +65,7 @@ class CanLogDecoder:
         Raises
         ------
         ConfigError
-            If they cannot all be those of one device.
+            If the frames are not from one device.
         """
         blocks: list[RawBlock] = []
         for time_ns, message in zip(frames["time_ns"].tolist(), _messages(frames), strict=True):
@@ -77,12 +78,12 @@ class CanLogDecoder:
 
 
 def log_decoder_of(unit: UnitSettings) -> CanLogDecoder | None:
-    """The decoder of a unit that reads CAN; None for others, which cannot read CAN logs.
+    """Return the decoder of a unit that reads CAN, or None for another unit.
 
     Raises
     ------
     ConfigError
-        If DBC, settings and calibration do not fit together.
+        If DBC, settings and calibration are inconsistent.
     """
     if not isinstance(unit.source, CanSourceSettings):
         return None
@@ -103,17 +104,14 @@ def _messages(frames: Frames) -> Iterator[can.Message]:
         )
 
 
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-
-
 def import_job(mapping: ImportMapping, unit: UnitSettings) -> ImportJob:
-    """What the reader of a file needs to know.
+    """Describe the import of a file for its reader.
 
     Raises
     ------
     ConfigError
-        If a waveform channel of the unit is not mapped, a mapped one is not the unit's, or a
-        channel is mapped in a unit in which it is not measured.
+        If a waveform channel of the unit is not mapped, a mapped channel is unknown, or it is
+        mapped with a unit that does not fit.
     """
     channels = {channel.id: channel for channel in mapping.channel}
     slow = {channel.id: channel for channel in mapping.slow_channel}
@@ -151,13 +149,12 @@ def import_recording(
     Parameters
     ----------
     advanced
-        Told the share of the file that has been read.
+        Called with the share of the file that has been read.
 
     Raises
     ------
     ConfigError
-        If file, mapping and unit do not fit together, or the file is damaged; nothing is left
-        behind then.
+        If file, mapping and unit are inconsistent, or the file is damaged; no files remain.
     """
     job = import_job(mapping, unit)
     decoder = None if job.channels else log_decoder_of(unit)
@@ -188,10 +185,10 @@ def _decoded(
         yield from ((raw, done) for raw in decoder.take(frames))
 
 
-def _with_all_slow(raw: RawBlock, job: ImportJob, unit: UnitSettings) -> RawBlock:
-    """Slow channels that are not in the file have no value."""
-    found = dict(zip((column.id for column in job.slow), raw.slow, strict=True))
-    return replace(raw, slow=tuple(found.get(c.id, math.nan) for c in unit.slow_channel))
+def _with_all_slow(block: RawBlock, job: ImportJob, unit: UnitSettings) -> RawBlock:
+    """Return the block with all slow channels; those that are not in the file are NaN."""
+    found = dict(zip((column.id for column in job.slow), block.slow, strict=True))
+    return replace(block, slow=tuple(found.get(c.id, math.nan) for c in unit.slow_channel))
 
 
 def _channels(mapped: Mapping[str, MappedChannel], unit: UnitSettings) -> tuple[ChannelColumn, ...]:
@@ -226,7 +223,7 @@ def _slow(column: MappedSlowChannel, channel_unit: str) -> SlowColumn:
 
 
 def _time_axis(time: TimeSettings) -> TimeAxis:
-    start_ns = None if time.start is None else (time.start - _EPOCH) // timedelta(microseconds=1)
+    start_ns = None if time.start is None else (time.start - EPOCH) // timedelta(microseconds=1)
     return TimeAxis(
         kind=time.source,
         utc_offset_s=_utc_offset_s(time.zone),
@@ -238,11 +235,8 @@ def _time_axis(time: TimeSettings) -> TimeAxis:
 
 
 def _utc_offset_s(zone: str) -> int:
-    if zone in ("UTC", ""):
-        return 0
-    hours, minutes = zone[1:].split(":")
-    offset_s = int(hours) * 3600 + int(minutes) * 60
-    return -offset_s if zone[0] == "-" else offset_s
+    offset = datetime.strptime("+00:00" if zone in ("UTC", "") else zone, "%z").utcoffset()
+    return round((offset or timedelta()).total_seconds())
 
 
 def _require_known(mapped: Mapping[str, object], known: list[str], kind: str, unit: str) -> None:

@@ -1,4 +1,8 @@
-"""Reading a Modbus device once, value by value, against its settings."""
+"""One-time reads of a Modbus device, decoded value by value.
+
+Functions that read raise `LinkError` if the device does not answer or answers wrongly, and
+`ConfigError` if it lacks the registers or is another device.
+"""
 
 import math
 import struct
@@ -20,8 +24,7 @@ from service.settings.adapter_values import link_fields
 from service.settings.sources.modbus import ModbusLinkSettings
 
 PLAUSIBLE = (1e-3, 1e6)
-"""Absolute values of a float that a machine may have; anything else is likely another type or byte
-order. Exact zero is neither."""
+"""Plausible absolute values of a float; others indicate another type or byte order, except 0."""
 
 FORMATS = {
     NumberType.INT16: ">h",
@@ -35,16 +38,16 @@ PAIR_TYPES = (NumberType.INT32, NumberType.UINT32, NumberType.FLOAT32)
 
 @dataclass(frozen=True)
 class RegisterLook:
-    """One register and what it may be.
+    """One register in all types and byte orders.
 
     Parameters
     ----------
     singles
-        int16 and uint16, bytes as they come and exchanged, by name.
+        int16 and uint16, in both byte orders, by name.
     pairs
-        With the next register: each type in each byte order; empty for the last one.
+        Types of two registers in each byte order; empty for the last register.
     plausible
-        Byte orders in which the pair is a float that a machine may have.
+        Byte orders in which the pair is a plausible float.
     """
 
     address: int
@@ -56,14 +59,14 @@ class RegisterLook:
 
 @dataclass(frozen=True)
 class ValueLook:
-    """One value of a map.
+    """One value of a register map.
 
     Parameters
     ----------
     registers
-        Raw words of its own number; a single bit of functions 1 and 2 is 0 or 1.
+        Raw words of the value; a bit of functions 1 and 2 is 0 or 1.
     flags
-        Status registers that speak of it, by address.
+        Status registers of the value, by address.
     """
 
     id: str
@@ -77,7 +80,7 @@ class ValueLook:
 
 @dataclass(frozen=True)
 class RingChannelLook:
-    """Counts of one channel in the newest slot of a block ring, and the device's verdict on it."""
+    """Counts of one channel in the newest slot of a block ring, and its state by the device."""
 
     channel: int
     ok: bool
@@ -88,17 +91,17 @@ class RingChannelLook:
 
 @dataclass(frozen=True)
 class RingLook:
-    """A block ring as it was found.
+    """Layout of a block ring, and its newest slot.
 
     Parameters
     ----------
     state
-        Of the newest slot: "whole", "torn" (it was being written), "damaged" (its checksum is
-        wrong) or "blank" (nothing was written there since the device started).
+        State of the newest slot: "whole", "torn" (being written), "damaged" (wrong checksum) or
+        "blank" (not written since the device started).
     start_ns
-        Time of its first sample by the device, UTC nanoseconds since 1970.
+        Device time of its first sample, UTC nanoseconds since 1970.
     slow
-        Its slow values; None where there is none.
+        Slow values; None for missing ones.
     """
 
     n_channels: int
@@ -115,7 +118,7 @@ class RingLook:
 
 
 def ring_look(header: RingHeader, slot: Slot) -> RingLook:
-    """Show a block ring by its header and its newest slot."""
+    """Describe a block ring by its header and its newest slot."""
     ring = header.layout
     state = (
         "blank" if slot.blank else "torn" if slot.torn else "damaged" if slot.damage else "whole"
@@ -145,20 +148,20 @@ def ring_look(header: RingHeader, slot: Slot) -> RingLook:
 
 
 def looks(data: bytes, address: int) -> list[RegisterLook]:
-    """Read each register in every way.
+    """Decode each register in every type and byte order.
 
     Parameters
     ----------
     data
         Big-endian words.
     address
-        Of the first one.
+        Address of the first register.
     """
     return [_look(data[2 * n : 2 * n + 4], address + n) for n in range(len(data) // 2)]
 
 
 def value_looks(decoder: MapDecoder, content: bytes) -> list[ValueLook]:
-    """Show every value of a map with the registers that it came from."""
+    """Return every value of a map with its registers."""
     reading = decoder.read(content)
     return [
         ValueLook(
@@ -224,20 +227,12 @@ _TRIES_IN_FLIGHT = 20
 
 
 def link_settings_of(device: ModbusLinkSettings) -> LinkSettings:
-    """How a device is reached."""
+    """Return the link settings of a device."""
     return LinkSettings(**link_fields(device))
 
 
 async def read_once(device: ModbusLinkSettings, function: int, address: int, count: int) -> bytes:
-    """Read registers, big-endian words, or bits, eight in a byte.
-
-    Raises
-    ------
-    LinkError
-        If the device does not answer, or answers nonsense.
-    ConfigError
-        If it has no such registers.
-    """
+    """Read registers as big-endian words, or bits, eight in a byte."""
     client = ModbusClient(link_settings_of(device))
     async with client.connected():
         return await client.read(address, count, function)
@@ -246,13 +241,7 @@ async def read_once(device: ModbusLinkSettings, function: int, address: int, cou
 async def read_map_once(
     device: ModbusLinkSettings, registers: RegisterMap
 ) -> tuple[MapDecoder, bytes]:
-    """Check the signature, then read everything that a map names.
-
-    Raises
-    ------
-    LinkError, ConfigError
-        As `read_once`; ConfigError too if it is another device.
-    """
+    """Check the signature, then read all registers of a map."""
     decoder = MapDecoder(registers)
     reader = MapReader(link_settings_of(device), decoder)
     async with reader.connected():
@@ -262,13 +251,7 @@ async def read_map_once(
 async def read_ring_once(
     device: ModbusLinkSettings, base_address: int, function: int
 ) -> tuple[RingHeader, Slot]:
-    """Read a block ring's header and its newest slot.
-
-    Raises
-    ------
-    LinkError, ConfigError
-        As `read_once`; ConfigError too if this is no block ring.
-    """
+    """Read a block ring's header and its newest slot."""
     client = ModbusClient(link_settings_of(device))
     reader = RingReader(client, base_address, function)
     async with client.connected():
@@ -278,13 +261,7 @@ async def read_ring_once(
 
 
 async def identify_once(device: ModbusLinkSettings) -> Identification:
-    """Ask a device who it is.
-
-    Raises
-    ------
-    LinkError, ConfigError
-        As `read_once`; ConfigError too if it does not say.
-    """
+    """Read the identification of a device."""
     client = ModbusClient(link_settings_of(device))
     async with client.connected():
         return await client.identify()
@@ -293,24 +270,15 @@ async def identify_once(device: ModbusLinkSettings) -> Identification:
 async def measure_in_flight(
     device: ModbusLinkSettings, address: int, function: int, most: int
 ) -> int:
-    """Try how many requests a device answers in order when they are sent at once.
+    """Measure how many simultaneous requests a device answers in order; at least 1.
 
     Parameters
     ----------
     address
-        Of a register that it has.
-
-    Returns
-    -------
-    At least 1.
-
-    Raises
-    ------
-    LinkError, ConfigError
-        As `read_once`, of a single request.
+        Address of an existing register.
     """
     await read_once(device, address, 1, function)
-    n_taken = 1
+    n_answered = 1
     for n_requests in range(2, most + 1):
         client = ModbusClient(replace(link_settings_of(device), requests_in_flight=n_requests))
         spans = [Span(address, 1, function)] * n_requests
@@ -320,5 +288,5 @@ async def measure_in_flight(
                     await client.read_spans(spans)
         except AcquisitionError:
             break
-        n_taken = n_requests
-    return n_taken
+        n_answered = n_requests
+    return n_answered

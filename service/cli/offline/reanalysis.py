@@ -1,82 +1,41 @@
-"""A recording through the same analysis as live samples, and its results in the API's words."""
+"""Analysis of a recording as of live samples, with results in the models of the API."""
 
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
+from typing import Any
 
 from acquisition.source import SampleSource
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from core.samples.calibration import UnitCalibration
 from service.api.routes.bearings import estimator_names, runout_names
-from service.api.values import (
-    ApiModel,
-    EstimatorName,
-    QualityModel,
-    ReadingModel,
-    RunoutName,
-    SpeedSourceName,
-    Time,
-    WindowModel,
-    reading_model,
-    window_model,
-)
+from service.api.values import QualityModel, reading_model, window_model
 from service.runtime.times import rfc3339
 
 
-class AssessmentModel(ApiModel):
-    """One bearing at one refresh; the parts are those of the API's ``latest``."""
-
-    unit: str
-    """Unit."""
-
-    bearing: str
-    """Bearing."""
-
-    time: Time
-    """End of the samples."""
-
-    quality: QualityModel
-    """The worst of the 1× amplitudes and the preferred stiffness."""
-
-    speed_source: SpeedSourceName
-    """Where the running speed came from."""
-
-    runout: dict[str, RunoutName | None]
-    """Whether runout was taken off 1× of the newest segment, and if not, why."""
-
-    window: WindowModel
-    """The samples."""
-
-    estimators: dict[str, EstimatorName | None]
-    """Where `stiffness` came from, by axes "xx" and "yy"; null if there is none."""
-
-    readings: dict[str, ReadingModel]
-    """All quantities of the catalogue, by name."""
-
-
-def assessment_model(assessment: Assessment) -> AssessmentModel:
-    """An assessment as the API shows its parts, to the last digit."""
-    return AssessmentModel(
-        unit=assessment.unit,
-        bearing=assessment.bearing,
-        time=rfc3339(assessment.time_ns),
-        quality=QualityModel.of(assessment.quality),
-        speed_source=assessment.speed_source.value,
-        runout=runout_names(assessment),
-        window=window_model(assessment.window),
-        estimators=estimator_names(assessment),
-        readings={name: reading_model(name, r) for name, r in assessment.readings.items()},
-    )
+def assessment_document(assessment: Assessment) -> dict[str, Any]:
+    """Return an assessment with its parts in the models of the API's ``latest``, to all digits."""
+    return {
+        "unit": assessment.unit,
+        "bearing": assessment.bearing,
+        "time": rfc3339(assessment.time_ns),
+        "quality": QualityModel.of(assessment.quality),
+        "speed_source": assessment.speed_source.value,
+        "runout": runout_names(assessment),
+        "window": window_model(assessment.window),
+        "estimators": estimator_names(assessment),
+        "readings": {name: reading_model(name, r) for name, r in assessment.readings.items()},
+    }
 
 
 async def assessments(
     source: SampleSource, monitor: UnitMonitor, passed: Callable[[int], None]
 ) -> AsyncIterator[Assessment]:
-    """All that a monitor learns from a source that comes to an end.
+    """Yield all assessments of a finite source.
 
     Parameters
     ----------
     passed
-        Called with the number of samples per channel of each block that is done.
+        Called with the number of samples per channel of each analysed block.
 
     Raises
     ------
@@ -91,36 +50,36 @@ async def assessments(
 
 
 def is_full(assessment: Assessment) -> bool:
-    """Whether the average has all the segments it wants."""
+    """Return whether the average has all its segments."""
     return assessment.window.n_segments >= assessment.window.n_segments_wanted
 
 
 class LastAverages:
-    """The last full average of each bearing; the last one of all while none is full."""
+    """The last full average of each bearing, or the last average if none is full."""
 
     def __init__(self) -> None:
         self._kept: dict[str, Assessment] = {}
 
     def put(self, assessment: Assessment) -> None:
-        """Take the next assessment."""
+        """Add the next assessment."""
         kept = self._kept.get(assessment.bearing)
         if kept is None or is_full(assessment) or not is_full(kept):
             self._kept[assessment.bearing] = assessment
 
     def all(self) -> Iterable[Assessment]:
-        """One for each bearing, in the order they came."""
+        """Return one assessment for each bearing, in order of arrival."""
         return self._kept.values()
 
 
 def calibration_differences(
     ids: Sequence[str], recorded: UnitCalibration, configured: UnitCalibration
 ) -> list[str]:
-    """What the plant file says otherwise than the recording, in words.
+    """Describe the differences between recorded and configured calibration.
 
     Parameters
     ----------
     ids
-        Of the waveform channels, which are the same in both.
+        Waveform channels, the same in both.
     """
     words = []
     for id_, then, now in zip(ids, recorded.channels, configured.channels, strict=True):

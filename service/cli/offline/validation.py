@@ -141,14 +141,14 @@ N_CONDITIONS = 5
 
 @dataclass(frozen=True)
 class Row:
-    """One printed figure beside padwatch's.
+    """A printed figure and the figure of padwatch.
 
     Parameters
     ----------
     table
-        Number of the table, or of the section where the figure stands in the text.
+        Number of the table, or of the section for a figure in the text.
     quantity
-        With unit; amplitudes are zero-to-peak.
+        Quantity with unit; amplitudes are zero-to-peak.
     """
 
     table: int | str
@@ -169,7 +169,7 @@ class Errors:
 
 
 def simulated_rows() -> list[Row]:
-    """Tables 4 to 7: 80 amplitudes from the frequency response of the 10-DOF model."""
+    """Return Tables 4 to 7: 80 amplitudes from the frequency response of the 10-DOF model."""
     rows: list[Row] = []
     for condition in range(N_CONDITIONS):
         rows += _condition_rows(condition)
@@ -177,12 +177,12 @@ def simulated_rows() -> list[Row]:
 
 
 def measured_rows() -> list[Row]:
-    """Tables 8 and 9 (X direction) and section 3.2: equation (5) on the printed amplitudes."""
+    """Return Tables 8 and 9 (X direction) and section 3.2, by equation (5)."""
     return [_measured_row(measured) for measured in MEASURED]
 
 
 def errors(rows: Sequence[Row]) -> Errors:
-    """Largest and root-mean-square error.
+    """Return the largest and the root-mean-square error.
 
     Raises
     ------
@@ -196,10 +196,9 @@ def errors(rows: Sequence[Row]) -> Errors:
 
 
 def rounding_limits_gn_per_m(measured: MeasuredRow) -> tuple[float, float]:
-    """Where the printed stiffness must lie if equation (5) made it from the unrounded amplitudes.
+    """Return the limits of the printed stiffness, computed by equation (5) from rounded values.
 
-    Each printed amplitude stands for half a unit of its last digit either way, and so does the
-    printed stiffness.
+    Each printed figure has an error of up to half a unit of its last digit.
     """
     shaft, half_shaft = _printed(measured.shaft_um_pk)
     bearing, half_bearing = _printed(measured.bearing_um_pk)
@@ -268,6 +267,6 @@ def _measured_row(measured: MeasuredRow) -> Row:
 
 
 def _printed(figure: str) -> tuple[float, float]:
-    """Value of a printed figure and half a unit of its last digit."""
+    """Return the value of a printed figure and half a unit of its last digit."""
     n_decimals = len(figure.partition(".")[2])
     return float(figure), 0.5 * 10.0**-n_decimals

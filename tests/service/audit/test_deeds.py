@@ -15,7 +15,7 @@ from core.alarms.life_cycle import update
 from core.alarms.operation import Acknowledge, Action, Comment, Shelve, TakeOutOfService, operate
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
-from service.app.service_audit import Release, start_deeds, stop_deed
+from service.app.service_audit import start_deeds, stop_deed
 from service.store.access.audit_entries import ActedNews, Acting, AuditEntry, Source, acting_as
 from service.store.audit_port import AuditQuery
 from service.store.film_port import BaselineStep, StoredStep
@@ -167,7 +167,8 @@ def test_what_cannot_be_told_is_not_done_and_the_other_way_round(
 
 
 def test_a_start_tells_whether_the_configuration_is_another(store: SqliteStore) -> None:
-    first, other = Release("1.0", "aa", "live"), Release("1.1", "bb", "live")
+    first = {"version": "1.0", "configuration": "aa", "origin": "live"}
+    other = first | {"version": "1.1", "configuration": "bb"}
     told = []
     for release in (first, first, other):
         starts = store.audit.entries(AuditQuery(limit=1, action="service.started"))
@@ -175,7 +176,7 @@ def test_a_start_tells_whether_the_configuration_is_another(store: SqliteStore) 
         store.audit.record([*deeds, stop_deed(release, 3, T0)])
         told.append([(deed.action, deed.before, deed.after) for deed in deeds])
 
-    assert told[0] == told[1] == [("service.started", None, vars(first))]
+    assert told[0] == told[1] == [("service.started", None, first)]
     before, after = {"configuration": "aa"}, {"configuration": "bb"}
     assert told[2][0] == ("configuration.changed", before, after)
     assert json.loads(newest(store).after or "") == {"n_refused_more": 3}

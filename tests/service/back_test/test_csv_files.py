@@ -106,7 +106,7 @@ def test_ten_lines_are_named_the_others_counted_and_other_encodings_refused(
     [
         ("u_random", "uncertainty", "missing columns: u_random; unknown columns: 'uncertainty'"),
         ("time,", "", "missing columns: time or time_ns"),
-        ("state", "quality", "columns that are there twice: 'quality'"),
+        ("state", "quality", "repeated columns: 'quality'"),
         (",unit", ",unit,time_ns", "both time and time_ns"),
         (",", ";", "line 1: columns must be separated by commas"),
         ("time", '"time', "line 1: a quote is not closed"),

@@ -147,7 +147,7 @@ def test_a_file_that_is_cut_off_anywhere_or_has_too_many_rows_is_refused(
     whole = path.read_bytes()
     for size in range(4, len(whole), 97):
         path.write_bytes(whole[:size])
-        assert refusal(path) == "not a complete Parquet file"
+        assert refusal(path).startswith("damaged Parquet file: ")
     monkeypatch.setattr("service.cli.offline.backtest_tables.MAX_ROWS", N_ROWS - 1)
     assert refusal(written()) == "20 rows; at most 19 are read"
 

@@ -8,7 +8,7 @@ from core.limits import AlarmLevel
 from core.units import DAY_NS
 from service.cli.offline.backtest import event_of, time_ns_of
 from service.cli.offline.backtest_bearing import Learning, MachineEvent, Period, periods_of
-from service.cli.offline.backtest_report import alarm_stretches
+from service.cli.offline.backtest_report import alarm_stretches, change_report
 
 DAYS = np.arange(100) * DAY_NS
 
@@ -67,10 +67,13 @@ def decided(level: list[int], change: list[float]) -> DecisionHistory:
 
 
 def test_an_alarm_that_rises_is_one_and_those_that_return_are_counted_each() -> None:
-    (found,) = alarm_stretches(decided([0, 1, 2, 1, 0], [0.0, -0.05, -0.2, -0.1, 0.0]))
+    decisions = decided([0, 1, 2, 1, 0], [0.0, -0.05, -0.2, -0.1, 0.0])
+    (found,) = alarm_stretches(decisions)
     assert (found.begin, found.danger, found.end, found.level) == (1, 2, 4, AlarmLevel.DANGER)
-    assert (found.raised.change, found.largest.change, found.largest.row) == (-0.05, -0.2, 2)
-    assert found.largest.std == 0.02
+    assert found.largest == 2
+    largest = change_report(decisions, found.largest)
+    assert largest.percent == pytest.approx(100.0 * (np.exp(-0.2) - 1.0))
+    assert largest.u_percent == pytest.approx(100.0 * np.exp(-0.2) * 0.02)
     found = list(alarm_stretches(decided([1, 0, 1, 1], [0.1, 0.0, 0.2, 0.3])))
     assert [(alarm.begin, alarm.end, alarm.danger) for alarm in found] == [
         (0, 1, None),

@@ -20,7 +20,7 @@ from core.change.settings import ChangeLimits
 from core.change.shaft_response import film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
 from core.units import DAY_NS
-from service.cli.offline.backtest import Found, export_baselines, run_back_test
+from service.cli.offline.backtest import BackTestResult, export_baselines, run_back_test
 from service.cli.offline.backtest_bearing import BackTestRules, Learning, MachineEvent
 from service.cli.offline.backtest_cells import ReadingsError
 from service.cli.offline.backtest_files import read_histories
@@ -48,7 +48,7 @@ def learning(two_units: Any) -> Learning:
 
 
 @pytest.fixture(scope="module")
-def found(histories: Histories, learning: Learning) -> Found:
+def found(histories: Histories, learning: Learning) -> BackTestResult:
     return run_back_test(histories, BackTestRules(learning, bracket_n_per_m=BRACKETS))
 
 
@@ -75,14 +75,14 @@ def learned_rows(two_units: Any, life: UnitLife) -> int:
     return int(np.searchsorted(time_ns, time_ns[0] + two_units.learning_days * DAY_NS))
 
 
-def test_alarms_are_those_that_core_decides(two_units: Any, found: Found) -> None:
+def test_alarms_are_those_that_core_decides(two_units: Any, found: BackTestResult) -> None:
     """Straight from the simulated life, without any file."""
     expected = []
     for unit, life in two_units.lives.items():
         n = learned_rows(two_units, life)
         for bearing, history in life.readings.items():
             is_settled = settled(life, bearing)
-            origin = Origin(unit, bearing, "not told", 1, "back-test", 0)
+            origin = Origin(unit, bearing, "unspecified", 1, "back-test", 0)
             baseline = learn(history.rows(0, n), is_settled[:n], origin, BaselineSettings())
             for direction in DIRECTIONS:
                 film = baseline.of(direction)
@@ -104,7 +104,7 @@ def test_alarms_are_those_that_core_decides(two_units: Any, found: Found) -> Non
 
 
 def test_the_damage_is_told_with_its_evidence_and_a_fault_that_was_learned_is_doubted(
-    two_units: Any, found: Found, histories: Histories
+    two_units: Any, found: BackTestResult, histories: Histories
 ) -> None:
     alarm = next(a for a in found.alarms if (a.unit, a.bearing) == ("U2", "LJB"))
     begin = alarm.begin
@@ -129,7 +129,7 @@ def test_the_damage_is_told_with_its_evidence_and_a_fault_that_was_learned_is_do
 
 
 def test_causes_are_told_by_the_newest_readings_of_all_bearings(
-    two_units: Any, found: Found
+    two_units: Any, found: BackTestResult
 ) -> None:
     alarm = next(a for a in found.alarms if (a.unit, a.bearing, a.direction) == ("U2", "LJB", "x"))
     life, baselines = two_units.lives["U2"], [b for b in found.baselines if b.origin.unit == "U2"]
@@ -171,7 +171,9 @@ def _deviation(history: Any, film: Any, direction: str) -> Any:
     return film.compare_history(history).deviation
 
 
-def test_every_reading_is_counted_once(two_units: Any, histories: Histories, found: Found) -> None:
+def test_every_reading_is_counted_once(
+    two_units: Any, histories: Histories, found: BackTestResult
+) -> None:
     assert len(found.films) == 12
     for film in found.films:
         n_readings = len(histories[film.unit, film.bearing].history)
@@ -179,7 +181,7 @@ def test_every_reading_is_counted_once(two_units: Any, histories: Histories, fou
         assert film.verdicts["normal"] > 1000
         assert film.baselines[0].cells_own > 10
     n_alarms = sum(film.n_alarms for film in found.films)
-    assert found.rate().n_alarms == len(found.alarms) == n_alarms
+    assert found.report("readings.csv", 1, 1.0).rate.n_alarms == len(found.alarms) == n_alarms
     compared_days = [
         np.ptp(life.operation.time_ns) / DAY_NS - two_units.learning_days
         for life in two_units.lives.values()
@@ -187,7 +189,7 @@ def test_every_reading_is_counted_once(two_units: Any, histories: Histories, fou
     assert found.unit_years == pytest.approx(sum(compared_days) / 365.25, abs=0.02)
 
 
-def test_exported_baselines_read_back_as_they_were(found: Found, tmp_path: Any) -> None:
+def test_exported_baselines_read_back_as_they_were(found: BackTestResult, tmp_path: Any) -> None:
     assert export_baselines(found, tmp_path / "out") == 8
     stored = baseline_from_json((tmp_path / "out" / "U2-LJB-v1.json").read_text(encoding="utf-8"))
     assert stored in found.baselines
@@ -223,7 +225,7 @@ def test_without_attitude_or_shaft_motion_less_is_known_and_said(
         ),
     )
     found = run_back_test({("U2", "LJB"): poorer}, BackTestRules(learning))
-    assert found.doubts == ["U2 LJB: no attitude_deg, so that its baseline does without"]
+    assert found.doubts == ["U2 LJB: no attitude_deg, so its baseline does not use it"]
     assert all(q.surface.shape.has_attitude is False for q in found.baselines[0].quantities)
     assert {a.cause.reason for a in found.alarms} == {
         "the readings have no shaft_um_pk in every bearing"
@@ -231,7 +233,7 @@ def test_without_attitude_or_shaft_motion_less_is_known_and_said(
 
 
 def test_states_that_are_not_told_are_followed_or_asked_for(
-    two_units: Any, histories: Histories, learning: Learning, found: Found
+    two_units: Any, histories: Histories, learning: Learning, found: BackTestResult
 ) -> None:
     rows, life = histories["U2", "LJB"], two_units.lives["U2"]
     operation = life.operation

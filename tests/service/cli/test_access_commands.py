@@ -165,7 +165,7 @@ def test_a_key_is_shown_once_and_opens_until_it_is_revoked(
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("create", "historian", "--unit", "U9"), "there is no unit U9, it has U1, U2"),
+        (("create", "historian", "--unit", "U9"), "there is no unit U9; known are U1, U2"),
         (("create", "historian", "--days", "0"), "Invalid value"),
         (("create", "a b"), "a name has 1 to 64"),
         (("create", "historian", "--role", "admin", "--unit", "U1"), "cannot have the role admin"),

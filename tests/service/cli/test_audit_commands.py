@@ -48,7 +48,7 @@ def test_an_altered_entry_is_named(plant_path: Path, database: Path) -> None:
         )
     said, document = audit("verify", plant_path), audit("verify", plant_path, "--json")
     assert (said.exit_code, document.exit_code) == (1, 1)
-    assert said.stdout.endswith("NOT WHOLE: entry 4 was altered\n")
+    assert said.stdout.endswith("CORRUPT: entry 4 was altered\n")
     assert json.loads(document.stdout)["finding"]["number"] == 4
 
 
@@ -60,7 +60,7 @@ def test_a_restored_backup_can_be_said_to_be_known(plant_path: Path, database: P
     number = len(HOSTILE) + 1
     unknown, known = audit("verify", plant_path), audit("verify", plant_path, f"--known={number}")
     assert (unknown.exit_code, known.exit_code) == (1, 0)
-    assert f"entry {number} tells that the head did not fit" in unknown.stdout
+    assert f"entry {number} reports that the head did not match" in unknown.stdout
 
 
 def test_an_export_holds_nothing_that_a_spreadsheet_computes(

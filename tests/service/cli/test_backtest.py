@@ -47,7 +47,7 @@ def test_a_report_is_one_json_document(readings: Path) -> None:
         "n_danger": 0,
         "alarms_per_unit_year": 0.0,
     }
-    assert report["doubts"] == ["U1 UJB: no attitude_deg, so that its baseline does without"]
+    assert report["doubts"] == ["U1 UJB: no attitude_deg, so its baseline does not use it"]
     assert report["readings_per_s"] > 0.0
 
 

@@ -51,7 +51,7 @@ def test_a_port_in_use_is_one_line_and_exit_1(plant_path: Path, tmp_path: Path) 
 
     assert result.exit_code == 1
     assert result.stderr == (
-        f"padwatch: cannot listen on 127.0.0.1 port {port}: Address already in use\n"
+        f"padwatch run: cannot listen on 127.0.0.1 port {port}: Address already in use\n"
     )
     assert result.stdout == ""
     assert not (tmp_path / "data").exists()

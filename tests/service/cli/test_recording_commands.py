@@ -9,16 +9,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from pydantic_core import to_jsonable_python
 from rigs.command_line import padwatch, padwatch_program
 
 from acquisition.clock import SystemClock
 from acquisition.delivery.blocks import sample_block
 from acquisition.errors import LinkError
+from acquisition.recordings.reader import open_recording
+from acquisition.recordings.source import RecordingSource
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
-from service.app.recordings import recording_of, recording_source, recording_writer, selection_of
-from service.cli.offline.reanalysis import assessment_model, assessments
-from service.cli.record import Patience, record_blocks
+from service.app.recordings import recording_writer, selection_of
+from service.cli.offline.reanalysis import assessment_document, assessments
+from service.cli.record import ReconnectPolicy, record_blocks
 from service.measuring.simulated_sources import simulated_feed as feed_of
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
@@ -60,7 +63,7 @@ def test_a_recorded_unit_can_be_read_back(plant_path: Path, tmp_path: Path) -> N
     result = padwatch_program(*command)
     assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout == f"{out}: 0.5 s of unit U2, 12 channels, 0.0 MB\n"
-    manifest = recording_of(out).manifest
+    manifest = open_recording(out).manifest
     assert (manifest.unit, manifest.n_samples, manifest.n_blocks) == ("U2", 300, 6)
     assert manifest.made_by.startswith("padwatch 0")
 
@@ -104,7 +107,7 @@ async def test_ending_a_recording_early_keeps_it(
     source = Interrupted(unit, 3, lambda: signal.raise_signal(number))
     writer = recording_writer(unit, tmp_path / "run", "a test")
     assert await record_blocks(source, writer, seconds=600.0) is None
-    assert recording_of(tmp_path / "run").manifest.n_samples == 150
+    assert open_recording(tmp_path / "run").manifest.n_samples == 150
 
 
 @pytest.mark.parametrize("patience_s", [None, 0.2])
@@ -113,11 +116,11 @@ async def test_a_link_that_stays_lost_ends_a_recording_and_keeps_it(
 ) -> None:
     unit = plant.unit[0]
     writer = recording_writer(unit, tmp_path / "run", "a test")
-    patience = None if patience_s is None else Patience(patience_s, stepped_clock)
+    policy = None if patience_s is None else ReconnectPolicy(patience_s, stepped_clock)
     source = Interrupted(unit, 2, lose_the_link)
-    assert await record_blocks(source, writer, 600.0, patience) == "cable cut"
-    # with patience it is asked once more, which is after the 0.2 s
-    assert recording_of(tmp_path / "run").manifest.n_samples == (100 if patience is None else 200)
+    assert await record_blocks(source, writer, 600.0, policy) == "cable cut"
+    # with a policy it is asked once more, which is after the 0.2 s
+    assert open_recording(tmp_path / "run").manifest.n_samples == (100 if policy is None else 200)
 
 
 async def test_a_lost_link_may_be_recorded_across_and_is_an_exact_gap(
@@ -125,9 +128,9 @@ async def test_a_lost_link_may_be_recorded_across_and_is_an_exact_gap(
 ) -> None:
     unit = plant.unit[0]
     writer = recording_writer(unit, tmp_path / "run", "a test")
-    patience = Patience(10.0, stepped_clock)
-    assert await record_blocks(Interrupted(unit, 2, lose_the_link), writer, 1.0, patience) is None
-    first = [block.first_index for block in recording_of(tmp_path / "run").raw_blocks()]
+    policy = ReconnectPolicy(10.0, stepped_clock)
+    assert await record_blocks(Interrupted(unit, 2, lose_the_link), writer, 1.0, policy) is None
+    first = [block.first_index for block in open_recording(tmp_path / "run").raw_blocks()]
     assert first == [0, 50, 200, 250, 400, 450, 600]
 
 
@@ -147,12 +150,12 @@ def test_a_unit_has_to_be_chosen_and_to_exist(plant_path: Path, tmp_path: Path) 
     result = padwatch("record", plant_path, "--out", tmp_path / "run")
     assert (result.exit_code, result.stderr) == (
         2,
-        f"{plant_path}: has units U1, U2; choose one with --unit\n",
+        f"padwatch record: {plant_path}: has units U1, U2; choose one with --unit\n",
     )
     result = padwatch("record", plant_path, "--unit", "U3", "--out", tmp_path / "run")
     assert (result.exit_code, result.stderr) == (
         2,
-        f"{plant_path}: has no unit U3, it has U1, U2\n",
+        f"padwatch record: {plant_path}: has no unit U3, it has U1, U2\n",
     )
 
 
@@ -163,11 +166,11 @@ async def test_the_command_prints_every_assessment_of_the_analysis_to_the_last_d
     result = await asyncio.to_thread(padwatch, *command)
     assert (result.exit_code, result.stderr) == (0, "")
 
-    opened, unit = recording_of(recording), plant.unit[0]
-    source = recording_source(opened, selection_of(opened, unit), None, SystemClock())
+    opened, unit = open_recording(recording), plant.unit[0]
+    source = RecordingSource(opened, SystemClock(), selection_of(opened, unit))
     monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
     expected = [
-        assessment_model(found).model_dump(mode="json")
+        to_jsonable_python(assessment_document(found))
         async for found in assessments(source, monitor, lambda _: None)
     ]
     assert len(expected) == 3 * 5

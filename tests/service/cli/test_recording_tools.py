@@ -9,8 +9,9 @@ from click.testing import Result
 from rigs.command_line import padwatch
 
 from acquisition.delivery.blocks import RawBlock, sample_block
+from acquisition.recordings.reader import open_recording
 from core.samples.blocks import Rejection
-from service.app.recordings import recording_of, recording_writer
+from service.app.recordings import recording_writer
 from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
 from service.settings.units import UnitSettings
@@ -151,10 +152,9 @@ def test_what_is_exported_can_be_imported_again(
     told = json.loads(result.stdout)
     assert (told["samples"], told["gap_samples"], told["sample_type"]) == (200, 200, "float32")
     calibration = calibration_of(unit)
-    before = [sample_block([raw], calibration) for raw in recording_of(folder).raw_blocks()]
-    after = [
-        sample_block([raw], calibration) for raw in recording_of(tmp_path / "again").raw_blocks()
-    ]
+    before = [sample_block([raw], calibration) for raw in open_recording(folder).raw_blocks()]
+    again = open_recording(tmp_path / "again")
+    after = [sample_block([raw], calibration) for raw in again.raw_blocks()]
     for first, second in zip(before, after, strict=True):
         assert (first.start_ns, first.first_index) == (second.start_ns, second.first_index)
         assert first.slow == second.slow

@@ -60,7 +60,7 @@ def test_a_database_that_was_rolled_back_is_told(plant: Path) -> None:
 
     assert result.exit_code == 1
     assert "high_water: the database was rolled back" in result.stdout
-    assert "NOT WHOLE: 1 high_water" in result.stdout
+    assert "CORRUPT: 1 high_water" in result.stdout
 
 
 def test_a_service_that_writes_meanwhile_is_no_fault(

@@ -7,7 +7,7 @@ from rigs.command_line import padwatch
 
 from service.cli.run import NEEDS_POSTGRESQL
 
-NO_STREAM = "no [stream]: give it one, with the servers of NATS, or use `padwatch run`"
+NO_STREAM = "no [stream]: add one with the servers of NATS, or use `padwatch run`"
 
 # no server is there, and none is asked before the mistake is found
 STREAM = '[stream]\nservers = ["nats://127.0.0.1:1"]\n'

@@ -21,7 +21,7 @@ from core.quality import Reason, bad
 from core.samples.blocks import DeviceClock, Rejection, SampleBlock
 from core.samples.gaps import SampleAccount
 from service.api.http.listening import listen
-from service.app.service import Performance, run_service
+from service.app.service import ServiceRun, run_service
 from service.measuring.simulated_sources import simulated_feed
 from service.measuring.sources import WatchedUnit, monitor_of
 from service.runtime.polls import TimedSource
@@ -163,7 +163,7 @@ async def told_by_a_service(folder: Path) -> Told:
     said: asyncio.Queue[str] = asyncio.Queue()
     url = asyncio.create_task(said.get())
     with listen("127.0.0.1", 0) as listener:
-        performance = Performance(plant, units, ends=True)
+        performance = ServiceRun(plant, units, ends=True)
         serving = asyncio.create_task(run_service(performance, listener, clock, said.put_nowait))
         await asyncio.wait([serving, url], return_when=asyncio.FIRST_COMPLETED)
         if serving.done():

@@ -10,7 +10,7 @@ import pytest
 
 from acquisition.clock import SystemClock
 from service.app.process import Supervision
-from service.app.service import Performance, run_service
+from service.app.service import ServiceRun, run_service
 from service.live.live_view import LinkState, LiveView
 from service.measuring.sources import live_units
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats, Pulse
@@ -197,9 +197,9 @@ async def test_every_task_of_the_program_has_a_pulse(
     settings, clock = load_plant_file(plant), SystemClock()
     before, said = asyncio.all_tasks(), asyncio.Queue()
     stopped = asyncio.Event()
-    monkeypatch.setattr("service.app.service.stop_on_signals", lambda: stopped)
+    monkeypatch.setattr("service.app.process.stop_on_signals", lambda: stopped)
     listener = socket.create_server(("127.0.0.1", 0))
-    performance = Performance(settings, live_units(settings, clock))
+    performance = ServiceRun(settings, live_units(settings, clock))
     service = asyncio.create_task(
         run_service(performance, listener, clock, said.put_nowait), name="the service"
     )

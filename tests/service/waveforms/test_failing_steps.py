@@ -204,9 +204,11 @@ def test_what_goes_on_failing_for_a_minute_is_an_alarm(rig: Any, index: Any) -> 
         capacity=1,
         oldest_wait_s=0.0,
         unstored_reason=None,
+        words=None,
+        condition=None,
+        trouble=None,
     )
-    parts.trouble = None
-    look = health_of([], parts, parts, parts, parts, recordings=keeper)
+    look = health_of([], *[parts] * 7, recordings=keeper, soundness=parts)
     folder = rig.make(0)
     index.is_away = True
     keeper.look()

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from acquisition.clock import SystemClock
-from service.app.replay import replayed_plant
+from service.app.recordings import replayed_plant
 from service.app.web import access_desk
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile

@@ -21,7 +21,7 @@ from harness.nats_server import NatsServer
 from harness.waiting import at_work
 from service.app.cluster_processes import Analysing
 from service.app.measuring_process import analysis_on
-from service.app.process import Ground, live_view
+from service.app.process import ProcessContext, live_view
 from service.app.storage import open_store
 from service.cluster.frames import Taken, decoded
 from service.cluster.ownership import Partition
@@ -101,23 +101,22 @@ async def publish(plant: PlantFile, sent: Iterable[SampleBlock]) -> None:
         await asyncio.wait_for(publisher.waiting.drained(), WAIT_S)
 
 
-def ground_of(plant: PlantFile, clock: Clock, store: Store) -> tuple[Ground, Monitors]:
+def ground_of(plant: PlantFile, clock: Clock, store: Store) -> tuple[ProcessContext, Monitors]:
     """What the roles of a process stand on, and the monitors of all units."""
     monitors = {unit.id: monitor_of(unit, plant.analysis) for unit in plant.unit}
     beats, timings, live = Heartbeats(clock), Timings(monitors, clock), live_view(plant, clock)
-    return Ground(plant, Origin.LIVE, clock, store, live, beats, timings), monitors
+    return ProcessContext(plant, Origin.LIVE, clock, store, live, beats, timings), monitors
 
 
 @asynccontextmanager
-async def analysing(plant: PlantFile) -> AsyncIterator[tuple[Analysing, Ground]]:
+async def analysing(plant: PlantFile) -> AsyncIterator[tuple[Analysing, ProcessContext]]:
     """Run the analysis of a process; what is not stored when this is left is lost."""
     store = open_store(plant)
     ground, monitors = ground_of(plant, SystemClock(), store)
     assert plant.stream is not None
-    process = Analysing(
-        plant, Partition(), plant.stream, monitors, ground, LiveContext(ground.live)
-    )
-    task = asyncio.create_task(process._analyse())
+    context = LiveContext(ground.live)
+    process = Analysing(plant, Partition(), plant.stream, monitors, ground, context)
+    task = asyncio.create_task(process.run())
     try:
         yield process, ground
     finally:

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import httpx2
@@ -14,10 +15,9 @@ from rigs.described import described_app
 from service.api.auth.authenticator import Authenticator
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import create_key
-from service.app.metrics import Watched, scrape
+from service.app.metrics import scrape
 from service.measuring.acquirer import Bus
 from service.measuring.timings import Timings
-from service.notifications.sender import Deliveries
 from service.store.access.identities import Role
 
 PASSWORD = "the river is high in may"  # noqa: S105
@@ -71,24 +71,27 @@ def token_of(answer: httpx2.Response) -> str:
 def access(service: Any) -> Access:
     """A second application over the same store, which asks everybody."""
     context = service.context
-    watched = Watched(
-        bearings={unit: [bearing.id for bearing in s.bearing] for unit, s in context.units.items()},
+    ground = SimpleNamespace(
+        plant=SimpleNamespace(unit=list(context.units.values())),
         live=context.live,
-        bus=Bus(1, service.clock),
+        timings=Timings(context.units, service.clock),
+        clock=service.clock,
+        store=service.store,
+    )
+    analysis = SimpleNamespace(
+        process=ground,
         recorder=service.recorder,
         alarms=context.alarms,
         films=context.films,
         captures=context.captures,
         evidence=service.evidence,
-        deliveries=Deliveries([], service.store.outbox, service.clock),
-        timings=Timings(context.units, service.clock),
-        clock=service.clock,
+        deliveries=context.deliveries,
+        **dict.fromkeys(("space", "load", "tape", "recordings", "soundness")),
     )
+    metrics = partial(scrape, analysis, Bus(1, service.clock), {})
     hashing = Hashing(PasswordHasher(time_cost=1, memory_cost=8, parallelism=1))
     desk = Authenticator(service.store.access, service.clock, local_role=None, hashing=hashing)
-    app = described_app(
-        replace(context, access=desk, metrics=partial(scrape, watched)), service.desk
-    )
+    app = described_app(replace(context, access=desk, metrics=metrics), service.desk)
     return Access(desk, app, service)
 
 

@@ -9,7 +9,7 @@ import pytest
 from rigs.described import described_app
 
 from core.alarms.alarm import PLANT
-from service.app.serving_process import Replica, replica_context, replica_on
+from service.app.serving_process import Replica
 from service.cluster.reported_commands import CommandWorker
 from service.cluster.reported_state import Reporter
 from service.runtime.heartbeats import Heartbeats
@@ -56,10 +56,9 @@ def process_of(service: Any, plant: PlantFile, name: str) -> tuple[Reporter, Com
 async def pair(running: Any, plant: PlantFile) -> AsyncIterator[Pair]:
     """Both, and the replica has seen two reports: it knows that somebody is alive."""
     reporter, carrying_out = process_of(running, plant, "one")
-    replica = await replica_on(plant, running.store, running.clock)
-    app = described_app(
-        replica_context(replica, running.context.access, None, Heartbeats(running.clock))
-    )
+    replica = Replica(plant, running.store, running.clock)
+    await replica.start()
+    app = described_app(replica.context(running.context.access, None, Heartbeats(running.clock)))
     transport = httpx2.ASGITransport(app)
     async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as client:
         both = Pair(running, replica, client, reporter, carrying_out)

@@ -6,9 +6,10 @@ import pytest
 
 from core.alarms.alarm import AlarmState
 from core.limits import AlarmLevel
-from service.app.serving_process import replica_on
+from service.app.serving_process import Replica
 from service.cluster.replica_state import NOT_ANALYSED, SILENT_AFTER_S
 from service.live.live_view import LinkState
+from service.settings.plant import PlantFile
 from service.store.port import StoreError
 
 SAME = [
@@ -63,10 +64,11 @@ async def test_a_process_that_has_died_is_not_shown_as_healthy(pair: Any) -> Non
 
 
 async def test_a_report_that_was_there_before_the_replica_is_no_sign_of_life(
-    running: Any, pair: Any
+    running: Any, pair: Any, plant: PlantFile
 ) -> None:
     await pair.reporter.report()
-    late = await replica_on(pair.replica.plant, running.store, running.clock)
+    late = Replica(plant, running.store, running.clock)
+    await late.start()
     await late.feed.look()
     assert not late.live.is_alive("U1")
     assert not late.live.current("U1", "UJB").is_current
