@@ -37,11 +37,11 @@ from service.notifications.sender import Deliveries
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import ContinuousRecorder
 from service.recordings.keeper import RecordingIndexer
-from service.reports.keeper import EvidenceKeeper
+from service.reports.keeper import EvidenceCollector
 from service.runtime.disk import SpaceWatch
 from service.runtime.heartbeats import Loop
 from service.settings.storage import Origin
-from service.store.loops import Retaining, Rolling, Scrubbing
+from service.store.loops import RetentionLoop, RollupLoop, ScrubLoop
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,10 @@ class Analysis:
     recordings: RecordingIndexer
     alarms: AlarmEngine
     films: FilmMonitor
-    evidence: EvidenceKeeper
+    evidence: EvidenceCollector
     references: ReferencesInForce
-    rolling: Rolling
-    retaining: Retaining
+    rolling: RollupLoop
+    retaining: RetentionLoop
     space: SpaceWatch
     load: LoadWatch
     soundness: IntegrityMonitor
@@ -98,7 +98,7 @@ class Analysis:
         loops: dict[str, Loop] = {"gather": self.rolling.run}
         if self.process.origin is Origin.LIVE:
             loops["retain"] = self.retaining.run
-            loops["scrub"] = Scrubbing(self.process.store.integrity, self.process.clock).run
+            loops["scrub"] = ScrubLoop(self.process.store.integrity, self.process.clock).run
         return loops
 
     async def close(self) -> None:
@@ -205,8 +205,8 @@ async def analysis_on(
         films=films,
         evidence=evidence,
         references=references,
-        rolling=Rolling(store.rollups, clock),
-        retaining=Retaining(store.retention, retention_limits(plant.retention), clock),
+        rolling=RollupLoop(store.rollups, clock),
+        retaining=RetentionLoop(store.retention, retention_limits(plant.retention), clock),
         space=space,
         load=load,
         soundness=soundness,

@@ -27,7 +27,7 @@ from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import ReceiverView
 from service.recordings.around_alarms import Captures
 from service.recordings.metrics import recording_metrics
-from service.reports.keeper import EvidenceKeeper
+from service.reports.keeper import EvidenceCollector
 from service.runtime.metrics import counter, gauge
 from service.runtime.polls import TimedSource
 from service.store.port import StoreError
@@ -85,7 +85,7 @@ async def scrape(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource
         return Scrape(analysis, bus, sources, None)
 
 
-def evidence_metrics(captures: Captures, evidence: EvidenceKeeper) -> Iterator[Metric]:
+def evidence_metrics(captures: Captures, evidence: EvidenceCollector) -> Iterator[Metric]:
     """Yield the families of captures and evidence."""
     counts = (
         ("captures_written", "Captures of samples alarm_context alarms.", captures.n_written),

@@ -24,7 +24,7 @@ from service.runtime.heartbeats import Heartbeats, Loop
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
-from service.store.holds import only_one
+from service.store.holds import exclusive_use
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ async def run_service(
     )
     alarm_context = LiveContext(live)
     router = router_of(plant, origin, alarm_context, clock)
-    with only_one(database_path(plant)), closing(open_store(plant, origin, router)) as store:
+    with exclusive_use(database_path(plant)), closing(open_store(plant, origin, router)) as store:
         process = ProcessContext(plant, origin, clock, store, live, beats, timings)
         desk = access_desk(plant, store.access, clock, service_run.is_demo)
         units = timed(service_run.units, timings)

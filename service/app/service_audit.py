@@ -15,7 +15,7 @@ from service.measuring.service_alarms import STEP_S
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
-from service.store.access.audit_entries import AuditEntry, Deed
+from service.store.access.audit_entries import AuditEntry, AuditAction
 from service.store.audit_port import AuditQuery, AuditStore
 from service.store.port import StoreError
 
@@ -28,7 +28,7 @@ Release = Mapping[str, str]
 """Version of padwatch, version of its configuration, and origin of its data."""
 
 
-def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[Deed]:
+def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[AuditAction]:
     """Return the entries of a start; a changed configuration has its own entry before it.
 
     Parameters
@@ -37,14 +37,14 @@ def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) ->
         Newest entry of a start; None if there is none.
     """
     before, now = _configuration_of(last_start), release[CONFIGURATION]
-    started = Deed(now_ns, PADWATCH, STARTED, SERVICE, after=release)
+    started = AuditAction(now_ns, PADWATCH, STARTED, SERVICE, after=release)
     if before is None or before == now:
         return [started]
     versions = ({CONFIGURATION: before}, {CONFIGURATION: now})
-    return [Deed(now_ns, PADWATCH, CHANGED, CONFIGURATION, *versions), started]
+    return [AuditAction(now_ns, PADWATCH, CHANGED, CONFIGURATION, *versions), started]
 
 
-def stop_deed(release: Release, refusals: int, now_ns: int) -> Deed:
+def stop_deed(release: Release, refusals: int, now_ns: int) -> AuditAction:
     """Return the entry of a stop.
 
     Parameters
@@ -53,7 +53,7 @@ def stop_deed(release: Release, refusals: int, now_ns: int) -> Deed:
         Refused requests without an entry of their own since the last one with an entry.
     """
     after = {"n_refused_more": refusals} if refusals else None
-    return Deed(now_ns, PADWATCH, STOPPED, SERVICE, before=release, after=after)
+    return AuditAction(now_ns, PADWATCH, STOPPED, SERVICE, before=release, after=after)
 
 
 def _configuration_of(start: AuditEntry | None) -> str | None:
@@ -98,7 +98,7 @@ class ServiceTrail:
             step_s = seen.step_s_since(before)
             if abs(step_s) > STEP_S:
                 step = {"by_s": round(step_s, 3)}
-                deed = Deed(seen.host_ns, PADWATCH, STEPPED, CLOCK, after=step)
+                deed = AuditAction(seen.host_ns, PADWATCH, STEPPED, CLOCK, after=step)
                 await self._attempt(self._audit.record, [deed])
 
     def _record_start(self) -> None:

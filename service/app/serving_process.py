@@ -35,7 +35,7 @@ from service.measuring.acquirer import Bus
 from service.measuring.commands import LocalCommands
 from service.measuring.references import ReferencesInForce
 from service.measuring.timings import Timings
-from service.reports.routes import EvidenceDesk
+from service.reports.routes import EvidenceService
 from service.runtime.heartbeats import Heartbeats
 from service.runtime.polls import TimedSource
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
@@ -54,7 +54,7 @@ def serving_of(
     listener: socket.socket,
     desk: Authenticator,
     announce: Callable[[str], None],
-    evidence: EvidenceDesk | None = None,
+    evidence: EvidenceService | None = None,
 ) -> ProcessServer:
     """Build the server of a context; the OpenAPI document is rendered once, after the start.
 

@@ -26,7 +26,7 @@ from service.cli.options import (
 from service.settings.core_values import watched_estimator
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
-from service.store.backup import AccessAfter, access_before, back_up, take_back
+from service.store.backup import AccessAfter, access_before, back_up, revoke_again
 from service.store.backup import restore as put_back
 from service.store.film_port import FilmStore
 from service.store.port import StoreError
@@ -72,7 +72,7 @@ def restore(
     access = access_before(database)
     done = put_back(copy, database, now_ns)
     with access_of(plant) as restored:
-        after = take_back(restored, access, now_ns)
+        after = revoke_again(restored, access, now_ns)
     before = None if done.before is None else str(done.before)
     found = {"database": str(done.database), "before": before, "schema": done.content.schema}
     said = f"{done.database}: restored" + (f"; the former database is {before}" if before else "")

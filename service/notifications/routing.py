@@ -7,7 +7,7 @@ from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.limits import AlarmLevel
 from service.notifications.message import Composer, dumps
 from service.settings.notifications import ReceiverSettings
-from service.store.outbox import Letter
+from service.store.outbox import OutboxMessage
 
 ACTIVE = (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED)
 HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
@@ -65,7 +65,7 @@ class Router:
     ) -> None:
         self._receivers, self._composer, self._now_ns = receivers, composer, now_ns
 
-    def __call__(self, alarm: Alarm, event: AlarmEvent) -> Iterable[Letter]:
+    def __call__(self, alarm: Alarm, event: AlarmEvent) -> Iterable[OutboxMessage]:
         """Return one letter for each receiver that requests the event."""
         notice = notice_of(alarm, event)
         if notice is None:
@@ -82,7 +82,7 @@ class Router:
         message = self._composer.alarm(alarm, event, notice.is_active, now_ns)
         body = dumps(message)
         return [
-            Letter(
+            OutboxMessage(
                 receiver=name,
                 event_id=message["id"],
                 body=body,

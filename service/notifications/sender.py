@@ -16,7 +16,7 @@ from service.notifications.channel import Channel, Delivered, Failed, Outcome
 from service.notifications.message import loads
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
 from service.settings.notifications import AnyReceiver
-from service.store.outbox import Backlog, LetterState, Outbox, StoredLetter
+from service.store.outbox import Backlog, MessageState, Outbox, StoredMessage
 from service.store.port import StoreError
 
 FIRST_WAIT_S = 1.0
@@ -149,7 +149,7 @@ class Sender:
             return False
         return not await self._stored(lambda: self._outbox.urgent(self.receiver.name))
 
-    async def _deliver(self, letter: StoredLetter) -> bool:
+    async def _deliver(self, letter: StoredMessage) -> bool:
         """Make one attempt; return whether the letter is settled."""
         self._note(SenderState.SENDING)
         self._pulse.beat(MAX_SEND_S)
@@ -160,10 +160,10 @@ class Sender:
         await self._finish(letter, outcome)
         return True
 
-    async def _finish(self, letter: StoredLetter, outcome: Outcome) -> None:
+    async def _finish(self, letter: StoredMessage, outcome: Outcome) -> None:
         """Store the outcome, even if the service stops meanwhile."""
         is_delivered = isinstance(outcome, Delivered)
-        state = LetterState.DELIVERED if is_delivered else LetterState.REFUSED
+        state = MessageState.DELIVERED if is_delivered else MessageState.REFUSED
         now_ns = self._clock.now_ns()
         await self._stored(
             lambda: self._outbox.finish(letter.id, state, outcome.answer, now_ns), to_the_end=True
@@ -174,7 +174,7 @@ class Sender:
             write(event, receiver=self.receiver.name, id=letter.event_id, answer=outcome.answer)
         self.status = SenderStatus(SenderState.SENDING)
 
-    async def _wait_after(self, letter: StoredLetter, failed: Failed) -> None:
+    async def _wait_after(self, letter: StoredMessage, failed: Failed) -> None:
         now_ns, before = self._clock.now_ns(), self.status
         if before.n_failures == 0:
             log.warning("not delivered", receiver=self.receiver.name, reason=failed.answer)

@@ -16,10 +16,10 @@ from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
 from service.settings.alarm_kinds import ALARM_KINDS
-from service.store.access.audit_entries import ActedNews, Deed
+from service.store.access.audit_entries import ActedNews, AuditAction
 from service.store.audit_deeds import alarm_deeds
 from service.store.database import Connection
-from service.store.outbox import Address, insert_letters, no_recipients
+from service.store.outbox import Address, insert_messages, no_recipients
 from service.store.port import AlarmQuery, StoredEvent, StoreError
 from service.store.sharing import DONE, answer_command
 from service.store.trends import BETWEEN_BOUNDS, IN_STATES, at_least, at_most, condition_arguments
@@ -67,14 +67,14 @@ SELECT_EVENTS = f"""
 def insert_alarms(
     writer: Connection,
     news: Iterable[AlarmNews],
-    tell: Callable[[Connection, Iterable[Deed]], None],
+    tell: Callable[[Connection, Iterable[AuditAction]], None],
     address: Address = no_recipients,
 ) -> None:
     """Add events, queue what tells of them, and bring the alarms to what they are after them."""
     for told in news:
         for event in told.events:
             if writer.execute(INSERT_EVENT, _event_row(event)).rowcount == 1:
-                insert_letters(writer, event, address(told.alarm, event))
+                insert_messages(writer, event, address(told.alarm, event))
                 tell(writer, alarm_deeds(event, told))
         writer.execute(UPSERT, _alarm_row(told.alarm))
         if isinstance(told, ActedNews) and told.command is not None:

@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from service.store.access.audit_entries import AuditEntry, Deed
+from service.store.access.audit_entries import AuditEntry, AuditAction
 from service.store.access.audit_verification import (
     AuditHead,
     HeadError,
@@ -50,7 +50,7 @@ class SqlAudit:
         """Why the head could not be written last; None if it could."""
         return self._chain.head_error
 
-    def record(self, deeds: Sequence[Deed]) -> None:
+    def record(self, deeds: Sequence[AuditAction]) -> None:
         """Write deeds in a transaction of their own.
 
         Raises

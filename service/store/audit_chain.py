@@ -6,7 +6,7 @@ from dataclasses import asdict, astuple
 from pathlib import Path
 from threading import Lock
 
-from service.store.access.audit_entries import FIRST, AuditEntry, Deed, chained
+from service.store.access.audit_entries import FIRST, AuditEntry, AuditAction, chained
 from service.store.access.audit_verification import (
     HEAD_DIFFERED,
     AuditHead,
@@ -52,7 +52,7 @@ class AuditChain:
                 yield writer
             self._settle()
 
-    def add(self, writer: Connection, deeds: Iterable[Deed]) -> None:
+    def add(self, writer: Connection, deeds: Iterable[AuditAction]) -> None:
         """Add deeds within a transaction; the first one in it compares the head with the chain."""
         for deed in deeds:
             newest = newest_of(writer)
@@ -119,14 +119,14 @@ def begin_head(path: Path) -> None:
         write_head(path, AuditHead())
 
 
-def _insert(writer: Connection, deed: Deed, newest: AuditHead) -> AuditHead:
+def _insert(writer: Connection, deed: AuditAction, newest: AuditHead) -> AuditHead:
     entry = chained(deed, newest.number + 1, newest.hash)
     writer.execute(INSERT, astuple(entry))
     return AuditHead(entry.number, entry.hash)
 
 
-def _told(deed: Deed, newest: AuditHead, why: str) -> Deed:
-    return Deed(
+def _told(deed: AuditAction, newest: AuditHead, why: str) -> AuditAction:
+    return AuditAction(
         time_ns=deed.time_ns,
         actor="padwatch",
         action=HEAD_DIFFERED,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from core.alarms.alarm import Alarm, AlarmEvent, AlarmNews, Hold
-from service.store.access.audit_entries import ActedNews, Deed, Source, acting
+from service.store.access.audit_entries import ActedNews, AuditAction, Source, acting
 from service.store.baselines import Versions, select_steps, versions_after
 from service.store.database import Connection
 from service.store.film_port import BaselineStep, StoredStep
@@ -15,7 +15,7 @@ from service.store.vector_reference_port import SetVectorReference
 PADWATCH = "padwatch"
 
 
-def alarm_deeds(event: AlarmEvent, told: AlarmNews) -> list[Deed]:
+def alarm_deeds(event: AlarmEvent, told: AlarmNews) -> list[AuditAction]:
     """What somebody did to an alarm; nothing if nobody did it."""
     if not event.actor:
         return []
@@ -26,7 +26,7 @@ def alarm_deeds(event: AlarmEvent, told: AlarmNews) -> list[Deed]:
         "occurrence": event.occurrence,
         **_holds(told.alarm),
     }
-    deed = Deed(
+    deed = AuditAction(
         time_ns=event.time_ns,
         actor=event.actor,
         action=f"alarm.{event.change.value}",
@@ -40,7 +40,7 @@ def alarm_deeds(event: AlarmEvent, told: AlarmNews) -> list[Deed]:
     return [deed]
 
 
-def step_deeds(writer: Connection, steps: Sequence[StoredStep]) -> list[Deed]:
+def step_deeds(writer: Connection, steps: Sequence[StoredStep]) -> list[AuditAction]:
     """What is about to be done to baselines, and where they stand before and after it."""
     deeds = []
     for place in dict.fromkeys((step.unit, step.bearing) for step in steps):
@@ -55,10 +55,10 @@ def step_deeds(writer: Connection, steps: Sequence[StoredStep]) -> list[Deed]:
     return deeds
 
 
-def reference_deed(writer: Connection, reference: GapReference) -> Deed:
+def reference_deed(writer: Connection, reference: GapReference) -> AuditAction:
     """A reference that is about to be set, after the one that rules until then."""
     history = select_history(writer, reference.unit, reference.bearing)
-    return Deed(
+    return AuditAction(
         time_ns=reference.set_ns,
         actor=reference.author,
         action="gap_reference.set",
@@ -71,10 +71,10 @@ def reference_deed(writer: Connection, reference: GapReference) -> Deed:
     )
 
 
-def vector_deed(before: SetVectorReference | None, reference: SetVectorReference) -> Deed:
+def vector_deed(before: SetVectorReference | None, reference: SetVectorReference) -> AuditAction:
     """A reference of 1× that is about to be set, after the one that rules until then."""
     found = reference.reference
-    return Deed(
+    return AuditAction(
         time_ns=reference.set_ns,
         actor=reference.author,
         action="order1_reference.set",
@@ -87,9 +87,9 @@ def vector_deed(before: SetVectorReference | None, reference: SetVectorReference
     )
 
 
-def _step_deed(step: StoredStep, before: Versions, after: Versions) -> Deed:
+def _step_deed(step: StoredStep, before: Versions, after: Versions) -> AuditAction:
     who = acting()
-    return Deed(
+    return AuditAction(
         time_ns=step.time_ns,
         actor=step.actor,
         action=f"baseline.{step.step.value}",

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from service.store.access.audit_entries import AuditEntry, Deed
+from service.store.access.audit_entries import AuditEntry, AuditAction
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class AuditQuery:
 class AuditStore(Protocol):
     """Who did what. Deeds in the store itself are written with what they change."""
 
-    def record(self, deeds: Sequence[Deed]) -> None:
+    def record(self, deeds: Sequence[AuditAction]) -> None:
         """Write deeds that change nothing in the store; durable when this returns."""
         ...
 

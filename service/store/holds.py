@@ -173,7 +173,7 @@ def lock_path(database: Path) -> Path:
 
 
 @contextmanager
-def only_one(database: Path, look: Callable[[Path], FileSystem] = file_system_of) -> Iterator[None]:
+def exclusive_use(database: Path, look: Callable[[Path], FileSystem] = file_system_of) -> Iterator[None]:
     """Be the only service that works with a database.
 
     The lock ends with the process, however that ends; the file stays and means nothing by itself.

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 
-from service.store.access.audit_entries import Deed
+from service.store.access.audit_entries import AuditAction
 from service.store.audit_chain import AuditChain
 from service.store.database import Connection
 from service.store.highwater.commits import CommitMarks
@@ -24,7 +24,7 @@ class Marked:
         Is told.
     damage
         Of its rows.
-    look_on
+    check_some
         Looks at some more of them; whether that was once around.
     require_file
         Raises `StoreError` if the database's file was removed or replaced since it was opened.
@@ -36,12 +36,12 @@ class Marked:
         writing: Callable[[], AbstractContextManager[Connection]],
         chain: AuditChain,
         damage: DamageLog,
-        look_on: Callable[[], bool],
+        check_some: Callable[[], bool],
         require_file: Callable[[], None],
     ) -> None:
         self.require_file = require_file
         self._marks, self._writing, self._chain = marks, writing, chain
-        self._damage, self.look_on = damage, look_on
+        self._damage, self.check_some = damage, check_some
 
     @property
     def found(self) -> Sequence[MarkFinding]:
@@ -80,8 +80,8 @@ class Marked:
         return found
 
 
-def _deed(finding: MarkFinding, now_ns: int) -> Deed:
-    return Deed(
+def _deed(finding: MarkFinding, now_ns: int) -> AuditAction:
+    return AuditAction(
         time_ns=now_ns,
         actor="padwatch",
         action=f"store.{finding.kind}",

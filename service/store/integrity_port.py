@@ -38,7 +38,7 @@ class Integrity(Protocol):
         """Go on with the database as it is, and tell the audit trail; what was wrong with it."""
         ...
 
-    def look_on(self) -> bool:
+    def check_some(self) -> bool:
         """Look at some rows behind those of the last time; whether that was once around."""
         ...
 
@@ -58,6 +58,6 @@ class Unmarked:
         """Nothing is to be adopted."""
         return ()
 
-    def look_on(self) -> bool:
+    def check_some(self) -> bool:
         """Nothing is to be looked at."""
         return True

@@ -11,14 +11,14 @@ from service.store.retention.limits import RetentionLimits
 from service.store.retention.port import RetentionStore
 from service.store.rollups.port import RollupStore
 
-RETAINING_PERIOD_S = 600.0
+RETENTION_PERIOD_S = 600.0
 """Between looks, when nothing is old any more."""
 
-RETAINING_REST_SHARE = 9.0
+RETENTION_REST_SHARE = 9.0
 """How much longer to rest than to work: it takes a tenth of one core, and lets others write."""
 
 
-class Retaining:
+class RetentionLoop:
     """Deletes what is old, a little of each bearing in turn, in a thread and with rests between.
 
     Ages are counted from a moment that a day of results lies behind: a clock that is set years
@@ -38,7 +38,7 @@ class Retaining:
         """Delete for ever."""
         while True:
             if not await self.round(pulse):
-                await rest(RETAINING_PERIOD_S, self._clock, pulse)
+                await rest(RETENTION_PERIOD_S, self._clock, pulse)
 
     async def round(self, pulse: Pulse = UNHEARD) -> bool:
         """Delete once of each bearing; whether there was anything to delete."""
@@ -64,18 +64,18 @@ class Retaining:
         begun_s = self._clock.monotonic_s()
         found = await asyncio.to_thread(self._store.delete, series, self._limits, now_ns)
         taken_s = self._clock.monotonic_s() - begun_s
-        await rest_after(taken_s, RETAINING_REST_SHARE, self._clock, pulse)
+        await rest_after(taken_s, RETENTION_REST_SHARE, self._clock, pulse)
         return found
 
 
-ROLLING_PERIOD_S = 20.0
+ROLLUP_PERIOD_S = 20.0
 """Between looks, when all is gathered."""
 
-ROLLING_REST_SHARE = 3.0
+ROLLUP_REST_SHARE = 3.0
 """How much longer to rest than to work: gathering an old database takes a quarter of one core."""
 
 
-class Rolling:
+class RollupLoop:
     """Gathers what is due, one bearing after the other, in a thread and with rests in between."""
 
     def __init__(self, rollups: RollupStore, clock: Clock) -> None:
@@ -87,9 +87,9 @@ class Rolling:
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Gather for ever."""
         while True:
-            pulse.beat(ROLLING_PERIOD_S)
+            pulse.beat(ROLLUP_PERIOD_S)
             if not await self._round(pulse):
-                await self._clock.sleep(ROLLING_PERIOD_S)
+                await self._clock.sleep(ROLLUP_PERIOD_S)
 
     async def _round(self, pulse: Pulse) -> bool:
         """Gather once for each bearing that is due; returns whether there was any."""
@@ -97,11 +97,11 @@ class Rolling:
         try:
             due = await asyncio.to_thread(self._rollups.due, now_ns)
             for series in due:
-                pulse.beat(ROLLING_PERIOD_S)
+                pulse.beat(ROLLUP_PERIOD_S)
                 begun_s = self._clock.monotonic_s()
                 await asyncio.to_thread(self._rollups.gather, series, now_ns)
                 taken_s = self._clock.monotonic_s() - begun_s
-                await rest_after(taken_s, ROLLING_REST_SHARE, self._clock, pulse)
+                await rest_after(taken_s, ROLLUP_REST_SHARE, self._clock, pulse)
         except StoreError as error:
             self._trouble.note(str(error))
             return False
@@ -109,15 +109,15 @@ class Rolling:
         return bool(due)
 
 
-SCRUBBING_REST_SHARE = 49.0
+SCRUB_REST_SHARE = 49.0
 """How much longer to rest than to look: it takes a fiftieth of one core."""
 
 LEAST_REST_S = 0.2
-SCRUBBING_PERIOD_S = 86_400.0
+SCRUB_PERIOD_S = 86_400.0
 """From once around to the next."""
 
 
-class Scrubbing:
+class ScrubLoop:
     """Looks for damage, a little at a time, in a thread and with rests in between."""
 
     def __init__(self, integrity: Integrity, clock: Clock) -> None:
@@ -131,13 +131,13 @@ class Scrubbing:
         while True:
             pulse.beat(LOOK_S)
             if await self.look(pulse):
-                await rest(SCRUBBING_PERIOD_S, self._clock, pulse)
+                await rest(SCRUB_PERIOD_S, self._clock, pulse)
 
     async def look(self, pulse: Pulse = UNHEARD) -> bool:
         """Look at some rows and rest; whether that was once around."""
         begun_s = self._clock.monotonic_s()
         try:
-            is_around = await asyncio.to_thread(self._integrity.look_on)
+            is_around = await asyncio.to_thread(self._integrity.check_some)
         except StoreError as error:
             self._trouble.note(str(error))
             await self._clock.sleep(LOOK_S)
@@ -145,8 +145,8 @@ class Scrubbing:
         self._trouble.note(None)
         taken_s = self._clock.monotonic_s() - begun_s
         await rest_after(
-            max(LEAST_REST_S / SCRUBBING_REST_SHARE, taken_s),
-            SCRUBBING_REST_SHARE,
+            max(LEAST_REST_S / SCRUB_REST_SHARE, taken_s),
+            SCRUB_REST_SHARE,
             self._clock,
             pulse,
         )

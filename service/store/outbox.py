@@ -9,7 +9,7 @@ from core.alarms.alarm import Alarm, AlarmEvent
 from service.store.database import Connect, Connection
 
 
-class LetterState(StrEnum):
+class MessageState(StrEnum):
     """What has become of a letter; all but the first are for ever."""
 
     WAITING = "waiting"
@@ -18,12 +18,12 @@ class LetterState(StrEnum):
     EXPIRED = "expired"
 
 
-DEAD = (LetterState.REFUSED, LetterState.EXPIRED)
+DEAD = (MessageState.REFUSED, MessageState.EXPIRED)
 """Letters that will never be delivered."""
 
 
 @dataclass(frozen=True)
-class Letter:
+class OutboxMessage:
     """An event of an alarm, to be told to one receiver.
 
     Parameters
@@ -51,17 +51,17 @@ class Letter:
     closes: bool
 
 
-Address = Callable[[Alarm, AlarmEvent], Iterable[Letter]]
+Address = Callable[[Alarm, AlarmEvent], Iterable[OutboxMessage]]
 """Who is to be told of an event of an alarm."""
 
 
-def no_recipients(alarm: Alarm, event: AlarmEvent) -> Iterable[Letter]:  # noqa: ARG001
+def no_recipients(alarm: Alarm, event: AlarmEvent) -> Iterable[OutboxMessage]:  # noqa: ARG001
     """Queue no letters."""
     return ()
 
 
 @dataclass(frozen=True)
-class StoredLetter:
+class StoredMessage:
     """A letter in the outbox.
 
     Parameters
@@ -82,7 +82,7 @@ class StoredLetter:
     body: str
     queued_ns: int
     is_urgent: bool
-    state: LetterState
+    state: MessageState
     n_attempts: int
     answer: str
     done_ns: int | None
@@ -108,14 +108,14 @@ class Backlog:
     n_waiting: int
     oldest_ns: int | None
     n_dead: int
-    last_dead: StoredLetter | None
+    last_dead: StoredMessage | None
     delivered_ns: int | None
 
 
 class Outbox(Protocol):
     """Durable letters; each method that changes something is on the disk when it returns."""
 
-    def waiting(self, receiver: str, limit: int) -> Sequence[StoredLetter]:
+    def waiting(self, receiver: str, limit: int) -> Sequence[StoredMessage]:
         """Read the first of what waits for a receiver, in order."""
         ...
 
@@ -123,7 +123,7 @@ class Outbox(Protocol):
         """Whether anything that waits for a receiver ends quiet hours."""
         ...
 
-    def finish(self, letter: int, state: LetterState, answer: str, now_ns: int) -> None:
+    def finish(self, letter: int, state: MessageState, answer: str, now_ns: int) -> None:
         """Note that a letter was delivered or refused."""
         ...
 
@@ -193,7 +193,7 @@ COUNT = """
 """
 
 
-def insert_letters(writer: Connection, event: AlarmEvent, letters: Iterable[Letter]) -> None:
+def insert_messages(writer: Connection, event: AlarmEvent, letters: Iterable[OutboxMessage]) -> None:
     """Queue what tells of an event that has just been stored for the first time."""
     of = {"alarm": event.identity.id, "number": event.number}
     writer.executemany(INSERT, [{**vars(letter), **of} for letter in letters])
@@ -211,7 +211,7 @@ class SqlOutbox:
     def __init__(self, write: Connect, read: Connect) -> None:
         self._write, self._read = write, read
 
-    def waiting(self, receiver: str, limit: int) -> list[StoredLetter]:
+    def waiting(self, receiver: str, limit: int) -> list[StoredMessage]:
         """Read the first of what waits for a receiver, in order."""
         with self._read() as reader:
             return [_letter(row) for row in reader.execute(SELECT_WAITING, (receiver, limit))]
@@ -221,7 +221,7 @@ class SqlOutbox:
         with self._read() as reader:
             return bool(reader.execute(SELECT_URGENT, (receiver,)).fetchone()[0])
 
-    def finish(self, letter: int, state: LetterState, answer: str, now_ns: int) -> None:
+    def finish(self, letter: int, state: MessageState, answer: str, now_ns: int) -> None:
         """Note that a letter was delivered or refused; saying so twice changes nothing."""
         with self._write() as writer:
             writer.execute(FINISH, (state.value, answer[:MAX_ANSWER], now_ns, letter))
@@ -251,10 +251,10 @@ class SqlOutbox:
 
 
 def _backlog(reader: Connection, receiver: str) -> Backlog:
-    n_waiting, oldest_ns = reader.execute(COUNT, (receiver, LetterState.WAITING.value)).fetchone()
+    n_waiting, oldest_ns = reader.execute(COUNT, (receiver, MessageState.WAITING.value)).fetchone()
     dead = [reader.execute(COUNT, (receiver, state.value)).fetchone()[0] for state in DEAD]
     ends = [_last(reader, receiver, state) for state in DEAD]
-    delivered = _last(reader, receiver, LetterState.DELIVERED)
+    delivered = _last(reader, receiver, MessageState.DELIVERED)
     return Backlog(
         receiver=receiver,
         n_waiting=int(n_waiting),
@@ -265,15 +265,15 @@ def _backlog(reader: Connection, receiver: str) -> Backlog:
     )
 
 
-def _last(reader: Connection, receiver: str, state: LetterState) -> StoredLetter | None:
+def _last(reader: Connection, receiver: str, state: MessageState) -> StoredMessage | None:
     row = reader.execute(SELECT_LAST, (receiver, state.value)).fetchone()
     return _letter(row) if row else None
 
 
-def _letter(row: tuple[Any, ...]) -> StoredLetter:
+def _letter(row: tuple[Any, ...]) -> StoredMessage:
     id_, receiver, event_id, body, queued_ns, is_urgent, state, n_attempts, answer, done_ns = row
-    return StoredLetter(
-        *(id_, receiver, event_id, body, queued_ns, bool(is_urgent), LetterState(state)),
+    return StoredMessage(
+        *(id_, receiver, event_id, body, queued_ns, bool(is_urgent), MessageState(state)),
         *(n_attempts, answer, done_ns),
     )
 

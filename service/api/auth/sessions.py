@@ -24,7 +24,7 @@ from service.api.auth.gate import BEARER_ONLY, caller_of, identity_of
 from service.api.context import Context
 from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
-from service.store.access.audit_entries import Deed, acting, name_actor
+from service.store.access.audit_entries import AuditAction, acting, name_actor
 from service.store.access.identities import Identity, Means, Permission, Role
 from service.store.audit_port import AuditStore
 from service.store.port import StoreError
@@ -101,7 +101,7 @@ async def record(audit: AuditStore, clock: Clock, action: str, name: str) -> Non
     """
     name_actor(name)
     who = acting()
-    deed = Deed(clock.now_ns(), name, action, name, source=who.source, peer=who.peer)
+    deed = AuditAction(clock.now_ns(), name, action, name, source=who.source, peer=who.peer)
     await asyncio.to_thread(audit.record, [deed])
 
 

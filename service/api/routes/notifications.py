@@ -12,7 +12,7 @@ from service.api.problems import problem_responses
 from service.api.values import ApiModel, DatedAnswer, Time
 from service.notifications.sender import ReceiverView, SenderStatus
 from service.settings.notifications import ChannelKind
-from service.store.outbox import Backlog, LetterState, StoredLetter
+from service.store.outbox import Backlog, MessageState, StoredMessage
 
 SenderStateName = Literal[
     "idle", "sending", "retrying", "quiet", "store_fails", "not_in_the_plant_file"
@@ -145,8 +145,8 @@ def _receiver(view: ReceiverView) -> ReceiverModel:
     )
 
 
-def _dead(letter: StoredLetter | None) -> DeadLetterModel | None:
+def _dead(letter: StoredMessage | None) -> DeadLetterModel | None:
     if letter is None or letter.done_ns is None:
         return None
-    outcome = "refused" if letter.state is LetterState.REFUSED else "expired"
+    outcome = "refused" if letter.state is MessageState.REFUSED else "expired"
     return DeadLetterModel.of(letter, outcome=outcome, reason=letter.answer, time=letter.done_ns)

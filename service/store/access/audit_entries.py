@@ -34,7 +34,7 @@ class Source(StrEnum):
 
 
 @dataclass(frozen=True)
-class Deed:
+class AuditAction:
     """What is to be written into the audit trail.
 
     Parameters
@@ -132,7 +132,7 @@ def digest(values: Sequence[object]) -> str:
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
-def chained(deed: Deed, number: int, previous_hash: str) -> AuditEntry:
+def chained(deed: AuditAction, number: int, previous_hash: str) -> AuditEntry:
     """A deed as the entry that follows another."""
     columns = (
         *(number, deed.time_ns, storable(deed.actor, MAX_NAME), deed.source.value),

@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from service.store.access.audit_entries import Deed, Document, acting
+from service.store.access.audit_entries import AuditAction, Document, acting
 from service.store.access.identities import ApiKey, Role, Session
 from service.store.access.port import AccessRefusedError, Account
 from service.store.audit_chain import AuditChain
@@ -12,12 +12,12 @@ from service.store.database import Connect, Connection
 
 def account_deed(
     done: str, name: str, now_ns: int, before: Role | None = None, after: Role | None = None
-) -> Deed:
+) -> AuditAction:
     """Something that has been done to an account, with its role before and after."""
     return _deed(f"account.{done}", name, now_ns, _role_document(before), _role_document(after))
 
 
-def key_deed(done: str, id_: str, now_ns: int, made: ApiKey | None = None) -> Deed:
+def key_deed(done: str, id_: str, now_ns: int, made: ApiKey | None = None) -> AuditAction:
     """Something that has been done to a key, with what it opens if it is new."""
     after = None
     if made is not None:
@@ -34,9 +34,9 @@ def _role_document(role: Role | None) -> Document:
     return None if role is None else {"role": role.value}
 
 
-def _deed(action: str, object_: str, now_ns: int, before: Document, after: Document) -> Deed:
+def _deed(action: str, object_: str, now_ns: int, before: Document, after: Document) -> AuditAction:
     who = acting()
-    return Deed(now_ns, who.actor, action, object_, before, after, source=who.source, peer=who.peer)
+    return AuditAction(now_ns, who.actor, action, object_, before, after, source=who.source, peer=who.peer)
 
 
 MAX_SESSIONS = 16

@@ -9,7 +9,7 @@ from service.store.highwater.file import MarkFile, mark_path
 from service.store.highwater.mark import Mark
 
 
-def adopt_copy(database: Path) -> None:
+def adopt_restored(database: Path) -> None:
     """Have the mark beside a database say what the database does.
 
     Raises

@@ -4,7 +4,7 @@ import time
 from pathlib import Path
 
 from service.settings.storage import Origin
-from service.store.access.audit_entries import Deed, acting
+from service.store.access.audit_entries import AuditAction, acting
 from service.store.access.audit_verification import AuditHead, write_head
 from service.store.audit_chain import newest_of
 from service.store.outbox import Address, no_recipients
@@ -72,10 +72,10 @@ def _begin_head(database: PostgresDatabase, head: Path) -> bool:
     return newest != AuditHead()
 
 
-def _begun(head: Path) -> Deed:
+def _begun(head: Path) -> AuditAction:
     """Tell of it, so that a head that was taken away is noticed in the trail."""
     who = acting()
-    return Deed(
+    return AuditAction(
         time_ns=time.time_ns(),
         actor="padwatch",
         action=HEAD_BEGUN,

@@ -39,7 +39,7 @@ class Scrubber:
         self._after: Key | None = None
         self._n_looks = 0
 
-    def look_on(self) -> bool:
+    def check_some(self) -> bool:
         """Look at some rows; whether that was once around.
 
         Raises

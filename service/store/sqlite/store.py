@@ -58,7 +58,7 @@ class SqliteStore(SqlStore):
                 self._writing,
                 self._chain,
                 database.damage,
-                scrubber.look_on,
+                scrubber.check_some,
                 database.file.require,
             )
         except OSError as error:

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from core.samples.gaps import Gap
-from service.store.access.audit_entries import MAX_DOCUMENT, MAX_NAME, AuditEntry, Deed
+from service.store.access.audit_entries import MAX_DOCUMENT, MAX_NAME, AuditEntry, AuditAction
 from service.store.access.audit_verification import HEAD_DIFFERED, AuditHead, head_path, read_head
 from service.store.audit import Trail
 from service.store.audit_port import AuditQuery
@@ -20,7 +20,7 @@ from service.store.port import StoreError, UnitGap
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.trail import verify_trail
 
-Build = Callable[..., Deed]
+Build = Callable[..., AuditAction]
 
 
 def all_of(store: SqliteStore) -> list[AuditEntry]:

@@ -12,7 +12,7 @@ from service.store.access.identities import ApiKey, Role
 from service.store.audit_port import AuditQuery
 from service.store.film_port import BaselineStep, StoredStep
 from service.store.gap_reference import GapReference, ReferenceSource
-from service.store.outbox import LetterState
+from service.store.outbox import MessageState
 from service.store.sharing import Command, OpenCommand
 from service.store.sql_store import SqlStore
 from service.store.vector_reference_port import SetVectorReference
@@ -49,7 +49,7 @@ def test_nothing_waits_for_anybody_in_a_new_outbox(store: SqlStore) -> None:
     assert list(store.outbox.backlogs()) == []
     assert not store.outbox.urgent("desk")
     assert store.outbox.expire("desk", 5, "too old", 6) == store.outbox.revive("desk", 7) == 0
-    store.outbox.finish(1, LetterState.DELIVERED, "200", 8)
+    store.outbox.finish(1, MessageState.DELIVERED, "200", 8)
     assert list(store.alarms()) == []
 
 
