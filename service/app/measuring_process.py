@@ -15,7 +15,6 @@ from service.app.service_health import Pressure, health_of
 from service.app.storage import (
     captures_of,
     evidence_of,
-    retention_limits,
     space_watch,
     tape_of,
     watch,
@@ -42,6 +41,7 @@ from service.runtime.disk import SpaceWatch
 from service.runtime.heartbeats import Loop
 from service.settings.storage import Origin
 from service.store.loops import Retaining, Rolling, Scrubbing
+from service.store.retention import ages_of
 
 
 @dataclass(frozen=True)
@@ -202,7 +202,7 @@ async def analysis_on(
         evidence=evidence,
         references=references,
         rolling=Rolling(store.rollups, clock),
-        retaining=Retaining(store.retention, retention_limits(plant.retention), clock),
+        retaining=Retaining(store.retention, ages_of(plant.retention), clock),
         space=space,
         load=load,
         soundness=soundness,

@@ -18,7 +18,7 @@ from service.settings.configuration import built_from, configuration_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditEntry, Deed
-from service.store.audit_port import AuditQuery, AuditStore
+from service.store.audit import AuditQuery, AuditStore
 from service.store.port import StoreError
 
 PADWATCH, SERVICE, CONFIGURATION, CLOCK = "padwatch", "service", "configuration", "clock"

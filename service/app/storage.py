@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from acquisition.clock import Clock
 from acquisition.recordings.writer import RecordingWriter
-from core.units import DAY_NS
 from service.api.downloads import Downloads
 from service.app.recordings import recording_writer
 from service.live.live_view import LiveView
@@ -35,20 +34,19 @@ from service.settings.configuration import Configuration, built_from, configurat
 from service.settings.core_values import analysis_of, film_rules_of
 from service.settings.plant import PlantFile, SpectraSettings
 from service.settings.sources.devices import ModbusVectorSettings
-from service.settings.storage import Origin, RetentionSettings, SpaceSettings
+from service.settings.storage import Origin, SpaceSettings
 from service.settings.units import UnitSettings
 from service.store.access.audit_verification import head_path
 from service.store.audit import Trail
 from service.store.outbox import Address, no_recipients
-from service.store.port import Store
-from service.store.retention.limits import RetentionLimits
-from service.store.spectra_port import SpectraLimits, TierLimits
+from service.store.spectra import SpectraLimits, TierLimits
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.trail import file_trail
-from service.store.waveform_port import WaveformKind
+from service.store.sqlite.store import file_trail
+from service.store.store import Store
+from service.store.waveforms import WaveformKind
 
 if TYPE_CHECKING:
-    from service.store.postgres.address import PostgresAddress
+    from service.store.postgres.connection import PostgresAddress
 
 DATABASE = "padwatch.sqlite3"
 
@@ -105,13 +103,13 @@ def open_trail(plant: PlantFile) -> Trail:
     """Open the audit trail of the plant's database for reading."""
     if plant.store.postgresql is None:
         return file_trail(database_path(plant))
-    from service.store.postgres.trail import server_trail
+    from service.store.postgres.store import server_trail
 
     return server_trail(_postgres_address(plant, plant.store.postgresql), head_file(plant))
 
 
 def _postgres_address(plant: PlantFile, conninfo: str) -> "PostgresAddress":
-    from service.store.postgres.address import PostgresAddress
+    from service.store.postgres.connection import PostgresAddress
 
     return PostgresAddress(conninfo, plant.store.password_path)
 
@@ -299,18 +297,3 @@ def custody_of(plant: PlantFile) -> Custody:
         gauge=Gauge(roots, space_limits(plant.space), measure_disk),
         bound=partial(captures_in_use, data / EVIDENCE),
     )
-
-
-def retention_limits(settings: RetentionSettings) -> RetentionLimits:
-    """Return the retention limits of the plant file; an age of 0 keeps data for ever."""
-    return RetentionLimits(
-        readings_ns=_age_ns(settings.readings_days),
-        minutes_ns=_age_ns(settings.minutes_days),
-        ten_minutes_ns=_age_ns(settings.ten_minutes_days),
-        films_ns=_age_ns(settings.films_days),
-        letters_ns=_age_ns(settings.messages_days),
-    )
-
-
-def _age_ns(days: float) -> int | None:
-    return round(days * DAY_NS) if days > 0.0 else None

@@ -17,7 +17,7 @@ from service.runtime.process import made_by
 from service.settings.plant import PlantFile
 from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.access.identities import MAX_DAYS, ApiKey, NameRefusedError, Role, account_name
-from service.store.access.port import AccessRefusedError, AccessStore
+from service.store.access.tables import AccessRefusedError, AccessStore
 from service.store.port import StoreError
 
 NS_PER_S = 1_000_000_000

@@ -28,7 +28,7 @@ from service.settings.plant import PlantFile
 from service.settings.sources.mapping import ImportMapping
 from service.settings.toml_file import TomlFileError, load_toml
 from service.store.port import StoreError
-from service.store.waveform_port import WaveformFile, WaveformKind
+from service.store.waveforms import WaveformFile, WaveformKind
 
 WRONG = (Found.DAMAGED, Found.MISSING)
 

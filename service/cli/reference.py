@@ -26,8 +26,9 @@ from service.runtime.process import person
 from service.settings.core_values import machine_of
 from service.settings.plant import PlantFile
 from service.store.access.audit_entries import Acting, Source, acting_as
-from service.store.gap_reference import GapReference, ReferenceSource
-from service.store.port import Store, StoreError
+from service.store.port import StoreError
+from service.store.references import GapReference, ReferenceSource
+from service.store.store import Store
 
 
 class BearingReferences(ApiModel):

@@ -21,7 +21,7 @@ from service.settings.core_values import watched_estimator
 from service.settings.plant import PlantFile
 from service.store.backup import AccessAfter, BackupError, access_before, back_up, take_back
 from service.store.backup import restore as put_back
-from service.store.film_port import FilmStore
+from service.store.films import FilmStore
 from service.store.port import StoreError
 from service.store.sqlite.checking import Finding, findings
 

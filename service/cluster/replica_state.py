@@ -34,7 +34,7 @@ from service.runtime.metrics import gauge
 from service.settings.core_values import film_rules_of
 from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
-from service.store.film_port import FilmStore
+from service.store.films import FilmStore
 from service.store.outbox import Backlog, Outbox
 from service.store.port import StoreError
 

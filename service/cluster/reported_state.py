@@ -30,8 +30,9 @@ from service.measuring.service_alarms import SHARED, is_shared, told_by
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import TroubleLog
 from service.settings.units import UnitSettings
-from service.store.port import Store, StoreError
+from service.store.port import StoreError
 from service.store.sharing import UnitBeat, UnitReport, UnitStates
+from service.store.store import Store
 
 EVERY_S = 1.0
 

@@ -15,8 +15,9 @@ from service.measuring.analyser import Analyser
 from service.measuring.service_alarms import ToldAlarms, gone_alarms, is_shared, judge
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.units import UnitSettings
-from service.store.port import Store, StoreError
+from service.store.port import StoreError
 from service.store.sharing import UnitBeat
+from service.store.store import Store
 
 SILENT_AFTER_S = 30.0
 """A standby takes over within seconds, a restart within ten: what lasts longer, somebody must see

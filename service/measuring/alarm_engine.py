@@ -46,7 +46,8 @@ from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.settings.units import UnitSettings
 from service.store.access.audit_entries import acting
-from service.store.port import AlarmQuery, Store
+from service.store.port import AlarmQuery
+from service.store.store import Store
 
 log = structlog.get_logger()
 

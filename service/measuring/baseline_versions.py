@@ -18,7 +18,8 @@ from core.units import NS_PER_S
 from service.live.commands import FilmPlace
 from service.measuring.baseline_learning import common_times
 from service.store.baselines import versions_after
-from service.store.film_port import FilmHistory, FilmQuery, FilmStore
+from service.store.film_readings import FilmHistory, FilmQuery
+from service.store.films import FilmStore
 
 TAIL_NS = 2 * 86_400 * NS_PER_S
 """How far operation is looked back on: longer than warming up."""

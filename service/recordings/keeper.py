@@ -13,7 +13,7 @@ import structlog
 from acquisition.clock import Clock
 from service.recordings.retention import Caretaker, Findings, Gauge, Troubles
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.store.waveform_port import WaveformFile, WaveformKind
+from service.store.waveforms import WaveformFile, WaveformKind
 
 log = structlog.get_logger()
 

@@ -24,7 +24,7 @@ from service.recordings.folders import (
 from service.recordings.index import Index, Unread, again, inspected
 from service.runtime.disk import Measure, SpaceLimits
 from service.store.port import StoreError
-from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
+from service.store.waveforms import WaveformFile, WaveformKind, WaveformState
 
 BELIEVED_NS = 86_400 * NS_PER_S
 """How much has to be recorded by a clock before anything is old by it."""

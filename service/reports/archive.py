@@ -19,8 +19,9 @@ from service.reports.folders import DOCUMENT, Place, kept_since_ns, parsed, plac
 from service.reports.keeper import EvidenceFolders
 from service.runtime.times import compact
 from service.settings.configuration import canonical
-from service.store.film_port import FilmStore
-from service.store.port import AlarmQuery, Store
+from service.store.films import FilmStore
+from service.store.port import AlarmQuery
+from service.store.store import Store
 
 PAGE = 1000
 """Events that are read at once."""

@@ -11,8 +11,9 @@ from core.condition.cells import Cell
 from core.units import NS_PER_S
 from service.reports.described import cell_bounds
 from service.reports.parts import AXES, Direction, MembersPart, rounded
-from service.store.film_port import FilmQuery, FilmStore
-from service.store.value_range import ValueRange
+from service.store.film_readings import FilmQuery
+from service.store.films import FilmStore
+from service.store.port import ValueRange
 
 MAX_MEMBERS = 2000
 

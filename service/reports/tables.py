@@ -14,7 +14,7 @@ from core.change.decision import Verdict
 from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import CrossSpectrum
 from service.reports.parts import AXES
-from service.store.film_port import FilmHistory
+from service.store.film_readings import FilmHistory
 
 SPECTRA, ORBITS, TREND = "spectra.parquet", "orbits.parquet", "trend.parquet"
 

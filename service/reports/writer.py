@@ -17,7 +17,8 @@ from service.reports.room import EvidenceLimits
 from service.reports.snapshot import Snapshot
 from service.reports.tables import ORBITS, SPECTRA, TREND, orbits_table, spectra_table, trend_table
 from service.runtime.files import sync_folder, write_synced
-from service.store.film_port import FilmQuery, FilmStore
+from service.store.film_readings import FilmQuery
+from service.store.films import FilmStore
 
 
 class EvidenceWriter:

@@ -16,8 +16,8 @@ from core.units import s_from_ns
 from service.runtime.files import create_private, put_in_place, sync_folder
 from service.settings.storage import Origin
 from service.store.access.identities import KeyState
-from service.store.access.port import AccessStore
-from service.store.highwater.adopting import adopt_copy
+from service.store.access.tables import AccessStore
+from service.store.highwater.commits import adopt_copy
 from service.store.schema import MIGRATIONS
 from service.store.sqlite.migrating import APPLICATION_IDS
 

@@ -5,11 +5,10 @@ import asyncio
 from acquisition.clock import Clock
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import LOOK_S, TroubleLog, rest, rest_after
-from service.store.integrity_port import Integrity
+from service.store.integrity import Integrity
 from service.store.port import StoreError
-from service.store.retention.limits import RetentionLimits
-from service.store.retention.port import RetentionStore
-from service.store.rollups.port import RollupStore
+from service.store.retention import Ages, RetentionStore
+from service.store.rollups.gathering import RollupStore
 
 RETAINING_PERIOD_S = 600.0
 """Between looks, when nothing is old any more."""
@@ -25,7 +24,7 @@ class Retaining:
     ahead makes nothing old before it was believed for a day, though results are stamped by it.
     """
 
-    def __init__(self, store: RetentionStore, limits: RetentionLimits, clock: Clock) -> None:
+    def __init__(self, store: RetentionStore, limits: Ages, clock: Clock) -> None:
         self._store, self._limits, self._clock = store, limits, clock
         self._trouble = TroubleLog(
             "what is old is not being deleted", "what is old is being deleted again"

@@ -8,14 +8,14 @@ tests of the store, which go over both.
 """
 
 from service.store.access.tables import ACCESS_TABLES, MUST_CHANGE
-from service.store.audit_chain import AUDIT_TABLES
+from service.store.audit import AUDIT_TABLES
 from service.store.films import FILM_TABLES
 from service.store.outbox import OUTBOX_TABLES
-from service.store.retention.schema import RETENTION_TABLES
+from service.store.references import VECTOR_REFERENCE_TABLES
+from service.store.retention import RETENTION_TABLES
 from service.store.rollups.rows import ROLLUP_TABLES
 from service.store.sharing import COMMAND_TABLES, POSITION_TABLES, UNIT_STATUS_TABLES
 from service.store.spectra import SPECTRA_TABLES
-from service.store.vector_references import VECTOR_REFERENCE_TABLES
 from service.store.waveforms import WAVEFORM_TABLES
 
 MIGRATIONS = (

@@ -8,9 +8,8 @@ from core.condition.operating_state import OperatingState
 from core.quality import Level
 from service.store.buckets import Summaries
 from service.store.database import Connection
-from service.store.port import QueryTooLargeError, StoreError, TrendQuery
+from service.store.port import QueryTooLargeError, StoreError, TrendQuery, ValueRange
 from service.store.series import Layout
-from service.store.value_range import ValueRange
 
 IN_STATES = """(
         CAST(:states AS TEXT) = '' OR CAST(:states AS TEXT) LIKE '%,' || operating_state || ',%'

@@ -26,7 +26,8 @@ from service.api.values import ApiModel, Time
 from service.live.alarm_board import AlarmBoard
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
-from service.store.port import AlarmQuery, Store
+from service.store.port import AlarmQuery
+from service.store.store import Store
 
 UnitKey = Annotated[str, Field(examples=["U1"])]
 

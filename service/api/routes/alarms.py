@@ -56,8 +56,7 @@ from service.api.values import (
 )
 from service.settings.alarm_kinds import AlarmKindName
 from service.store.access.identities import Permission
-from service.store.port import AlarmQuery, StoredEvent
-from service.store.value_range import ValueRange
+from service.store.port import AlarmQuery, StoredEvent, ValueRange
 
 
 class AcknowledgeModel(ActorModel):

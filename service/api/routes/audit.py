@@ -17,7 +17,7 @@ from service.api.values import ApiModel, Time
 from service.runtime.times import rfc3339
 from service.store.access.audit_entries import MAX_NAME, AuditEntry
 from service.store.access.identities import Permission
-from service.store.audit_port import AuditQuery
+from service.store.audit import AuditQuery
 
 SourceName = Literal["api", "command_line", "padwatch"]
 

@@ -35,9 +35,8 @@ from service.api.values import (
 )
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
-from service.store.film_port import FilmHistory, FilmQuery
-from service.store.port import QueryTooLargeError
-from service.store.value_range import ValueRange
+from service.store.film_readings import FilmHistory, FilmQuery
+from service.store.port import QueryTooLargeError, ValueRange
 
 EvidenceName = Literal["measured", "insufficient_excitation", "bad_quality"]
 

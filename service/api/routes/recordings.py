@@ -19,7 +19,7 @@ from service.api.values import ApiModel, Time
 from service.recordings.library import Kept, Shelf
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
-from service.store.waveform_port import WaveformKind
+from service.store.waveforms import WaveformKind
 
 
 class RecordingAlarmModel(ApiModel):

@@ -23,9 +23,8 @@ from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import LEVEL_NAMES, ApiModel, LevelName, Time, states_named
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
-from service.store.port import Trend, TrendQuery
+from service.store.port import Trend, TrendQuery, ValueRange
 from service.store.series import U_RANDOM, U_SYSTEMATIC
-from service.store.value_range import ValueRange
 
 
 class CentreColumnModel(ApiModel):

@@ -30,7 +30,7 @@ from service.api.values import (
 )
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
-from service.store.spectra_port import Spectra, SpectraQuery, StoredSpectrum
+from service.store.spectra import Spectra, SpectraQuery, StoredSpectrum
 
 
 class PlaceSpectraModel(ApiModel):

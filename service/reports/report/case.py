@@ -10,7 +10,7 @@ from service.reports.archive import EvidenceArchive, Occurrence, SamplesState
 from service.reports.document import Evidence
 from service.reports.parts import AXES, BearingPart, ComparisonPart, Direction
 from service.reports.tables import ORBITS, SPECTRA, TREND, Columns, read_table, trend_columns
-from service.store.film_port import FilmQuery
+from service.store.film_readings import FilmQuery
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,11 @@
 """Whether the audit trail is whole: its chain, and the file that names its newest entry."""
 
 import json
-import os
-import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from service.runtime.files import write_private
 from service.store.access.audit_entries import FIRST, AuditEntry, recomputed
 
 FORMAT = "padwatch-audit-head"
@@ -53,35 +52,14 @@ def read_head(path: Path) -> AuditHead:
 
 
 def write_head(path: Path, head: AuditHead) -> None:
-    """Write a head aside, bring it to the disk and give it its name.
+    """Write a head, durable on return.
 
     Raises
     ------
     OSError
-        If the disk refuses; what was there stays.
+        If that fails; the previous head stays.
     """
-    document = {"format": FORMAT, **asdict(head)}
-    # a name of its own: another process may be writing as well
-    descriptor, aside = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(json.dumps(document).encode() + b"\n")
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(aside, path)
-    except BaseException:
-        Path(aside).unlink(missing_ok=True)
-        raise
-    _sync_folder(path.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Bring the name to the disk, too: without it a power cut may leave the head before."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    write_private(path, json.dumps({"format": FORMAT, **asdict(head)}).encode() + b"\n")
 
 
 def _head(document: object) -> AuditHead:

@@ -1,15 +1,150 @@
-"""`CommitMarks`: counts transactions in the database, and notes the count beside it."""
+"""Commit counter that detects a database restored from an older copy."""
 
+import hashlib
 import os
+import sqlite3
 from collections.abc import Callable, Sequence
-from dataclasses import astuple
-from typing import Any, Protocol
+from contextlib import closing
+from dataclasses import astuple, dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
 
-from service.store.highwater.comparison import MarkFinding, compared
-from service.store.highwater.file import MarkError, MarkFile, NoMarkError
-from service.store.highwater.host import host_id
-from service.store.highwater.mark import Mark
+from core.units import s_from_ns
+from service.store.database import Connection
+from service.store.highwater.mark import Mark, MarkError, MarkFile, NoMarkError, mark_path
 from service.store.port import StoreError
+
+MACHINE_ID = Path("/etc/machine-id")
+NO_HOST = ""
+
+
+def host_id(machine_id: Path = MACHINE_ID) -> str:
+    """Name of this machine, from which the machine's own cannot be found out.
+
+    Empty where machines have none, as in many containers.
+    """
+    try:
+        text = machine_id.read_bytes().strip()
+    except OSError:
+        return NO_HOST
+    if not text or text == b"uninitialized":
+        return NO_HOST
+    return hashlib.blake2b(text, key=b"padwatch", digest_size=8).hexdigest()
+
+
+MAX_BEHIND = 64
+"""Transactions by which the file may lag: a crash leaves out those of each process's last."""
+
+
+class Kind(StrEnum):
+    """What can be wrong."""
+
+    ROLLED_BACK = "rolled_back"
+    REPLACED = "replaced"
+    MARK_LOST = "mark_lost"
+    MARK_BEHIND = "mark_behind"
+    OTHER_HOST = "other_host"
+
+
+@dataclass(frozen=True)
+class MarkFinding:
+    """What the mark says that the database does not.
+
+    Parameters
+    ----------
+    n_missing
+        Transactions that were acknowledged and are not there; None where nobody can tell.
+    detail
+        One sentence for people.
+    """
+
+    kind: Kind
+    n_missing: int | None
+    detail: str
+
+
+def compared(mark: Mark | str, database: Mark, host: str) -> list[MarkFinding]:
+    """What is wrong; nothing if the database is what was here last.
+
+    Parameters
+    ----------
+    mark
+        What the file says, read before the database was; or why it says nothing.
+    host
+        Of this machine.
+    """
+    if isinstance(mark, str):
+        return [MarkFinding(Kind.MARK_LOST, None, _lost(mark, database))]
+    found = _history(mark, database)
+    if NO_HOST not in (host, mark.host) and mark.host != host:
+        found.append(MarkFinding(Kind.OTHER_HOST, None, OTHER_HOST))
+    return found
+
+
+OTHER_HOST = (
+    "the data folder was written by another machine before: if that still runs, two services"
+    " take themselves for the same plant"
+)
+
+
+def _history(mark: Mark, database: Mark) -> list[MarkFinding]:
+    if mark.store != database.store:
+        return [MarkFinding(Kind.REPLACED, None, _replaced(mark, database))]
+    n_missing = mark.n_commits - database.n_commits
+    if n_missing > 0:
+        return [MarkFinding(Kind.ROLLED_BACK, n_missing, _rolled_back(mark, database))]
+    if n_missing == 0 and mark.nonce != database.nonce:
+        return [MarkFinding(Kind.ROLLED_BACK, None, _parted(mark, database))]
+    if n_missing < -MAX_BEHIND:
+        return [MarkFinding(Kind.MARK_BEHIND, 0, _behind(mark, database))]
+    return []
+
+
+def _rolled_back(mark: Mark, database: Mark) -> str:
+    n = mark.n_commits - database.n_commits
+    last, known = _when(database.time_ns), _when(mark.time_ns)
+    return (
+        f"the database was rolled back: {n} transactions, written after {last} and up to {known},"
+        " are missing"
+    )
+
+
+def _parted(mark: Mark, database: Mark) -> str:
+    return (
+        f"the database is not the one that was here last: transaction {database.n_commits} is"
+        f" another one than the one of {_when(mark.time_ns)}"
+    )
+
+
+def _replaced(mark: Mark, database: Mark) -> str:
+    return (
+        f"the database was replaced by another one: {mark.n_commits} transactions up to"
+        f" {_when(mark.time_ns)} were in the one before, {database.n_commits} are in this one"
+    )
+
+
+def _behind(mark: Mark, database: Mark) -> str:
+    return (
+        f"the high-water mark is older than the database: it knows {mark.n_commits} transactions"
+        f" of {database.n_commits}"
+    )
+
+
+def _lost(why: str, database: Mark) -> str:
+    return (
+        f"the high-water mark {why}: whether the database, whose last transaction is of"
+        f" {_when(database.time_ns)}, is the newest cannot be told"
+    )
+
+
+def _when(time_ns: int) -> str:
+    try:
+        moment = datetime.fromtimestamp(s_from_ns(time_ns), UTC)
+    except (ValueError, OverflowError, OSError):
+        return "an unknown time"
+    return f"{moment:%Y-%m-%dT%H:%M:%SZ}"
+
 
 CREATE = """
     CREATE TABLE IF NOT EXISTS high_water (
@@ -30,14 +165,6 @@ SELECT = """
 """
 """Texts as bytes: what is damaged need not be text."""
 PUT = f"INSERT OR REPLACE INTO high_water (id, {COLUMNS}) VALUES (1, ?, ?, ?, ?, ?)"  # noqa: S608
-
-
-class Writer(Protocol):
-    """A connection within a transaction."""
-
-    def execute(self, statement: str, parameters: Any = ..., /) -> Any:
-        """Carry out a statement."""
-        ...
 
 
 class CommitMarks:
@@ -61,7 +188,7 @@ class CommitMarks:
         self.found: Sequence[MarkFinding] = ()
         self.error: str | None = None
 
-    def open(self, writer: Writer, said: Mark | str | None) -> None:
+    def open(self, writer: Connection, said: Mark | str | None) -> None:
         """Compare the file with the database that has just been opened, within a transaction.
 
         A database without a mark gets one, and so does the folder where there was none before.
@@ -76,7 +203,7 @@ class CommitMarks:
                 return
         self.found = compared("is not there" if said is None else said, mark, self._host)
 
-    def count(self, writer: Writer) -> None:
+    def count(self, writer: Connection) -> None:
         """Count the transaction that is about to be committed, in it."""
         if self.found:
             return  # what was found stays to be seen until it is adopted
@@ -99,7 +226,7 @@ class CommitMarks:
         else:
             self.error = None
 
-    def adopt(self, writer: Writer) -> None:
+    def adopt(self, writer: Connection) -> None:
         """Take the database as it is for the newest, within a transaction."""
         last, said = select_mark(writer), self.said()
         if last is None:
@@ -119,7 +246,7 @@ class CommitMarks:
         else:
             self.found, self.error = (), None
 
-    def _put(self, writer: Writer, last: Mark, n_commits: int) -> None:
+    def _put(self, writer: Connection, last: Mark, n_commits: int) -> None:
         self._newest = Mark(last.store, self._host, n_commits, _chance(8), self._now_ns())
         writer.execute(PUT, astuple(self._newest))
 
@@ -136,7 +263,7 @@ class CommitMarks:
             return str(error)
 
 
-def select_mark(reader: Writer) -> Mark | None:
+def select_mark(reader: Connection) -> Mark | None:
     """Read the mark in a database; None if it has none yet."""
     row = reader.execute(SELECT).fetchone()
     if row is None:
@@ -149,3 +276,29 @@ def select_mark(reader: Writer) -> Mark | None:
 
 def _chance(n_bytes: int) -> str:
     return os.urandom(n_bytes).hex()
+
+
+def adopt_copy(database: Path) -> None:
+    """Have the mark beside a database say what the database does.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses; then the next start finds the database older than the mark.
+    sqlite3.Error
+        If the database cannot be read.
+    """
+    mark = _mark_of(database)
+    file = MarkFile(mark_path(database))
+    if mark is None:  # a copy from before there were marks: it gets one when it is opened
+        file.path.unlink(missing_ok=True)
+    else:
+        file.replace(mark)
+
+
+def _mark_of(database: Path) -> Mark | None:
+    # nobody writes to it yet: no journal is looked for or left behind
+    uri = f"{database.absolute().as_uri()}?mode=ro&immutable=1"
+    with closing(sqlite3.connect(uri, uri=True)) as reader:
+        has_one = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'high_water'"
+        return select_mark(reader) if reader.execute(has_one).fetchone() else None

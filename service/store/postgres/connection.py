@@ -1,19 +1,81 @@
-"""Connections to PostgreSQL, and how a statement is cancelled."""
+"""Connections to PostgreSQL: address, errors, advisory locks, and cancellation of statements."""
 
+import hashlib
+import os
+import re
+import socket
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
 import psycopg
 from psycopg.abc import Buffer
 from psycopg.adapt import AdaptersMap, Dumper
+from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
 from service.runtime.asker import ASKER, Asker
 from service.store.database import Parameters
-from service.store.port import StoreError
-from service.store.postgres.address import PostgresAddress
-from service.store.postgres.statements import translated
+from service.store.port import RefusedRowError, StoreError
+
+MAX_PASSWORD_BYTES = 4096
+DEFAULTS = {
+    "connect_timeout": "5",
+    "keepalives_idle": "10",
+    "keepalives_interval": "5",
+    "keepalives_count": "3",
+    "tcp_user_timeout": "25000",
+}
+"""A server that has gone without a word is noticed within half a minute."""
+
+
+@dataclass(frozen=True)
+class PostgresAddress:
+    """How to reach a database.
+
+    Parameters
+    ----------
+    conninfo
+        As libpq takes it, without a password.
+    password_file
+        File that holds nothing but the password, readable by its owner alone; without it libpq
+        looks into ``~/.pgpass``, if it needs one.
+    """
+
+    conninfo: str
+    password_file: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """What the database is called in messages."""
+        parts = conninfo_to_dict(self.conninfo)
+        database = parts.get("dbname") or parts.get("user") or "of the user's name"
+        host = parts.get("host") or parts.get("service") or "this computer"
+        return f"PostgreSQL database {database} at {host}"
+
+    def full(self, purpose: str) -> str:
+        """Everything that is needed to connect, the password included: never to be shown."""
+        given = conninfo_to_dict(self.conninfo)
+        name = f"padwatch {purpose} {os.getpid()}@{socket.gethostname()}"[:63]
+        settings = {**DEFAULTS, "application_name": name, **given, "client_encoding": "UTF8"}
+        if self.password_file is not None:
+            settings["password"] = self._password(self.password_file)
+        return make_conninfo(**settings)  # type: ignore[arg-type]
+
+    def _password(self, path: Path) -> str:
+        try:
+            with path.open("rb") as file:
+                mode = os.fstat(file.fileno()).st_mode
+                found = file.read(MAX_PASSWORD_BYTES)
+        except OSError as error:
+            raise StoreError(f"[store] password_file {path}: {error.strerror}") from error
+        if mode & 0o077:
+            raise StoreError(f"[store] password_file {path} can be read by others: chmod 600 it")
+        return found.decode("utf-8", "surrogateescape").rstrip("\r\n")
+
 
 BIGINT_OID = 20
 DOUBLE_OID = 701
@@ -26,7 +88,7 @@ SESSION = """
 """
 """Of every session; a client that has gone without a word keeps no lock for long."""
 
-SETTINGS = """
+SERVER_SETTINGS = """
     SELECT current_setting('fsync'), current_setting('full_page_writes'),
     current_setting('server_encoding'), pg_is_in_recovery(), current_schema() IS NOT NULL
 """
@@ -113,7 +175,7 @@ def require_fit(session: Session, where: str) -> None:
             f"{where} is of PostgreSQL {version}, which is too old: padwatch needs"
             f" {OLDEST_VERSION // 10_000} or newer"
         )
-    row = session.execute(SETTINGS.encode()).fetchone()
+    row = session.execute(SERVER_SETTINGS.encode()).fetchone()
     why = None if row is None else _unfit(*row)
     if why is not None:
         raise StoreError(f"{where} {why}")
@@ -173,3 +235,108 @@ def _watch(session: Session, asker: Asker, is_done: Event) -> None:
         session.cancel_safe(timeout=CANCEL_WITHIN_S)
     except psycopg.Error:
         return  # the server is gone, and what it did with it
+
+
+BY_STATE = {
+    "53100": "the disk of the database is full: make room there",
+    "53200": "the database server has no memory left",
+    "53300": "too many connections are open: raise max_connections",
+    "57014": "it took too long: the database is too slow, or too busy with others",
+    "55P03": "another padwatch has been writing for too long: see what it waits for",
+    "25P03": "a transaction was left open for too long",
+    "25006": "the database only reads: name the primary in [store] postgresql, not a standby",
+    "42501": "the role may not do this: give it the rights that the how-to of PostgreSQL lists",
+    "57P01": "the database server is being stopped; it is tried again",
+    "57P02": "the database server has crashed and recovers; it is tried again",
+    "57P03": "the database server is starting or stopping; it is tried again",
+    "XX001": "the database is damaged: restore a backup",
+    "XX002": "an index is damaged: run reindexdb",
+}
+"""What to do, by SQLSTATE."""
+
+BY_WORDS = {
+    "password authentication failed": "correct [store] password_file, or the role's password",
+    "no password supplied": "name a [store] password_file",
+    "no pg_hba.conf entry": "let this host and role in, in pg_hba.conf of the server",
+    "does not exist": "create it, as the how-to of PostgreSQL shows, or correct [store] postgresql",
+    "too many clients": BY_STATE["53300"],
+    "remaining connection slots": BY_STATE["53300"],
+    "the database system is": BY_STATE["57P03"],
+    "could not translate host name": "correct the host in [store] postgresql",
+    "session is read-only": BY_STATE["25006"],
+    "certificate": "correct sslmode, sslrootcert or sslcert in [store] postgresql",
+}
+"""What to do, by what the server or its library says before there is a session."""
+
+OF_THE_ROW = (
+    psycopg.IntegrityError,
+    psycopg.DataError,
+    psycopg.errors.DataCorrupted,
+    psycopg.errors.IndexCorrupted,
+)
+"""Errors that a row or its page is to blame for: others of its transaction can be written."""
+
+UNREACHABLE = "see whether PostgreSQL runs and can be reached; it is tried again"
+
+
+def sentence(where: str, error: psycopg.Error) -> str:
+    """What went wrong where, and what to do about it."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    said = (error.diag.message_primary or (lines[0] if lines else type(error).__name__)).rstrip(".")
+    advice = _advice(error)
+    return f"{where}: {said}" + (f"; {advice}" if advice else "")
+
+
+def _advice(error: psycopg.Error) -> str | None:
+    if error.sqlstate in BY_STATE:
+        return BY_STATE[error.sqlstate]
+    if error.sqlstate is None and isinstance(error, psycopg.OperationalError):
+        said = str(error)
+        return next((advice for words, advice in BY_WORDS.items() if words in said), UNREACHABLE)
+    return None
+
+
+@contextmanager
+def renamed(where: str) -> Iterator[None]:
+    """Raise `StoreError` for whatever PostgreSQL, its library or the system raise."""
+    try:
+        yield
+    except psycopg.Error as error:
+        kind = RefusedRowError if isinstance(error, OF_THE_ROW) else StoreError
+        raise kind(sentence(where, error)) from error
+    except UnicodeEncodeError as error:
+        raise RefusedRowError(f"{where}: {error}") from error
+    except OSError as error:
+        raise StoreError(f"{where}: {error}") from error
+
+
+def lock_number(name: str) -> int:
+    """The number that stands for a name, the same in every padwatch."""
+    digest = hashlib.sha256(b"padwatch " + name.encode("utf-8", "surrogateescape")).digest()
+    return int.from_bytes(digest[:8], "big", signed=True)
+
+
+MIGRATING = lock_number("/migrating")
+WRITING = lock_number("/writing")
+"""Held by every transaction that writes: as in SQLite, one writes at a time."""
+
+
+_PIECE = re.compile(r"('(?:[^']|'')*')|\?|(?<!:):([A-Za-z_][A-Za-z_0-9]*)|%|\bwhole_(?=[a-z])")
+
+
+@lru_cache(maxsize=1024)
+def translated(statement: str) -> bytes:
+    """Write ``?`` as ``%s`` and ``:name`` as ``%(name)s``; what is quoted stays as it is.
+
+    ``whole_`` before a table is left out: the server sees to it that what it reads is whole.
+    """
+    return _PIECE.sub(_piece, statement).encode()
+
+
+def _piece(found: re.Match[str]) -> str:
+    quoted, name = found[1], found[2]
+    if quoted is not None:
+        return quoted.replace("%", "%%")
+    if name is not None:
+        return f"%({name})s"
+    return {"?": "%s", "%": "%%"}.get(found[0], "")

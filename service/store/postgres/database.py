@@ -1,17 +1,305 @@
-"""PostgreSQL under the store: synchronous commits, one writer at a time, short reads."""
+"""PostgreSQL database: one writer, several readers, and names held by a process."""
 
+import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
+from threading import Lock
+from types import TracebackType
+
+import psycopg
 
 from service.settings.storage import Origin
 from service.store.database import Connection, Unreadable
-from service.store.postgres.address import PostgresAddress
-from service.store.postgres.connection import PostgresConnection
-from service.store.postgres.errors import renamed
-from service.store.postgres.holding import PostgresHold
-from service.store.postgres.migrating import migrate
-from service.store.postgres.readers import Readers
-from service.store.postgres.writer import Writer, writing_session
+from service.store.port import StoreError
+from service.store.postgres.connection import (
+    WRITING,
+    PostgresAddress,
+    PostgresConnection,
+    Session,
+    cancelled_when_gone,
+    connected,
+    lock_number,
+    renamed,
+    require_fit,
+    sentence,
+)
+from service.store.postgres.schema import migrate
+
+N_KEPT = 4
+READER_SETTINGS = """
+    SET default_transaction_read_only = on; SET statement_timeout = '30s';
+"""
+BEGIN_READING = b"BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"
+
+
+class Readers:
+    """Read-only sessions of one database, opened as they are needed."""
+
+    def __init__(self, address: PostgresAddress) -> None:
+        self._address = address
+        self._lock = Lock()
+        self._idle: list[Session] = []
+        self._is_closed = False
+
+    @contextmanager
+    def reading(self) -> Iterator[PostgresConnection]:
+        """Borrow a session; one with which something went wrong is not used again."""
+        with renamed(self._address.name):
+            session = self._begun()
+            try:
+                with cancelled_when_gone(session):
+                    yield PostgresConnection(session)
+                session.execute("COMMIT")
+            except BaseException:
+                session.close()
+                raise
+            self._put_back(session)
+
+    def close(self) -> None:
+        """Close those that are not in use now, and the others as they are given back."""
+        with self._lock:
+            self._is_closed = True
+            idle, self._idle = self._idle, []
+        for session in idle:
+            session.close()
+
+    def _begun(self) -> Session:
+        while (idle := self._taken()) is not None:
+            try:
+                idle.execute(BEGIN_READING)
+            except psycopg.OperationalError:  # the server was started anew since
+                idle.close()
+            else:
+                return idle
+        session = connected(self._address, "reader", READER_SETTINGS)
+        session.execute(BEGIN_READING)
+        return session
+
+    def _taken(self) -> Session | None:
+        with self._lock:
+            if self._is_closed:
+                raise StoreError(f"{self._address.name} is closed")
+            return self._idle.pop() if self._idle else None
+
+    def _put_back(self, session: Session) -> None:
+        with self._lock:
+            if not self._is_closed and len(self._idle) < N_KEPT:
+                self._idle.append(session)
+                return
+        session.close()
+
+
+WRITER_SETTINGS = """
+    SET synchronous_commit = on; SET lock_timeout = '20s'; SET statement_timeout = '60s';
+"""
+BEGIN_WRITING = f"""
+    BEGIN ISOLATION LEVEL READ COMMITTED READ WRITE; SELECT pg_advisory_xact_lock({WRITING});
+"""
+NUMBER = "SELECT pg_current_xact_id()::text"
+OUTCOME = "SELECT pg_xact_status(%s::xid8)"
+"""``committed``, ``aborted``, or ``in progress`` while the lost session is still there."""
+
+DOUBT_S = 8.0
+"""How long the outcome of a commit is asked for that got no answer."""
+
+PAUSE_S = 0.2
+
+
+class Writer:
+    """Transactions, one at a time among all processes.
+
+    Parameters
+    ----------
+    address
+        Of the database.
+    session
+        Open and fit.
+    """
+
+    def __init__(self, address: PostgresAddress, session: Session) -> None:
+        self._address, self._where = address, address.name
+        self._session, self._lock = session, Lock()
+        self._is_closed = False
+
+    def close(self) -> None:
+        """End the session; closing twice is fine."""
+        with self._lock:
+            self._is_closed = True
+            self._session.close()
+
+    @contextmanager
+    def writing(self) -> Iterator[PostgresConnection]:
+        """Open a transaction, alone; durable when left."""
+        with self._lock, renamed(self._where):
+            number = self._begin()
+            try:
+                yield PostgresConnection(self._session)
+            except BaseException:
+                self._roll_back()
+                raise
+            self._commit(number)
+
+    def _begin(self) -> str:
+        if self._is_closed:
+            raise StoreError(f"{self._where} is closed")
+        if not self._session.closed:
+            try:
+                return self._begun()
+            except psycopg.OperationalError:
+                if not self._session.closed:
+                    self._roll_back()
+                    raise
+        self._session = writing_session(self._address)  # it was lost since the last transaction
+        return self._begun()
+
+    def _begun(self) -> str:
+        try:
+            self._session.execute(BEGIN_WRITING.encode())
+            row = self._session.execute(NUMBER).fetchone()
+        except psycopg.Error:
+            self._roll_back()
+            raise
+        return "" if row is None else str(row[0])
+
+    def _commit(self, number: str) -> None:
+        try:
+            done = self._session.execute("COMMIT")
+        except psycopg.OperationalError as error:
+            if not self._session.closed:
+                self._roll_back()
+                raise
+            self._settle(number, error)
+        else:
+            if done.statusmessage != "COMMIT":
+                raise StoreError(f"{self._where}: the transaction was undone by an error in it")
+
+    def _settle(self, number: str, lost: psycopg.Error) -> None:
+        """Ask what has become of a commit that got no answer; fail unless it is there."""
+        until_s = time.monotonic() + DOUBT_S
+        outcome = self._outcome(number)
+        while outcome is None and time.monotonic() < until_s:
+            time.sleep(PAUSE_S)
+            outcome = self._outcome(number)
+        if outcome == "committed":
+            return
+        if outcome == "aborted":
+            raise StoreError(sentence(self._where, lost))
+        raise StoreError(
+            f"{self._where}: the connection was lost as results were written; whether they were"
+            " is not known, so they are written again"
+        )
+
+    def _outcome(self, number: str) -> str | None:
+        """What has become of a transaction; None while that cannot be known."""
+        try:
+            if self._session.closed:
+                self._session = writing_session(self._address)
+            row = self._session.execute(OUTCOME, (number,)).fetchone()
+        except (psycopg.OperationalError, StoreError):
+            return None
+        return None if row is None or row[0] == "in progress" else row[0]
+
+    def _roll_back(self) -> None:
+        if self._session.closed:
+            return
+        try:
+            self._session.execute("ROLLBACK")
+        except psycopg.Error:
+            self._session.close()  # which rolls back as well
+
+
+def writing_session(address: PostgresAddress) -> Session:
+    """Open a session that may write.
+
+    Raises
+    ------
+    StoreError
+        If the server is not fit for it.
+    psycopg.Error
+        If it cannot be reached, or refuses.
+    """
+    session = connected(address, "writer", WRITER_SETTINGS)
+    try:
+        require_fit(session, address.name)
+    except BaseException:
+        session.close()
+        raise
+    return session
+
+
+TAKE = "SELECT pg_try_advisory_lock(%s)"
+HOLD_SETTINGS = "SET statement_timeout = '5s';"
+HOLDER = """
+    SELECT application_name, client_addr::text FROM pg_locks JOIN pg_stat_activity USING (pid)
+    WHERE locktype = 'advisory' AND granted AND objsubid = 1
+    AND pg_locks.database = (SELECT oid FROM pg_database WHERE datname = current_database())
+    AND ((classid::bigint << 32) | objid::bigint) = %s
+"""
+
+
+class PostgresHold:
+    """A name held in a database, from entering to leaving.
+
+    Parameters
+    ----------
+    address
+        Of the database.
+    name
+        What is held.
+    """
+
+    def __init__(self, address: PostgresAddress, name: str) -> None:
+        self._address, self._name = address, name
+        self._session: Session | None = None
+        self._lock = Lock()
+
+    @property
+    def is_held(self) -> bool:
+        """Ask the server; False for ever once there was no answer."""
+        with self._lock:
+            if self._session is None:
+                return False
+            try:
+                self._session.execute("SELECT 1")
+            except psycopg.Error:
+                self._end()
+                return False
+            return True
+
+    def __enter__(self) -> "PostgresHold":
+        with renamed(self._address.name):
+            self._session = connected(self._address, f"holds {self._name}", HOLD_SETTINGS)
+            try:
+                self._take(self._session)
+            except BaseException:
+                self._end()
+                raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        with self._lock:
+            self._end()
+
+    def _take(self, session: Session) -> None:
+        number = lock_number(self._name)
+        if session.execute(TAKE, (number,)).fetchone() == (True,):
+            return
+        row = session.execute(HOLDER, (number,)).fetchone()
+        holder = "unknown" if row is None else " at ".join(str(part) for part in row if part)
+        raise StoreError(
+            f"{self._name} is held by another padwatch ({holder}) in {self._address.name}:"
+            " stop it first"
+        )
+
+    def _end(self) -> None:
+        if self._session is not None:
+            self._session.close()
+            self._session = None
 
 
 class PostgresDatabase:

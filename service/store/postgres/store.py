@@ -1,23 +1,26 @@
-"""The store in a PostgreSQL database."""
+"""Store in a PostgreSQL database."""
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from service.settings.storage import Origin
 from service.store.access.audit_entries import Deed, acting
 from service.store.access.audit_verification import AuditHead, write_head
-from service.store.audit_chain import newest_of
+from service.store.audit import Trail, newest_of
 from service.store.outbox import Address, no_recipients
 from service.store.port import StoreError
-from service.store.postgres.address import PostgresAddress
-from service.store.postgres.database import PostgresDatabase
-from service.store.spectra_port import SpectraLimits
-from service.store.sql_store import SqlStore
+from service.store.postgres.connection import PostgresAddress, PostgresConnection
+from service.store.postgres.database import PostgresDatabase, Readers
+from service.store.spectra import SpectraLimits
+from service.store.store import Store
 
 HEAD_BEGUN = "audit.head_begun"
 
 
-class PostgresStore(SqlStore):
+class PostgresStore(Store):
     """A store that several processes on several hosts may share.
 
     Parameters
@@ -84,3 +87,18 @@ def _begun(head: Path) -> Deed:
         source=who.source,
         peer=who.peer,
     )
+
+
+def server_trail(address: PostgresAddress, head: Path) -> Trail:
+    """Trail of a database, which is opened as it is read, and the head that this host has."""
+    return Trail(partial(_opened, address), head, is_shared=True)
+
+
+@contextmanager
+def _opened(address: PostgresAddress) -> Iterator[PostgresConnection]:
+    readers = Readers(address)
+    try:
+        with readers.reading() as reader:
+            yield reader
+    finally:
+        readers.close()

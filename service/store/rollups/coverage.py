@@ -16,9 +16,8 @@ from service.store.buckets import (
 )
 from service.store.database import Connection
 from service.store.port import Trend, TrendQuery
-from service.store.retention.marks import Gone, select_gone
-from service.store.rollups.making import select_mark
 from service.store.rollups.rows import ANYTHING, HOUR_NS, WIDTHS_NS, Cells, Conditions, select_cells
+from service.store.rollups.writing import Gone, select_gone, select_mark
 from service.store.trends import Span, arguments, select_page, select_readings, storable, too_large
 
 MAX_SPANS = 4096

@@ -9,17 +9,13 @@ from acquisition.clock import SystemClock
 from service.settings.storage import Origin
 from service.store.database import Connection, Unreadable
 from service.store.highwater.commits import CommitMarks
-from service.store.highwater.file import MarkFile, mark_path
+from service.store.highwater.mark import MarkFile, mark_path
 from service.store.holds import why_unusable
 from service.store.port import RefusedRowError, StoreError
-from service.store.seals import DamageLog
-from service.store.sqlite.holding import FileHold, held
+from service.store.seals import DamageLog, Seals
+from service.store.sqlite.connections import Readers, Writer, opened
+from service.store.sqlite.file import FileHold, OpenedFile, held, is_of_the_row, told, why_cut
 from service.store.sqlite.migrating import migrate
-from service.store.sqlite.opened_file import OpenedFile, why_cut
-from service.store.sqlite.readers import Readers
-from service.store.sqlite.sealing import Seals
-from service.store.sqlite.trouble import is_of_the_row, told
-from service.store.sqlite.writer import Writer, opened
 
 PAGE_BYTES = 8192
 """In pages of half that size, a result of all quantities would need a page of its own."""

@@ -17,8 +17,8 @@ from service.api.auth.passwords import Hashing
 from service.cli.commands import app
 from service.runtime.process import made_by
 from service.store.access.identities import Identity, Role
-from service.store.access.port import AccessStore
-from service.store.audit_port import AuditQuery
+from service.store.access.tables import AccessStore
+from service.store.audit import AuditQuery
 from service.store.sqlite import SqliteStore
 
 PASSWORD = "rotor rope gauge"  # noqa: S105

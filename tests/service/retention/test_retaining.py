@@ -8,13 +8,12 @@ from structlog.testing import capture_logs
 
 from acquisition.clock import Clock
 from core.units import DAY_NS
-from service.app.storage import retention_limits
 from service.settings.storage import RetentionSettings
 from service.store.loops import LOOK_S, RETAINING_PERIOD_S, RETAINING_REST_SHARE, Retaining
 from service.store.port import StoreError
-from service.store.retention.limits import RetentionLimits
+from service.store.retention import Ages, ages_of
 
-LIMITS = RetentionLimits(readings_ns=DAY_NS)
+LIMITS = {"readings_days": DAY_NS}
 
 
 class OldStore:
@@ -39,7 +38,7 @@ class OldStore:
     def series(self) -> Sequence[int]:
         return list(self.left)
 
-    def delete(self, series: int, limits: RetentionLimits, now_ns: int) -> bool:
+    def delete(self, series: int, limits: Ages, now_ns: int) -> bool:
         assert (limits, now_ns <= self._clock.now_ns()) == (LIMITS, True)
         if self.refusal:
             raise StoreError(self.refusal)
@@ -119,5 +118,5 @@ def test_nothing_finer_is_kept_longer_than_what_is_coarser_and_zero_days_are_for
             RetentionSettings.model_validate(wrong)
     everything = dict.fromkeys(("readings_days", "minutes_days", "ten_minutes_days"), 0.0)
     RetentionSettings.model_validate(everything)
-    found = retention_limits(RetentionSettings(readings_days=1.5, films_days=0.0))
-    assert (found.readings_ns, found.films_ns) == (round(1.5 * DAY_NS), None)
+    found = ages_of(RetentionSettings(readings_days=1.5, films_days=0.0))
+    assert (found["readings_days"], found.get("films_days")) == (round(1.5 * DAY_NS), None)

@@ -23,9 +23,9 @@ from service.store.access.identities import (
     key_id,
     new_key,
 )
-from service.store.access.port import AccessRefusedError, AccessStore
-from service.store.audit_port import AuditQuery
-from service.store.sql_store import SqlStore
+from service.store.access.tables import AccessRefusedError, AccessStore
+from service.store.audit import AuditQuery
+from service.store.store import Store
 
 T0 = 1_767_225_600_000_000_000
 S = 1_000_000_000
@@ -61,7 +61,7 @@ def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(
 
 
 def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(
-    people: People, access: AccessStore, store: SqlStore
+    people: People, access: AccessStore, store: Store
 ) -> None:
     people.add("anna", Role.ADMIN, PASSWORD, T0)
     people.add("berta", Role.ENGINEER, PASSWORD, T0)
@@ -215,7 +215,7 @@ def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
 
 
 def test_every_change_is_in_the_audit_trail_with_what_was_before_and_nothing_secret(
-    store: SqlStore, people: People
+    store: Store, people: People
 ) -> None:
     accounts = store.access.accounts
     token = people.offer_set_up(T0)

@@ -13,9 +13,11 @@ from rigs.store_fixtures import at
 
 from service.store.holds import OVER_A_NETWORK, FileSystem, file_system_of
 from service.store.port import StoreError
-from service.store.sqlite import SqliteStore, readers, writer
-from service.store.sqlite.readers import Readers
-from service.store.sqlite.trouble import leaves_in_doubt
+from service.store.sqlite import SqliteStore
+from service.store.sqlite import connections as readers
+from service.store.sqlite import connections as writer
+from service.store.sqlite.connections import Readers
+from service.store.sqlite.file import leaves_in_doubt
 
 
 @contextmanager

@@ -11,8 +11,8 @@ from rigs.rolled_trends import gather_all
 from rigs.store_fixtures import Execute, at, gap, query
 
 from service.store.access.identities import Role
-from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError, TrendQuery
+from service.store.references import GapReference, ReferenceSource
 from service.store.seals import MAX_PLACES, DamageLog, Place, begun, seal_of
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.checking import findings

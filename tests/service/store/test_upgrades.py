@@ -16,8 +16,8 @@ from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
 from service.settings.storage import Origin
 from service.store import schema
-from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
+from service.store.references import GapReference, ReferenceSource
 from service.store.schema import MIGRATIONS
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.migrating import migrate

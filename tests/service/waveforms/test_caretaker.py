@@ -8,7 +8,7 @@ import pytest
 
 from service.recordings.folders import place_of, put_out_of_sight
 from service.recordings.index import again
-from service.store.waveform_port import WaveformKind, WaveformState
+from service.store.waveforms import WaveformKind, WaveformState
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
 T0 = 1_767_225_600_000_000_000

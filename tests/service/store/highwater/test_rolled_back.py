@@ -11,10 +11,10 @@ import pytest
 from rigs.assessments import assessment
 from rigs.tiers import covering
 
-from service.store.audit_port import AuditQuery
+from service.store.audit import AuditQuery
 from service.store.backup import back_up, restore
-from service.store.highwater.comparison import Kind, MarkFinding
-from service.store.highwater.file import MarkFile, mark_path
+from service.store.highwater.commits import Kind, MarkFinding
+from service.store.highwater.mark import MarkFile, mark_path
 from service.store.port import StoreError, TrendQuery
 from service.store.sqlite import SqliteStore
 

@@ -10,7 +10,7 @@ from rigs.memory_folder import memory_folder
 
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore, connection
-from service.store.postgres.address import PostgresAddress
+from service.store.postgres.connection import PostgresAddress
 
 
 def refused(address: PostgresAddress) -> str:
@@ -136,7 +136,7 @@ def test_a_query_that_takes_too_long_ends_with_a_sentence(
     postgres_store: PostgresStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "service.store.postgres.readers.SETTINGS", "SET statement_timeout = '20ms';"
+        "service.store.postgres.database.SETTINGS", "SET statement_timeout = '20ms';"
     )
     with (
         pytest.raises(StoreError, match="it took too long: the database is too slow"),

@@ -8,7 +8,8 @@ import pytest
 from harness.places import PostgresPlace
 
 from service.store import schema
-from service.store.postgres.statements import for_postgres, translated
+from service.store.postgres.connection import translated
+from service.store.postgres.schema import for_postgres
 
 
 @pytest.mark.parametrize(
