@@ -12,19 +12,19 @@ from typing import Any
 from service.store.database import Connection
 
 MAX_PLACES = 1000
-"""Places that are remembered; beyond it they are only counted."""
+"""Maximum number of places that are listed; further ones are only counted."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """A row that is not what was written, or not there.
+    """Row that is damaged or missing.
 
     Parameters
     ----------
     key
-        What the row is found by, as it can be written down.
+        Key of the row as text.
     is_missing
-        Whether nothing is there at all.
+        Whether the row is missing.
     """
 
     table: str
@@ -33,12 +33,12 @@ class Place:
 
 
 class DamageLog:
-    """Places that were found damaged since the start, each once; used from several threads.
+    """Damaged rows found since the start, each once; used from several threads.
 
     Parameters
     ----------
     most
-        How many places are remembered.
+        Maximum number of listed places.
     """
 
     def __init__(self, most: int = MAX_PLACES) -> None:
@@ -49,17 +49,17 @@ class DamageLog:
 
     @property
     def n_damaged(self) -> int:
-        """How many there are; beyond `most` one that is met again may count again."""
+        """Number of damaged rows; beyond `most` a row that is found again may count again."""
         return len(self._places) + self._n_more
 
     @property
     def places(self) -> Sequence[Place]:
-        """Where, in the order in which they were found."""
+        """Damaged rows in the order in which they were found."""
         with self._lock:
             return list(self._places)
 
     def note(self, place: Place) -> None:
-        """Remember a place."""
+        """Add a damaged row."""
         with self._lock:
             if place in self._places:
                 return
@@ -70,45 +70,44 @@ class DamageLog:
 
 
 Cell = int | float | bytes | None
-"""Of a stored row; texts as their bytes, for what is damaged need not be text."""
+"""Value of a stored row; texts as bytes, since damaged text may not be UTF-8."""
 
 FORMAT = 1
-"""Of seals; what has seals of another one is sealed anew."""
+"""Format of checksums; those of another format are computed anew."""
 
 _VERSION = 2
-"""Of Python's own way to write values: kinds, lengths and all bits of numbers, nothing else.
+"""Version of `marshal`, which encodes types, lengths and all bits of numbers.
 
-Later ones write what is there twice as a reference, so that equal rows may look different.
-"""
+Later versions write repeated values as references, so that equal rows may differ."""
 
 
 def begun(table: str) -> int:
-    """What the seals of a table begin with."""
+    """Return the initial value of the checksums of a table."""
     return zlib.crc32(table.encode())
 
 
 def seal_of(begun_with: int, cells: tuple[Cell, ...]) -> int:
-    """CRC-32 of a row of a table, which is given by what its seals begin with."""
+    """Return the CRC-32 of a row, continued from the initial value of its table."""
     return zlib.crc32(marshal.dumps(cells, _VERSION), begun_with)
 
 
 SEAL, IS_WHOLE = "padwatch_seal_", "padwatch_is_whole_"
-"""Functions that the connections of padwatch know; each table has its own, for speed."""
+"""SQL functions of padwatch's connections, one per table for speed."""
 
 WHOLE = "whole_"
-"""Views that show only rows that are whole also to a connection that writes."""
+"""Prefix of views that omit damaged rows also on a writing connection."""
 
 
 @dataclass(frozen=True)
 class SealedTable:
-    """A table whose rows have seals.
+    """Table with checksums of its rows.
 
     Parameters
     ----------
     types
-        Of its columns, in their order.
+        Types of the columns, in their order.
     key
-        Columns by which a row is found.
+        Columns of the key.
     """
 
     name: str
@@ -117,19 +116,19 @@ class SealedTable:
 
     @property
     def columns(self) -> Sequence[str]:
-        """Names of its columns, in their order."""
+        """Names of the columns, in their order."""
         return list(self.types)
 
     @property
     def seals(self) -> str:
-        """Name of the table with its seals."""
+        """Name of the table with the checksums."""
         return f"seal_{self.name}"
 
     @cached_property
     def create(self) -> Sequence[str]:
-        """Make the table of seals, and seal what there is already."""
+        """Statements that create the table of checksums and fill it."""
         keys = ", ".join(self.key)
-        # of the same types, or no seal would be found without reading all of them
+        # with the same types, since the index is not used otherwise
         typed = ", ".join(f"{column} {self.types[column]} NOT NULL" for column in self.key)
         return (
             f"CREATE TABLE {self.seals} ({typed}, seal INTEGER NOT NULL, PRIMARY KEY ({keys}))"
@@ -139,7 +138,7 @@ class SealedTable:
 
     @cached_property
     def triggers(self) -> Sequence[str]:
-        """Seal what is written from now on, over this connection."""
+        """Statements by which this connection maintains the checksums."""
         keys = ", ".join(self.key)
         put = (
             f"INSERT INTO {self.seals} VALUES ({self._listed('NEW.')}, {self._seal('NEW.')})"  # noqa: S608
@@ -154,7 +153,7 @@ class SealedTable:
         ]
 
     def view(self, before: str = "") -> str:
-        """Let this connection see only rows that are whole, by the table's name or another one."""
+        """Return the statement by which this connection sees intact rows only, under a name."""
         listed = ", ".join(f"r.{column} AS {column}" for column in self.columns)
         return (
             f"CREATE TEMP VIEW {before}{self.name} AS SELECT {listed}"  # noqa: S608
@@ -162,12 +161,12 @@ class SealedTable:
         )
 
     def is_whole(self, of: str) -> str:
-        """Whether a row fits its seal, as an expression."""
+        """Return the expression that a row fits its checksum."""
         seal = f"SELECT s.seal FROM main.{self.seals} AS s WHERE {self.matched(of, 's.')}"  # noqa: S608
         return f"{IS_WHOLE}{self.name}(({seal}), {self._cells(of)})"
 
     def matched(self, of: str, ours: str = "") -> str:
-        """Whether a row has the key of a seal, as an expression."""
+        """Return the expression that a row has the key of a checksum."""
         return " AND ".join(f"{ours}{column} = {of}{column}" for column in self.key)
 
     def _seal(self, of: str) -> str:
@@ -184,17 +183,17 @@ class SealedTable:
 
 
 OTHERWISE_KEPT = frozenset({"spectrum", "high_water", "rollup_redo"})
-"""Tables whose rows have checksums of their own, and those that only say what is to be done."""
+"""Tables whose rows have checksums of their own, or only list pending work."""
 
 SCHEMA = "CREATE TABLE IF NOT EXISTS seal_schema (id INTEGER PRIMARY KEY, number INTEGER)"
 SEALED_AT = "SELECT number FROM seal_schema WHERE id = 1"
 SET_SEALED_AT = "INSERT OR REPLACE INTO seal_schema VALUES (1, ?)"
-"""An upgrade changes tables, perhaps rows: what was sealed before it is sealed anew."""
+"""An upgrade may change rows, so checksums of an older schema are computed anew."""
 PER_FORMAT = 1_000_000
-"""Of that number: the format of seals counts, too."""
+"""Factor of the format in that number."""
 
 WALK = "CREATE TABLE IF NOT EXISTS seal_walk (id INTEGER PRIMARY KEY, place TEXT)"
-"""How far somebody has come who looks at all rows in turn."""
+"""Table with the progress of the check of all rows."""
 
 TABLES = """
     SELECT name FROM main.sqlite_master
@@ -203,12 +202,12 @@ TABLES = """
 
 
 class Seals:
-    """The seals of one database file.
+    """Checksums of one database file.
 
     Parameters
     ----------
     damage
-        Is told of rows that do not fit their seals.
+        Receives rows that do not fit their checksums.
     """
 
     def __init__(self, damage: DamageLog) -> None:
@@ -216,7 +215,7 @@ class Seals:
         self.tables: dict[str, SealedTable] = {}
 
     def begin(self, writer: sqlite3.Connection) -> None:
-        """Seal what is not sealed yet, within a transaction, and all that is written later."""
+        """Create missing checksums within a transaction, and maintain them on this connection."""
         self.tables = {table.name: table for table in _tables(writer)}
         self.teach(writer)
         (schema,) = writer.execute("PRAGMA main.user_version").fetchone()
@@ -237,20 +236,20 @@ class Seals:
                 writer.execute(statement)
 
     def know(self, reader: sqlite3.Connection) -> None:
-        """Find out which tables have seals, of a database that somebody else may be writing to."""
+        """Read which tables have checksums, in a database that another process may be writing."""
         there = {name for (name,) in reader.execute("SELECT name FROM main.sqlite_master")}
         self.tables = {t.name: t for t in _tables(reader) if t.seals in there}
         self.teach(reader)
 
     def guard(self, reader: sqlite3.Connection) -> None:
-        """Let a connection see only rows that are whole."""
+        """Let a connection see intact rows only."""
         self.teach(reader)
         for table in self.tables.values():
             reader.execute(table.view())
             reader.execute(table.view(WHOLE))
 
     def teach(self, connection: sqlite3.Connection) -> None:
-        """Let a connection compute seals."""
+        """Register the functions that compute checksums on a connection."""
         for name in self.tables:
             connection.create_function(SEAL + name, -1, _sealed(name), deterministic=True)
             is_whole = self._is_whole(name)
@@ -269,7 +268,7 @@ class Seals:
         return False
 
     def key_of(self, name: str, cells: Sequence[object]) -> str:
-        """What a row is found by, as words."""
+        """Return the key of a row as text."""
         table = self.tables[name]
         cell_of = dict(zip(table.columns, cells, strict=True))
         return ", ".join(f"{column} {_cell_words(cell_of[column])}" for column in table.key)
@@ -300,24 +299,24 @@ def _table(reader: sqlite3.Connection, name: str) -> SealedTable:
 
 
 ROWS_AT_ONCE = 2000
-"""Read in one look at the database: a short one does not make its log grow."""
+"""Rows per transaction: a short one does not make the log grow."""
 
 Key = tuple[Any, ...]
-"""Of a row, the columns that it is found by."""
+"""Values of the key of a row."""
 
 
 @dataclass(frozen=True)
 class Walk:
-    """A way through a table, or through its seals.
+    """Walk through a table or its checksums, in order of the key.
 
     Parameters
     ----------
     source
-        Statement for keys and whether the row is as it should be.
+        Statement for keys, and whether the row is as it should be.
     keys
-        Columns of the key, as the statement calls them.
+        Columns of the key in the statement.
     is_of_seals
-        Whether seals are walked through, whose rows may be gone.
+        Whether checksums are read, whose rows may be missing.
     """
 
     table: SealedTable
@@ -328,9 +327,9 @@ class Walk:
     def page(
         self, reader: Connection, log: DamageLog, after: Key | None, n_rows: int = ROWS_AT_ONCE
     ) -> Key | None:
-        """Look at the rows behind a key, in its order; the last one's key, None if none was left.
+        """Check the rows after a key; return the last key, or None at the end.
 
-        Altered rows are noted by the function that compares seals.
+        The SQL function that compares checksums adds altered rows to the log.
         """
         marks = ", ".join("?" * len(self.table.key))
         beyond = "" if after is None else f"WHERE ({self.keys}) > ({marks})"
@@ -344,7 +343,7 @@ class Walk:
 
 
 def walks(table: SealedTable) -> tuple[Walk, Walk]:
-    """What there is to walk through: rows, for those altered, and seals, for rows that are gone."""
+    """Return the walks through rows, for altered ones, and through checksums, for missing ones."""
     keys, of_seals = _keys(table, "r."), _keys(table, "s.")
     row = f"SELECT 1 FROM main.{table.name} AS r WHERE {table.matched('s.', 'r.')}"  # noqa: S608
     rows = f"SELECT {keys}, {table.is_whole('r.')} FROM main.{table.name} AS r"  # noqa: S608
@@ -361,4 +360,4 @@ def _keys(table: SealedTable, of: str) -> str:
 
 def _words(table: SealedTable, key: Sequence[object]) -> str:
     words = ", ".join(f"{column} {cell}" for column, cell in zip(table.key, key, strict=True))
-    return words.encode("utf-8", "replace").decode("utf-8")  # a damaged text may be none
+    return words.encode("utf-8", "replace").decode("utf-8")  # damaged text may not be UTF-8

@@ -20,7 +20,7 @@ NO_HOST = ""
 
 
 def host_id(machine_id: Path = MACHINE_ID) -> str:
-    """Name of this machine, from which the machine's own cannot be found out.
+    """Return an identifier of this machine that does not reveal its own.
 
     Empty where machines have none, as in many containers.
     """
@@ -34,11 +34,11 @@ def host_id(machine_id: Path = MACHINE_ID) -> str:
 
 
 MAX_BEHIND = 64
-"""Transactions by which the file may lag: a crash leaves out those of each process's last."""
+"""Maximum number of transactions by which the file may lag; a crash omits each process's last."""
 
 
 class Kind(StrEnum):
-    """What can be wrong."""
+    """Kind of a difference."""
 
     ROLLED_BACK = "rolled_back"
     REPLACED = "replaced"
@@ -49,14 +49,14 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class MarkFinding:
-    """What the mark says that the database does not.
+    """Difference between the mark in the file and that in the database.
 
     Parameters
     ----------
     n_missing
-        Transactions that were acknowledged and are not there; None where nobody can tell.
+        Number of committed transactions that are missing; None if unknown.
     detail
-        One sentence for people.
+        Sentence that describes it.
     """
 
     kind: Kind
@@ -65,14 +65,14 @@ class MarkFinding:
 
 
 def compared(mark: Mark | str, database: Mark, host: str) -> list[MarkFinding]:
-    """What is wrong; nothing if the database is what was here last.
+    """Return the differences; none if the database is the newest.
 
     Parameters
     ----------
     mark
-        What the file says, read before the database was; or why it says nothing.
+        Mark in the file, read before that in the database; or the reason why there is none.
     host
-        Of this machine.
+        Identifier of this machine.
     """
     if isinstance(mark, str):
         return [MarkFinding(Kind.MARK_LOST, None, _lost(mark, database))]
@@ -83,8 +83,8 @@ def compared(mark: Mark | str, database: Mark, host: str) -> list[MarkFinding]:
 
 
 OTHER_HOST = (
-    "the data folder was written by another machine before: if that still runs, two services"
-    " take themselves for the same plant"
+    "the data folder was last written by another machine: if padwatch still runs there, two"
+    " services monitor the same plant"
 )
 
 
@@ -112,8 +112,8 @@ def _rolled_back(mark: Mark, database: Mark) -> str:
 
 def _parted(mark: Mark, database: Mark) -> str:
     return (
-        f"the database is not the one that was here last: transaction {database.n_commits} is"
-        f" another one than the one of {_when(mark.time_ns)}"
+        f"the database is not the last one used here: transaction {database.n_commits} differs from"
+        f" that of {_when(mark.time_ns)}"
     )
 
 
@@ -126,15 +126,15 @@ def _replaced(mark: Mark, database: Mark) -> str:
 
 def _behind(mark: Mark, database: Mark) -> str:
     return (
-        f"the high-water mark is older than the database: it knows {mark.n_commits} transactions"
+        f"the high-water mark is older than the database: it counts {mark.n_commits} transactions"
         f" of {database.n_commits}"
     )
 
 
 def _lost(why: str, database: Mark) -> str:
     return (
-        f"the high-water mark {why}: whether the database, whose last transaction is of"
-        f" {_when(database.time_ns)}, is the newest cannot be told"
+        f"the high-water mark {why}: it is unknown whether the database, whose last transaction is"
+        f" of {_when(database.time_ns)}, is the newest"
     )
 
 
@@ -156,28 +156,35 @@ CREATE = """
         time_ns INTEGER NOT NULL
     ) STRICT
 """
-"""No migration: PostgreSQL, where one row for all writers would hold them up, has no such table."""
+"""Not a migration: in PostgreSQL one row would block all writers."""
 
 COLUMNS = "store, host, n_commits, nonce, time_ns"
 SELECT = """
     SELECT CAST(store AS BLOB), CAST(host AS BLOB), n_commits, CAST(nonce AS BLOB), time_ns
     FROM high_water WHERE id = 1
 """
-"""Texts as bytes: what is damaged need not be text."""
+"""Texts as bytes, since damaged text may not be UTF-8."""
 PUT = f"INSERT OR REPLACE INTO high_water (id, {COLUMNS}) VALUES (1, ?, ?, ?, ?, ?)"  # noqa: S608
 
 
 class CommitMarks:
-    """The marks of one database, used by whoever holds its writer.
+    """Marks of one database; used only by the holder of its writing connection.
 
     Parameters
     ----------
     file
-        Beside the database.
+        File beside the database.
     now_ns
-        Clock on the wall.
+        Wall clock.
     host
-        Name of this machine.
+        Returns the identifier of this machine.
+
+    Attributes
+    ----------
+    found
+        Differences at opening, until they are adopted.
+    error
+        Error of the last attempt to write the file; None if it succeeded.
     """
 
     def __init__(
@@ -189,14 +196,14 @@ class CommitMarks:
         self.error: str | None = None
 
     def open(self, writer: Connection, said: Mark | str | None) -> None:
-        """Compare the file with the database that has just been opened, within a transaction.
+        """Compare the file with a database that has just been opened, within a transaction.
 
-        A database without a mark gets one, and so does the folder where there was none before.
+        A database without a mark gets one, as does a folder without a file.
         """
         writer.execute(CREATE)
         mark = select_mark(writer)
         if mark is None:
-            mark = Mark(_chance(16), self._host, 0, _chance(8), self._now_ns())
+            mark = Mark(_random_hex(16), self._host, 0, _random_hex(8), self._now_ns())
             writer.execute(PUT, astuple(mark))
             if said is None:
                 self._file.replace(mark)
@@ -204,18 +211,18 @@ class CommitMarks:
         self.found = compared("is not there" if said is None else said, mark, self._host)
 
     def count(self, writer: Connection) -> None:
-        """Count the transaction that is about to be committed, in it."""
+        """Count the current transaction, within it."""
         if self.found:
-            return  # what was found stays to be seen until it is adopted
+            return  # the differences stay visible until they are adopted
         last = select_mark(writer)
         if last is None:
             raise StoreError("the database has lost its high-water mark")
         self._put(writer, last, last.n_commits + 1)
 
     def settle(self) -> None:
-        """Note beside the database what has been committed.
+        """Write the committed mark to the file.
 
-        What is on the disk is not undone because of it: until it succeeds the file lags.
+        If that fails, the transaction stays committed and the file lags behind until it succeeds.
         """
         if self._newest is None or self.found:
             return
@@ -227,16 +234,16 @@ class CommitMarks:
             self.error = None
 
     def adopt(self, writer: Connection) -> None:
-        """Take the database as it is for the newest, within a transaction."""
+        """Accept the database as the newest, within a transaction."""
         last, said = select_mark(writer), self.said()
         if last is None:
             raise StoreError("the database has lost its high-water mark")
         n_before = said.n_commits if isinstance(said, Mark) else 0
-        # beyond both, so that no mark of before fits ever again
+        # above both, so that no earlier mark ever fits again
         self._put(writer, last, max(last.n_commits, n_before) + 1)
 
     def adopted(self) -> None:
-        """Note beside the database what was adopted; if that fails, it will be found again."""
+        """Write the adopted mark to the file; if that fails, the differences are found again."""
         if self._newest is None:
             return
         try:
@@ -247,13 +254,13 @@ class CommitMarks:
             self.found, self.error = (), None
 
     def _put(self, writer: Connection, last: Mark, n_commits: int) -> None:
-        self._newest = Mark(last.store, self._host, n_commits, _chance(8), self._now_ns())
+        self._newest = Mark(last.store, self._host, n_commits, _random_hex(8), self._now_ns())
         writer.execute(PUT, astuple(self._newest))
 
     def said(self) -> Mark | str | None:
-        """What the file says, or why it says nothing; None if it is not there.
+        """Return the mark in the file, or the reason why it is unreadable; None if there is none.
 
-        Before the database is opened to be compared with it: the file may lag, but not lead.
+        It must be read before the database: the file may lag behind, but not lead.
         """
         try:
             return self._file.read()
@@ -264,7 +271,7 @@ class CommitMarks:
 
 
 def select_mark(reader: Connection) -> Mark | None:
-    """Read the mark in a database; None if it has none yet."""
+    """Return the mark in a database; None if it has none yet."""
     row = reader.execute(SELECT).fetchone()
     if row is None:
         return None
@@ -274,30 +281,30 @@ def select_mark(reader: Connection) -> Mark | None:
     return Mark(store, host, int(n_commits), nonce, int(time_ns))
 
 
-def _chance(n_bytes: int) -> str:
+def _random_hex(n_bytes: int) -> str:
     return os.urandom(n_bytes).hex()
 
 
 def adopt_copy(database: Path) -> None:
-    """Have the mark beside a database say what the database does.
+    """Write the mark of a restored database to the file beside it.
 
     Raises
     ------
     OSError
-        If the disk refuses; then the next start finds the database older than the mark.
+        If the disk refuses; the next start then finds the database older than the mark.
     sqlite3.Error
         If the database cannot be read.
     """
     mark = _mark_of(database)
     file = MarkFile(mark_path(database))
-    if mark is None:  # a copy from before there were marks: it gets one when it is opened
+    if mark is None:  # an old copy without a mark gets one when it is opened
         file.path.unlink(missing_ok=True)
     else:
         file.replace(mark)
 
 
 def _mark_of(database: Path) -> Mark | None:
-    # nobody writes to it yet: no journal is looked for or left behind
+    # immutable: no journal is read or created
     uri = f"{database.absolute().as_uri()}?mode=ro&immutable=1"
     with closing(sqlite3.connect(uri, uri=True)) as reader:
         has_one = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'high_water'"

@@ -3,16 +3,17 @@
 import fcntl
 import json
 import os
-import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from service.runtime.files import write_private
+
 FORMAT = "padwatch-high-water-mark-1"
 SLOT_BYTES = 512
-"""What disks write whole or not at all."""
+"""Size that disks write atomically."""
 
 _SUM_BYTES = 9
 TEXT_BYTES = SLOT_BYTES - _SUM_BYTES
@@ -20,20 +21,20 @@ TEXT_BYTES = SLOT_BYTES - _SUM_BYTES
 
 @dataclass(frozen=True)
 class Mark:
-    """A database's newest transaction.
+    """Last transaction of a database.
 
     Parameters
     ----------
     store
-        Of the database, made by chance when that was made.
+        Random identifier of the database.
     host
-        Of the machine that wrote it; empty where machines have no name.
+        Identifier of the machine that wrote it; empty if machines have none.
     n_commits
-        Transactions there ever were.
+        Total number of transactions.
     nonce
-        Of this one, made by chance: two histories that part never have the same again.
+        Random identifier of the transaction, which differs between diverging histories.
     time_ns
-        When it was written, UTC.
+        Time of writing, UTC.
     """
 
     store: str
@@ -44,13 +45,13 @@ class Mark:
 
 
 def encoded(mark: Mark) -> bytes:
-    """A mark as `SLOT_BYTES` bytes that people can read, too."""
+    """Return a mark as `SLOT_BYTES` bytes of readable text."""
     text = json.dumps({"format": FORMAT, **asdict(mark)}).encode("ascii").ljust(TEXT_BYTES)
     return text + b"%08x\n" % zlib.crc32(text)
 
 
 def decoded(slot: bytes) -> Mark | None:
-    """Invert `encoded`; None for anything else."""
+    """Invert `encoded`; None for other bytes."""
     text, checksum = slot[:TEXT_BYTES], slot[TEXT_BYTES:]
     if checksum != b"%08x\n" % zlib.crc32(text):
         return None
@@ -65,35 +66,35 @@ def decoded(slot: bytes) -> Mark | None:
 
 SUFFIX = ".high-water-mark"
 SLOTS = (0, 4096)
-"""Written by turns, in blocks of their own: a write that is torn leaves the mark before it."""
+"""Offsets that are written in turn, each in its own block: a torn write leaves the other mark."""
 
 
 class MarkError(ValueError):
-    """There is no mark; the message says why."""
+    """There is no valid mark; the message says why."""
 
 
 class NoMarkError(MarkError):
-    """The file is not there."""
+    """The file does not exist."""
 
 
 def mark_path(database: Path) -> Path:
-    """Where the mark of a database is."""
+    """Return the path of the mark of a database."""
     return database.with_name(database.stem + SUFFIX)
 
 
 class MarkFile:
-    """The file of a database's mark; several processes may write it."""
+    """File with a database's mark; several processes may write it."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def read(self) -> Mark:
-        """Read the mark.
+        """Return the mark.
 
         Raises
         ------
         MarkError
-            If there is none, or it is damaged; `NoMarkError` if the file is not there.
+            If it is damaged; `NoMarkError` if the file does not exist.
         """
         try:
             with _opened(self.path, os.O_RDONLY) as descriptor:
@@ -104,12 +105,12 @@ class MarkFile:
             raise MarkError(f"cannot be read: {error.strerror}") from error
 
     def advance(self, mark: Mark) -> None:
-        """Write a later mark, on the disk when this returns; an earlier one changes nothing.
+        """Write a later mark, durable on return; an earlier one has no effect.
 
         Raises
         ------
         MarkError
-            If the file is not there or damaged: what it said must be told before it is made anew.
+            If the file is missing or damaged, which must be reported before it is replaced.
         OSError
             If the disk refuses.
         """
@@ -127,27 +128,14 @@ class MarkFile:
             raise NoMarkError("is not there") from None
 
     def replace(self, mark: Mark) -> None:
-        """Make the file anew with this mark, whatever it said before.
+        """Write the file anew with this mark.
 
         Raises
         ------
         OSError
-            If the disk refuses; what was there stays.
+            If the disk refuses; the previous file stays.
         """
-        descriptor, aside = tempfile.mkstemp(prefix=f".{self.path.name}-", dir=self.path.parent)
-        try:
-            with os.fdopen(descriptor, "wb") as file:
-                for place in SLOTS:
-                    file.seek(place)
-                    file.write(encoded(mark))
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(aside, self.path)
-        except BaseException:
-            Path(aside).unlink(missing_ok=True)
-            raise
-        with _opened(self.path.parent, os.O_RDONLY) as folder:
-            os.fsync(folder)
+        write_private(self.path, encoded(mark).ljust(SLOTS[1], b"\0") + encoded(mark))
 
 
 def _slots(descriptor: int) -> list[Mark | None]:

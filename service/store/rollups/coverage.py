@@ -1,4 +1,4 @@
-"""A span of time from as few roll-ups as possible."""
+"""Trends of a time range from as few roll-ups as possible."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,13 +18,14 @@ from service.store.database import Connection
 from service.store.port import Trend, TrendQuery
 from service.store.rollups.rows import ANYTHING, HOUR_NS, WIDTHS_NS, Cells, Conditions, select_cells
 from service.store.rollups.writing import Gone, select_gone, select_mark
+from service.store.series import find_series
 from service.store.trends import Span, arguments, select_page, select_readings, storable, too_large
 
 MAX_SPANS = 4096
-"""That many are read at a time, so that no range needs more memory than another."""
+"""Spans per query, which bounds memory."""
 
 MAX_CUT_SPANS = 100_000
-"""Finer roll-ups that are looked at because bounds cut through wider ones; a second or two."""
+"""Maximum number of finer roll-ups that are read because bounds cut through wider ones."""
 
 REDONE = """
     SELECT start_ns FROM rollup_redo
@@ -34,20 +35,20 @@ REDONE = """
 
 @dataclass
 class Cover:
-    """What a query is answered from.
+    """Data that answer a query.
 
     Parameters
     ----------
     summaries
-        Out of roll-ups of which every reading is wanted, summed up in buckets.
+        Roll-ups of which every reading is requested, aggregated into buckets.
     spans
-        Where single readings are to be read instead.
+        Spans of which single readings must be read.
     rolled_spans
-        From when to when the roll-ups go.
+        Spans of the roll-ups.
     n_rolled
-        Readings in them, usable or not.
+        Number of readings in them, usable or not.
     is_coarse
-        Whether some of the readings in them are gone.
+        Whether some of these readings were deleted.
     """
 
     summaries: list[Summaries] = field(default_factory=list)
@@ -57,14 +58,6 @@ class Cover:
     is_coarse: bool = False
 
 
-def select_series(reader: Connection, query: TrendQuery) -> int | None:
-    """Number of the bearing that is asked for; None if there never was one."""
-    found = reader.execute(
-        "SELECT id FROM series WHERE unit = ? AND bearing = ?", (query.unit, query.bearing)
-    ).fetchone()
-    return None if found is None else int(found[0])
-
-
 def covered(
     reader: Connection,
     query: TrendQuery,
@@ -72,21 +65,24 @@ def covered(
     whole: Span,
     bucket_ns: int,
 ) -> Cover:
-    """Cover a range of time.
+    """Cover a time range.
 
-    Where single readings are gone, roll-ups that reach beyond the range count as a whole, and those
-    that bounds of conditions cut through not at all.
-
-    Raises `QueryTooLargeError` if bounds of conditions cut through too much of it.
+    Where single readings were deleted, roll-ups that extend beyond the range count as a whole, and
+    those that bounds of conditions cut through are left out.
 
     Parameters
     ----------
     gone
-        What there is no more of the bearing.
+        Times up to which data of the bearing were deleted.
     bucket_ns
-        Width of the buckets asked for.
+        Width of the requested buckets.
+
+    Raises
+    ------
+    QueryTooLargeError
+        If bounds of conditions cut through too many roll-ups.
     """
-    series = select_series(reader, query)
+    series = find_series(reader, query.unit, query.bearing)
     if series is None:
         return Cover()
     covering = _Covering(reader, query, series, bucket_ns)
@@ -112,7 +108,7 @@ class _Covering:
         self.cover = Cover()
 
     def take(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span; what does not fit the widest roll-ups goes to finer ones, then to rows."""
+        """Cover a span by the widest roll-ups, its ends by finer ones, then by single readings."""
         if span[0] >= span[1]:
             return
         if not widths_ns:
@@ -130,13 +126,13 @@ class _Covering:
         self.take((inner[1], span[1]), finer_ns)
 
     def take_coarse(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span of which only roll-ups are there, and readings that have come too late."""
+        """Cover a span whose single readings were deleted, except late ones."""
         self._take_cells(span, widths_ns)
         late = self._redone(span)
         self.cover.spans += [_within(span, (hour, hour + HOUR_NS)) for hour in late]
 
     def _take_cells(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span with the widest roll-ups that fit; the narrowest ones may reach beyond."""
+        """Cover a span by the widest roll-ups that fit; the narrowest may extend beyond it."""
         width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
         inner = _inside(span, width_ns) if finer_ns else _around(span, width_ns)
         if finer_ns and inner[0] >= inner[1]:
@@ -201,7 +197,7 @@ class _Covering:
             self.cover.rolled_spans += _runs(np.unique(chosen.time_ns), width_ns)
 
     def _cut(self, conditions: Conditions) -> npt.NDArray[np.bool_]:
-        """Cells of which some readings may be wanted and others not."""
+        """Return the cells of which only some readings may be requested."""
         asked = self._asked
         sides = (
             (asked["eccentricity_low"], conditions.eccentricity_low, -1.0),
@@ -229,7 +225,7 @@ def _around(span: Span, width_ns: int) -> Span:
 
 
 def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
-    """Spans of neighbours, out of their starts."""
+    """Return the spans of adjacent buckets, given their starts."""
     breaks = np.flatnonzero(np.diff(time_ns) > width_ns)
     if time_ns.size:
         firsts = np.concatenate([time_ns[:1], time_ns[breaks + 1]]).tolist()
@@ -239,12 +235,12 @@ def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
 
 
 def read_trend(reader: Connection, query: TrendQuery) -> Trend:
-    """Read trends of one bearing, gathered into buckets if they are many.
+    """Return trends of one bearing, aggregated into buckets if they are many.
 
     Raises
     ------
     QueryTooLargeError
-        If more single readings would have to be read than can be.
+        If too many single readings would have to be read.
     """
     gone = _gone(reader, query)
     whole = (storable(query.start_ns), storable(query.end_ns))
@@ -259,7 +255,7 @@ def read_trend(reader: Connection, query: TrendQuery) -> Trend:
 
 
 def _gone(reader: Connection, query: TrendQuery) -> Gone:
-    series = select_series(reader, query)
+    series = find_series(reader, query.unit, query.bearing)
     return Gone({}) if series is None else select_gone(reader, series)
 
 

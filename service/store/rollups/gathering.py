@@ -20,10 +20,11 @@ DELETE_HOUR = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time
 
 
 def merge_late(writer: Connection, series: int, hour_ns: int, gone: Gone) -> None:
-    """Add the single readings of such an hour, all of them late, to its roll-ups; then they go.
+    """Merge late readings of an hour whose single readings were deleted into its roll-ups.
 
-    Both in one transaction: a reading is always in one of the two. One that is offered twice after
-    its hour was deleted counts twice: nothing tells it from another any more.
+    The readings are deleted in the same transaction, so that each is either stored or merged. A
+    reading that is written twice after its hour was deleted counts twice, since it cannot be
+    recognized.
     """
     hour = (hour_ns, hour_ns + HOUR_NS)
     minutes = minutes_of(writer, series, hour)
@@ -39,10 +40,10 @@ def merge_late(writer: Connection, series: int, hour_ns: int, gone: Gone) -> Non
 
 
 MAX_READINGS = 2000
-"""Of one piece of work, during which nobody else writes: some tens of milliseconds."""
+"""Readings per step, which blocks other writers for some tens of milliseconds."""
 
 MAX_REDONE = 24
-"""Hours of one piece of work."""
+"""Hours per step."""
 
 NEXT_TIMES = """
     SELECT time_ns FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?
@@ -55,7 +56,7 @@ SET_MARK = """
 
 
 def gather_next(writer: Connection, series: int, now_ns: int) -> None:
-    """Gather what has come since the mark, as far as its minutes are over, and set the mark."""
+    """Aggregate readings after the mark, in complete minutes, and move the mark."""
     mark_ns = select_mark(writer, series)
     until_ns = _until(writer, series, mark_ns, now_ns)
     if until_ns > mark_ns:
@@ -64,7 +65,7 @@ def gather_next(writer: Connection, series: int, now_ns: int) -> None:
 
 
 def gather_anew(writer: Connection, series: int) -> None:
-    """Gather the hours again that have got readings since they were gathered."""
+    """Aggregate again the hours that received readings since they were aggregated."""
     mark_ns = select_mark(writer, series)
     hours = writer.execute(
         "SELECT start_ns FROM rollup_redo WHERE series = ? ORDER BY start_ns LIMIT ?",
@@ -88,7 +89,7 @@ def _gather_hour(writer: Connection, series: int, span: Span) -> None:
 
 
 def _until(writer: Connection, series: int, mark_ns: int, now_ns: int) -> int:
-    """Up to when to gather now: whole minutes, after which there is a reading already."""
+    """Return the end of the next step: whole minutes that are followed by a reading."""
     end_ns = now_ns + 1
     times = writer.execute(NEXT_TIMES, (series, mark_ns, end_ns, MAX_READINGS)).fetchall()
     if not times:
@@ -99,7 +100,7 @@ def _until(writer: Connection, series: int, mark_ns: int, now_ns: int) -> int:
 
 
 def _gather(writer: Connection, series: int, span: Span) -> None:
-    """Fill the spans of every width that end within a span of time."""
+    """Write the roll-ups of every width that end within a span."""
     minutes = minutes_of(writer, series, span)
     if minutes is not None:
         insert_cells(writer, series, MINUTE_NS, minutes)
@@ -132,18 +133,18 @@ class RollupStore(Tables):
     """Roll-ups of readings. Readings that are not aggregated yet are read one by one."""
 
     def due(self, now_ns: int) -> list[int]:
-        """Numbers of the bearings that have readings to gather, the one most behind first."""
+        """Return the bearings with readings to aggregate, the one furthest behind first."""
         with self._reading() as reader:
             rows = reader.execute(DUE, {"now_ns": now_ns, "width_ns": MINUTE_NS})
             return [int(row[0]) for row in rows]
 
     def gather(self, series: int, now_ns: int) -> None:
-        """Gather some readings of one bearing.
+        """Aggregate some readings of one bearing in one short transaction.
 
         Raises
         ------
         StoreError
-            If nothing was gathered; the message is the database's.
+            If nothing was aggregated.
         """
         with self._writing() as writer:
             gather_anew(writer, series)

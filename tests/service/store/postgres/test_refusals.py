@@ -136,7 +136,7 @@ def test_a_query_that_takes_too_long_ends_with_a_sentence(
     postgres_store: PostgresStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "service.store.postgres.database.SETTINGS", "SET statement_timeout = '20ms';"
+        "service.store.postgres.database.READER_SETTINGS", "SET statement_timeout = '20ms';"
     )
     with (
         pytest.raises(StoreError, match="it took too long: the database is too slow"),
