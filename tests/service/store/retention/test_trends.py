@@ -114,7 +114,7 @@ def _delete_until(store: SqliteStore, what: str, hour: int) -> None:
         "minutes_days": None if what == "single" else age_ns,
         "ten_minutes_days": age_ns if what == "ten" else None,
     }
-    delete_all(store, limits)
+    delete_all(store, {name: age for name, age in limits.items() if age is not None})
 
 
 def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
