@@ -19,14 +19,11 @@ from service.store.access.identities import KeyState
 from service.store.access.tables import AccessStore
 from service.store.highwater.commits import adopt_copy
 from service.store.schema import MIGRATIONS
+from service.store.sqlite.checking import structure_findings
 from service.store.sqlite.migrating import APPLICATION_IDS
 
 MAX_FINDINGS = 5
 """Maximum number of defects in a message."""
-
-EVERY_FINDING = 2**31 - 1
-
-NULL_FINDING = "NULL value in "
 
 
 class BackupError(Exception):
@@ -88,33 +85,18 @@ def _require_ours(connection: sqlite3.Connection, path: Path) -> None:
     schema = _number(connection, "user_version")
     if schema > len(MIGRATIONS):
         raise BackupError(
-            f"{path} has schema {schema}, this padwatch knows up to {len(MIGRATIONS)};"
+            f"{path} has schema {schema}, this padwatch supports up to {len(MIGRATIONS)};"
             " use the padwatch that wrote it, or a newer one"
         )
 
 
 def _require_whole(connection: sqlite3.Connection, path: Path) -> None:
-    damage = list(islice(_damage(connection), MAX_FINDINGS))
+    damage = list(islice(structure_findings(connection), MAX_FINDINGS))
     if damage:
         raise BackupError(f"{path} is damaged: " + "; ".join(damage))
     loose = connection.execute("PRAGMA foreign_key_check").fetchone()
     if loose is not None:
         raise BackupError(f"{path} is damaged: rows of {loose[0]} refer to missing rows")
-
-
-def _damage(connection: sqlite3.Connection) -> Iterator[str]:
-    """What is wrong; SQLite before 3.41 finds nulls that are none in tables WITHOUT ROWID."""
-    said_null = set()
-    for (finding,) in connection.execute(f"PRAGMA integrity_check({EVERY_FINDING})"):
-        if finding.startswith(NULL_FINDING):
-            said_null.add(finding)
-        elif finding != "ok":
-            yield finding
-    for finding in sorted(said_null):
-        table, _, column = finding.removeprefix(NULL_FINDING).partition(".")
-        looked = f'SELECT 1 FROM "{table}" WHERE typeof("{column}") = \'null\' LIMIT 1'  # noqa: S608
-        if connection.execute(looked).fetchone() is not None:
-            yield finding
 
 
 def _number(connection: sqlite3.Connection, pragma: str) -> int:

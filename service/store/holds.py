@@ -217,13 +217,20 @@ def _require_local(folder: Path, found: FileSystem) -> None:
 
 
 def _take(descriptor: int, database: Path) -> None:
+    if (holder := take_lock(descriptor)) is not None:
+        raise AlreadyRunningError(
+            f"another padwatch (process {holder}) uses {database}:"
+            " stop it, or choose another data folder"
+        )
+
+
+def take_lock(descriptor: int) -> str | None:
+    """Lock a file and write the process number to it; return that of another holder, if any."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         holder = os.pread(descriptor, _PID_BYTES, 0).decode("ascii", "replace").strip()
-        raise AlreadyRunningError(
-            f"another padwatch (process {holder or 'unknown'}) uses {database}:"
-            " stop it, or choose another data folder"
-        ) from None
+        return holder or "unknown"
     os.ftruncate(descriptor, 0)
     os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
+    return None

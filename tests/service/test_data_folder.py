@@ -25,7 +25,7 @@ def test_a_data_folder_on_a_network_file_system_is_refused_with_what_to_do(tmp_p
 
 
 def test_a_data_folder_that_may_forget_is_warned_of_and_a_local_disk_is_not(tmp_path: Path) -> None:
-    for found in (FileSystem("ext4"), FileSystem("tmpfs", warning="is memory")):
+    for found in (FileSystem("ext4"), FileSystem("tmpfs", warning="is in memory")):
         with capture_logs() as logs, only_one(tmp_path / "x", lambda _, found=found: found):
             pass
         warned = [(entry["log_level"], entry["why"]) for entry in logs]
@@ -37,4 +37,4 @@ def test_a_second_service_on_the_same_data_is_refused_in_one_line(plant_path: Pa
     with only_one(plant_path.parent / "data" / "padwatch.sqlite3"):
         found = padwatch("run", plant_path, "--port", "0")
     assert (found.exit_code, found.stderr.count("\n")) == (1, 1)
-    assert f"another padwatch (process {os.getpid()}) works with" in found.stderr
+    assert f"another padwatch (process {os.getpid()}) uses" in found.stderr

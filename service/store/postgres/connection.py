@@ -29,20 +29,20 @@ DEFAULTS = {
     "keepalives_count": "3",
     "tcp_user_timeout": "25000",
 }
-"""A server that has gone without a word is noticed within half a minute."""
+"""A server that disappears silently is detected within half a minute."""
 
 
 @dataclass(frozen=True)
 class PostgresAddress:
-    """How to reach a database.
+    """Address of a database.
 
     Parameters
     ----------
     conninfo
-        As libpq takes it, without a password.
+        Connection string of libpq, without a password.
     password_file
-        File that holds nothing but the password, readable by its owner alone; without it libpq
-        looks into ``~/.pgpass``, if it needs one.
+        File with only the password, readable by its owner alone; without it libpq reads
+        ``~/.pgpass``.
     """
 
     conninfo: str
@@ -50,14 +50,14 @@ class PostgresAddress:
 
     @property
     def name(self) -> str:
-        """What the database is called in messages."""
+        """Name of the database in messages."""
         parts = conninfo_to_dict(self.conninfo)
-        database = parts.get("dbname") or parts.get("user") or "of the user's name"
+        database = parts.get("dbname") or parts.get("user") or "named like the user"
         host = parts.get("host") or parts.get("service") or "this computer"
         return f"PostgreSQL database {database} at {host}"
 
     def full(self, purpose: str) -> str:
-        """Everything that is needed to connect, the password included: never to be shown."""
+        """Return the connection string with the password, which must never be shown."""
         given = conninfo_to_dict(self.conninfo)
         name = f"padwatch {purpose} {os.getpid()}@{socket.gethostname()}"[:63]
         settings = {**DEFAULTS, "application_name": name, **given, "client_encoding": "UTF8"}
@@ -73,7 +73,7 @@ class PostgresAddress:
         except OSError as error:
             raise StoreError(f"[store] password_file {path}: {error.strerror}") from error
         if mode & 0o077:
-            raise StoreError(f"[store] password_file {path} can be read by others: chmod 600 it")
+            raise StoreError(f"[store] password_file {path} is readable by others: chmod 600 it")
         return found.decode("utf-8", "surrogateescape").rstrip("\r\n")
 
 
@@ -86,7 +86,7 @@ SESSION = """
     SET tcp_keepalives_idle = 10; SET tcp_keepalives_interval = 5; SET tcp_keepalives_count = 3;
     SET idle_in_transaction_session_timeout = '30s';
 """
-"""Of every session; a client that has gone without a word keeps no lock for long."""
+"""Settings of every session; one whose client disappeared releases its locks soon."""
 
 SERVER_SETTINGS = """
     SELECT current_setting('fsync'), current_setting('full_page_writes'),
@@ -95,7 +95,7 @@ SERVER_SETTINGS = """
 
 
 class _TruthDumper(Dumper):
-    """Truths as 0 and 1, as they are stored."""
+    """Dumps booleans as 0 and 1, as they are stored."""
 
     oid = BIGINT_OID
 
@@ -104,7 +104,7 @@ class _TruthDumper(Dumper):
 
 
 class _NumberDumper(Dumper):
-    """Numbers; what is none is NULL, as SQLite has it."""
+    """Dumps floats; NaN as NULL, as in SQLite."""
 
     oid = DOUBLE_OID
 
@@ -125,7 +125,7 @@ Session = psycopg.Connection[tuple[Any, ...]]
 
 
 class PostgresConnection:
-    """A session within a transaction, for statements that are written once for both databases."""
+    """Session within a transaction, for statements written for both databases."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -133,7 +133,7 @@ class PostgresConnection:
     def execute(
         self, statement: str, parameters: Parameters = (), /
     ) -> psycopg.Cursor[tuple[Any, ...]]:
-        """Run a statement; all that it found is in memory then."""
+        """Run a statement and fetch all rows."""
         return self._session.execute(translated(statement), parameters or None, binary=True)
 
     def executemany(
@@ -146,7 +146,7 @@ class PostgresConnection:
 
 
 def connected(address: PostgresAddress, purpose: str, settings: str) -> Session:
-    """Open a session with some settings of its own."""
+    """Open a session with additional settings."""
     session = psycopg.connect(address.full(purpose), autocommit=True, context=_Context)
     try:
         session.execute((SESSION + settings).encode())
@@ -162,17 +162,17 @@ class _Context:
 
 
 def require_fit(session: Session, where: str) -> None:
-    """Refuse a server that cannot keep what padwatch writes.
+    """Refuse an unsuitable server.
 
     Raises
     ------
     StoreError
-        If it is too old, loses data at a power cut, is a standby or has no place for tables.
+        If it is too old, loses data at a power cut, is a standby or has no schema for tables.
     """
     if session.info.server_version < OLDEST_VERSION:
         version = session.info.parameter_status("server_version")
         raise StoreError(
-            f"{where} is of PostgreSQL {version}, which is too old: padwatch needs"
+            f"{where} runs on PostgreSQL {version}, which is too old: padwatch needs"
             f" {OLDEST_VERSION // 10_000} or newer"
         )
     row = session.execute(SERVER_SETTINGS.encode()).fetchone()
@@ -185,7 +185,7 @@ def _unfit(
     fsync: str, full_page_writes: str, encoding: str, is_standby: bool, has_schema: bool
 ) -> str | None:
     if is_standby:
-        return "is a standby, which only reads: name the primary in [store] postgresql"
+        return "is a read-only standby: name the primary in [store] postgresql"
     if fsync != "on" or full_page_writes != "on":
         return (
             "would lose results at a power cut: set fsync = on and full_page_writes = on"
@@ -204,12 +204,12 @@ CANCEL_WITHIN_S = 2.0
 
 @contextmanager
 def cancelled_when_gone(session: Session) -> Iterator[None]:
-    """Cancel what a session does as soon as its asker has gone; nothing where nobody asks.
+    """Cancel the statements of a session when the client of the request has gone.
 
     Raises
     ------
     StoreError
-        If the asker has gone.
+        If the client has gone.
     """
     asker = ASKER.get()
     if asker is None:
@@ -224,7 +224,7 @@ def cancelled_when_gone(session: Session) -> Iterator[None]:
         is_done.set()
         watcher.join()
         if asker.has_gone:
-            raise StoreError("interrupted: nobody waits for the answer")
+            raise StoreError("interrupted: the client has disconnected")
 
 
 def _watch(session: Session, asker: Asker, is_done: Event) -> None:
@@ -234,31 +234,31 @@ def _watch(session: Session, asker: Asker, is_done: Event) -> None:
     try:
         session.cancel_safe(timeout=CANCEL_WITHIN_S)
     except psycopg.Error:
-        return  # the server is gone, and what it did with it
+        return  # the server is gone, and its statements with it
 
 
 BY_STATE = {
-    "53100": "the disk of the database is full: make room there",
-    "53200": "the database server has no memory left",
+    "53100": "the disk of the database is full: free space there",
+    "53200": "the database server is out of memory",
     "53300": "too many connections are open: raise max_connections",
-    "57014": "it took too long: the database is too slow, or too busy with others",
-    "55P03": "another padwatch has been writing for too long: see what it waits for",
+    "57014": "the query timed out: the database is too slow, or overloaded",
+    "55P03": "another padwatch has been writing for too long: check what it waits for",
     "25P03": "a transaction was left open for too long",
-    "25006": "the database only reads: name the primary in [store] postgresql, not a standby",
-    "42501": "the role may not do this: give it the rights that the how-to of PostgreSQL lists",
-    "57P01": "the database server is being stopped; it is tried again",
-    "57P02": "the database server has crashed and recovers; it is tried again",
-    "57P03": "the database server is starting or stopping; it is tried again",
+    "25006": "the database is read-only: name the primary in [store] postgresql, not a standby",
+    "42501": "the role lacks permission: grant the rights listed in the how-to for PostgreSQL",
+    "57P01": "the database server is shutting down; padwatch retries",
+    "57P02": "the database server has crashed and is recovering; padwatch retries",
+    "57P03": "the database server is starting or stopping; padwatch retries",
     "XX001": "the database is damaged: restore a backup",
     "XX002": "an index is damaged: run reindexdb",
 }
-"""What to do, by SQLSTATE."""
+"""Advice by SQLSTATE."""
 
 BY_WORDS = {
     "password authentication failed": "correct [store] password_file, or the role's password",
     "no password supplied": "name a [store] password_file",
-    "no pg_hba.conf entry": "let this host and role in, in pg_hba.conf of the server",
-    "does not exist": "create it, as the how-to of PostgreSQL shows, or correct [store] postgresql",
+    "no pg_hba.conf entry": "permit this host and role in pg_hba.conf of the server",
+    "does not exist": "create it (see the how-to for PostgreSQL), or correct [store] postgresql",
     "too many clients": BY_STATE["53300"],
     "remaining connection slots": BY_STATE["53300"],
     "the database system is": BY_STATE["57P03"],
@@ -266,7 +266,7 @@ BY_WORDS = {
     "session is read-only": BY_STATE["25006"],
     "certificate": "correct sslmode, sslrootcert or sslcert in [store] postgresql",
 }
-"""What to do, by what the server or its library says before there is a session."""
+"""Advice by the text of errors that occur before there is a session."""
 
 OF_THE_ROW = (
     psycopg.IntegrityError,
@@ -274,13 +274,13 @@ OF_THE_ROW = (
     psycopg.errors.DataCorrupted,
     psycopg.errors.IndexCorrupted,
 )
-"""Errors that a row or its page is to blame for: others of its transaction can be written."""
+"""Errors caused by a row or its page: others of its transaction can be written."""
 
-UNREACHABLE = "see whether PostgreSQL runs and can be reached; it is tried again"
+UNREACHABLE = "check that PostgreSQL runs and can be reached; padwatch retries"
 
 
 def sentence(where: str, error: psycopg.Error) -> str:
-    """What went wrong where, and what to do about it."""
+    """Return a message with advice."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     said = (error.diag.message_primary or (lines[0] if lines else type(error).__name__)).rstrip(".")
     advice = _advice(error)
@@ -298,7 +298,7 @@ def _advice(error: psycopg.Error) -> str | None:
 
 @contextmanager
 def renamed(where: str) -> Iterator[None]:
-    """Raise `StoreError` for whatever PostgreSQL, its library or the system raise."""
+    """Raise `StoreError` for errors of PostgreSQL, its library and the system."""
     try:
         yield
     except psycopg.Error as error:
@@ -311,14 +311,14 @@ def renamed(where: str) -> Iterator[None]:
 
 
 def lock_number(name: str) -> int:
-    """The number that stands for a name, the same in every padwatch."""
+    """Return the number of an advisory lock by name, the same in every process."""
     digest = hashlib.sha256(b"padwatch " + name.encode("utf-8", "surrogateescape")).digest()
     return int.from_bytes(digest[:8], "big", signed=True)
 
 
 MIGRATING = lock_number("/migrating")
 WRITING = lock_number("/writing")
-"""Held by every transaction that writes: as in SQLite, one writes at a time."""
+"""Held by every writing transaction, so that only one writes at a time, as in SQLite."""
 
 
 _PIECE = re.compile(r"('(?:[^']|'')*')|\?|(?<!:):([A-Za-z_][A-Za-z_0-9]*)|%|\bwhole_(?=[a-z])")
@@ -326,9 +326,9 @@ _PIECE = re.compile(r"('(?:[^']|'')*')|\?|(?<!:):([A-Za-z_][A-Za-z_0-9]*)|%|\bwh
 
 @lru_cache(maxsize=1024)
 def translated(statement: str) -> bytes:
-    """Write ``?`` as ``%s`` and ``:name`` as ``%(name)s``; what is quoted stays as it is.
+    """Return a statement with ``%s`` for ``?`` and ``%(name)s`` for ``:name``, except in literals.
 
-    ``whole_`` before a table is left out: the server sees to it that what it reads is whole.
+    The prefix ``whole_`` of tables is removed, since the server checks its data itself.
     """
     return _PIECE.sub(_piece, statement).encode()
 

@@ -33,7 +33,7 @@ BEGIN_READING = b"BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"
 
 
 class Readers:
-    """Read-only sessions of one database, opened as they are needed."""
+    """Read-only sessions of one database, each used by one thread at a time."""
 
     def __init__(self, address: PostgresAddress) -> None:
         self._address = address
@@ -43,7 +43,7 @@ class Readers:
 
     @contextmanager
     def reading(self) -> Iterator[PostgresConnection]:
-        """Borrow a session; one with which something went wrong is not used again."""
+        """Borrow a session; one that raised an error is not used again."""
         with renamed(self._address.name):
             session = self._begun()
             try:
@@ -56,7 +56,7 @@ class Readers:
             self._put_back(session)
 
     def close(self) -> None:
-        """Close those that are not in use now, and the others as they are given back."""
+        """Close idle sessions now, and the others when they are returned."""
         with self._lock:
             self._is_closed = True
             idle, self._idle = self._idle, []
@@ -67,7 +67,7 @@ class Readers:
         while (idle := self._taken()) is not None:
             try:
                 idle.execute(BEGIN_READING)
-            except psycopg.OperationalError:  # the server was started anew since
+            except psycopg.OperationalError:  # the server has been restarted since
                 idle.close()
             else:
                 return idle
@@ -97,23 +97,23 @@ BEGIN_WRITING = f"""
 """
 NUMBER = "SELECT pg_current_xact_id()::text"
 OUTCOME = "SELECT pg_xact_status(%s::xid8)"
-"""``committed``, ``aborted``, or ``in progress`` while the lost session is still there."""
+"""``committed``, ``aborted``, or ``in progress`` while the lost session still exists."""
 
 DOUBT_S = 8.0
-"""How long the outcome of a commit is asked for that got no answer."""
+"""Maximum time to determine the outcome of a commit without an answer."""
 
 PAUSE_S = 0.2
 
 
 class Writer:
-    """Transactions, one at a time among all processes.
+    """Writing session, with one transaction at a time among all processes.
 
     Parameters
     ----------
     address
-        Of the database.
+        Address of the database.
     session
-        Open and fit.
+        Open session to a suitable server.
     """
 
     def __init__(self, address: PostgresAddress, session: Session) -> None:
@@ -122,14 +122,14 @@ class Writer:
         self._is_closed = False
 
     def close(self) -> None:
-        """End the session; closing twice is fine."""
+        """End the session; closing twice has no effect."""
         with self._lock:
             self._is_closed = True
             self._session.close()
 
     @contextmanager
     def writing(self) -> Iterator[PostgresConnection]:
-        """Open a transaction, alone; durable when left."""
+        """Open a transaction; durable when left."""
         with self._lock, renamed(self._where):
             number = self._begin()
             try:
@@ -149,7 +149,7 @@ class Writer:
                 if not self._session.closed:
                     self._roll_back()
                     raise
-        self._session = writing_session(self._address)  # it was lost since the last transaction
+        self._session = writing_session(self._address)  # it was lost after the last transaction
         return self._begun()
 
     def _begun(self) -> str:
@@ -171,10 +171,10 @@ class Writer:
             self._settle(number, error)
         else:
             if done.statusmessage != "COMMIT":
-                raise StoreError(f"{self._where}: the transaction was undone by an error in it")
+                raise StoreError(f"{self._where}: an error rolled the transaction back")
 
     def _settle(self, number: str, lost: psycopg.Error) -> None:
-        """Ask what has become of a commit that got no answer; fail unless it is there."""
+        """Determine the outcome of an unanswered commit; raise an error unless it succeeded."""
         until_s = time.monotonic() + DOUBT_S
         outcome = self._outcome(number)
         while outcome is None and time.monotonic() < until_s:
@@ -185,12 +185,12 @@ class Writer:
         if outcome == "aborted":
             raise StoreError(sentence(self._where, lost))
         raise StoreError(
-            f"{self._where}: the connection was lost as results were written; whether they were"
-            " is not known, so they are written again"
+            f"{self._where}: the connection was lost during a commit whose outcome is unknown;"
+            " the results are written again"
         )
 
     def _outcome(self, number: str) -> str | None:
-        """What has become of a transaction; None while that cannot be known."""
+        """Return the outcome of a transaction; None while it is unknown."""
         try:
             if self._session.closed:
                 self._session = writing_session(self._address)
@@ -205,7 +205,7 @@ class Writer:
         try:
             self._session.execute("ROLLBACK")
         except psycopg.Error:
-            self._session.close()  # which rolls back as well
+            self._session.close()  # also rolls back
 
 
 def writing_session(address: PostgresAddress) -> Session:
@@ -214,7 +214,7 @@ def writing_session(address: PostgresAddress) -> Session:
     Raises
     ------
     StoreError
-        If the server is not fit for it.
+        If the server is unsuitable.
     psycopg.Error
         If it cannot be reached, or refuses.
     """
@@ -238,14 +238,18 @@ HOLDER = """
 
 
 class PostgresHold:
-    """A name held in a database, from entering to leaving.
+    """Name held in a database, from entering to leaving, by an advisory lock of its own session.
+
+    The lock ends with the session: when the process ends, when the server restarts, or at most half
+    a minute after the host or the network fails. The holder must therefore check `is_held` before
+    every action that only one process may take; a lost name stays lost.
 
     Parameters
     ----------
     address
-        Of the database.
+        Address of the database.
     name
-        What is held.
+        Name to hold.
     """
 
     def __init__(self, address: PostgresAddress, name: str) -> None:
@@ -255,7 +259,7 @@ class PostgresHold:
 
     @property
     def is_held(self) -> bool:
-        """Ask the server; False for ever once there was no answer."""
+        """Check with the server; False forever once it did not answer."""
         with self._lock:
             if self._session is None:
                 return False
@@ -303,14 +307,14 @@ class PostgresHold:
 
 
 class PostgresDatabase:
-    """One database of a server; may be used from several threads, and by several processes.
+    """One database of a server; used by several threads and processes.
 
     Parameters
     ----------
     address
-        Of the database; it has to be there, and empty or padwatch's.
+        Address of the database, which must exist and be empty or padwatch's.
     origin
-        What it is to hold; one that holds the other is refused.
+        Origin of its data; a database with data of the other origin is refused.
 
     Raises
     ------
@@ -332,12 +336,12 @@ class PostgresDatabase:
         self._writer, self._readers = Writer(address, session), Readers(address)
 
     def close(self) -> None:
-        """End all sessions; closing twice is fine."""
+        """End all sessions; closing twice has no effect."""
         self._readers.close()
         self._writer.close()
 
     def writing(self) -> AbstractContextManager[PostgresConnection]:
-        """Open a transaction, alone among all processes; durable when left."""
+        """Open the only writing transaction of all processes; durable when left."""
         return self._writer.writing()
 
     @contextmanager
@@ -345,14 +349,14 @@ class PostgresDatabase:
         self,
         unreadable: Unreadable = "strict",  # noqa: ARG002
     ) -> Iterator[PostgresConnection]:
-        """Open a look at one state of the database, which stores no unreadable text."""
+        """Open a read-only transaction; the database stores no unreadable text."""
         with self._readers.reading() as reader:
             yield reader
 
     def ever_had(self, connection: Connection, table: str) -> bool:  # noqa: ARG002
-        """Assume so: what is beside the database was begun as it was opened."""
+        """Return True: files beside the database are created when it is opened."""
         return True
 
     def hold(self, name: str) -> PostgresHold:
-        """Take a name among all processes that use this database."""
+        """Hold a name among all processes that use this database."""
         return PostgresHold(self.address, name)

@@ -21,20 +21,20 @@ HEAD_BEGUN = "audit.head_begun"
 
 
 class PostgresStore(Store):
-    """A store that several processes on several hosts may share.
+    """Store that several processes on several hosts may share.
 
     Parameters
     ----------
     address
-        Of the database; it has to be there, and empty or padwatch's.
+        Address of the database, which must exist and be empty or padwatch's.
     head
-        File on this host that names the newest entry of the audit trail that this host has seen.
+        File on this host that names the newest entry of the audit trail read here.
     origin
-        What it is to hold; one that holds the other is refused.
+        Origin of its data; a database with data of the other origin is refused.
     to
-        Who is to be told of events of alarms.
+        Function that returns the messages about an event of an alarm.
     spectra
-        How many spectra are kept.
+        Limits of stored spectra.
 
     Raises
     ------
@@ -65,7 +65,7 @@ class PostgresStore(Store):
 
 
 def _begin_head(database: PostgresDatabase, head: Path) -> bool:
-    """Write the head of a host that is new to a trail; whether the trail was there before it."""
+    """Write the head of a new host; return whether the trail already had entries."""
     if head.exists():
         return False
     head.parent.mkdir(parents=True, exist_ok=True)
@@ -76,21 +76,21 @@ def _begin_head(database: PostgresDatabase, head: Path) -> bool:
 
 
 def _begun(head: Path) -> Deed:
-    """Tell of it, so that a head that was taken away is noticed in the trail."""
+    """Return an entry about a new head, so that the removal of a head is visible in the trail."""
     who = acting()
     return Deed(
         time_ns=time.time_ns(),
         actor="padwatch",
         action=HEAD_BEGUN,
         object="audit",
-        reason=f"{head.absolute()} was not there",
+        reason=f"{head.absolute()} did not exist",
         source=who.source,
         peer=who.peer,
     )
 
 
 def server_trail(address: PostgresAddress, head: Path) -> Trail:
-    """Trail of a database, which is opened as it is read, and the head that this host has."""
+    """Return the audit trail of a database, with the head of this host; nothing is upgraded."""
     return Trail(partial(_opened, address), head, is_shared=True)
 
 

@@ -18,13 +18,12 @@ from service.store.sqlite.connections import BUSY_TIMEOUT_S
 from service.store.sqlite.file import is_of_the_data
 
 EVERY = 1_000_000
-NULL_QUIRK = "NULL value in "
-"""What SQLite before 3.41 finds in tables WITHOUT ROWID where nothing is wrong."""
+NULL_FINDING = "NULL value in "
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Something that is wrong.
+    """Defect of a database.
 
     Parameters
     ----------
@@ -36,13 +35,13 @@ class Finding:
     detail: str
 
 
-def findings(path: Path, told: Callable[[float], None] = lambda _: None) -> Iterator[Finding]:
-    """Read a database from end to end, also while padwatch writes to it; what is wrong with it.
+def findings(path: Path, progress: Callable[[float], None] = lambda _: None) -> Iterator[Finding]:
+    """Check a database completely, also while padwatch writes to it; yield its defects.
 
     Parameters
     ----------
-    told
-        Called with the share that has been done.
+    progress
+        Receives the completed fraction.
 
     Raises
     ------
@@ -51,7 +50,7 @@ def findings(path: Path, told: Callable[[float], None] = lambda _: None) -> Iter
     """
     if not path.exists():
         raise StoreError(f"{path.absolute()}: there is no database")
-    said = _mark_beside(path)  # first: it may lag, but not lead
+    in_file = _mark_beside(path)  # read first: it may lag behind, but not lead
     log = DamageLog(EVERY)
     seals = Seals(log)
     uri = f"{path.absolute().as_uri()}?mode=ro"
@@ -59,17 +58,17 @@ def findings(path: Path, told: Callable[[float], None] = lambda _: None) -> Iter
         with closing(
             sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None)
         ) as reader:
-            mark = _mark_inside(reader)  # now: a running service moves both on
-            yield from _structure(reader)
+            mark = _mark_inside(reader)  # now: a running service changes both
+            yield from (Finding("structure", each) for each in structure_findings(reader))
             seals.know(reader)
-            _look_at_rows(reader, seals, log, told)
+            _look_at_rows(reader, seals, log, progress)
             mark = mark or select_mark(reader)
             if mark is not None:
-                for found in compared(said, mark, host_id()):
+                for found in compared(in_file, mark, host_id()):
                     yield Finding("high_water", found.detail)
     except (sqlite3.Error, UnicodeDecodeError) as error:
-        yield Finding("structure", f"cannot be read any further: {error}")
-    yield from _said(log)
+        yield Finding("structure", f"cannot be read further: {error}")
+    yield from _damage(log)
 
 
 def _mark_beside(path: Path) -> Mark | str:
@@ -83,29 +82,38 @@ def _mark_inside(reader: sqlite3.Connection) -> Mark | None:
     try:
         return select_mark(reader)
     except (sqlite3.Error, UnicodeDecodeError):
-        return None  # asked again at the end: damage elsewhere is told all the same
+        return None  # read again at the end, after other damage was reported
 
 
-def _structure(reader: sqlite3.Connection) -> Iterator[Finding]:
-    for (line,) in reader.execute(f"PRAGMA integrity_check({EVERY})"):
-        if line != "ok" and not line.startswith(NULL_QUIRK):
-            yield Finding("structure", line)
+def structure_findings(connection: sqlite3.Connection) -> Iterator[str]:
+    """Yield structural defects; SQLite before 3.41 reports false nulls in WITHOUT ROWID tables."""
+    nulls = set()
+    for (finding,) in connection.execute(f"PRAGMA integrity_check({EVERY})"):
+        if finding.startswith(NULL_FINDING):
+            nulls.add(finding)
+        elif finding != "ok":
+            yield finding
+    for finding in sorted(nulls):
+        table, _, column = finding.removeprefix(NULL_FINDING).partition(".")
+        is_null = f'SELECT 1 FROM "{table}" WHERE typeof("{column}") = \'null\' LIMIT 1'  # noqa: S608
+        if connection.execute(is_null).fetchone() is not None:
+            yield finding
 
 
 def _look_at_rows(
-    reader: sqlite3.Connection, seals: Seals, log: DamageLog, told: Callable[[float], None]
+    reader: sqlite3.Connection, seals: Seals, log: DamageLog, progress: Callable[[float], None]
 ) -> None:
     tables = list(seals.tables.values())
     for done, table in enumerate(tables):
-        told(done / len(tables))
+        progress(done / len(tables))
         for walk in walks(table):
             after: Key | None = None
             while (after := walk.page(reader, log, after)) is not None:
                 pass
-    told(1.0)
+    progress(1.0)
 
 
-def _said(log: DamageLog) -> Iterator[Finding]:
+def _damage(log: DamageLog) -> Iterator[Finding]:
     for is_missing, kind in ((True, "missing"), (False, "altered")):
         for place in log.places:
             if place.is_missing == is_missing:
@@ -113,11 +121,11 @@ def _said(log: DamageLog) -> Iterator[Finding]:
 
 
 ROWS_AT_ONCE = 500
-"""A few milliseconds, after which the log beside the file may be brought into it."""
+"""Rows per transaction of a few milliseconds, after which the log can be moved into the file."""
 
 HEX = "hex"
 REMEMBER_EVERY = 300
-"""Looks, after which it is written down how far it has come."""
+"""Number of steps after which the progress is written."""
 
 RECALL = "SELECT place FROM main.seal_walk WHERE id = 1"
 REMEMBER = """
@@ -126,12 +134,12 @@ REMEMBER = """
 
 
 class Scrubber:
-    """Goes on, also after a restart, where it has been last; used by one thread at a time.
+    """Checks all rows in turn and resumes after a restart; used by one thread at a time.
 
     Parameters
     ----------
     damage
-        Is told of rows that are altered or gone.
+        Receives altered and missing rows.
     """
 
     def __init__(self, database: Database, seals: Seals, damage: DamageLog) -> None:
@@ -142,7 +150,7 @@ class Scrubber:
         self._n_looks = 0
 
     def look_on(self) -> bool:
-        """Look at some rows; whether that was once around.
+        """Check some rows; return whether all rows have been checked once.
 
         Raises
         ------
@@ -170,7 +178,7 @@ class Scrubber:
             if isinstance(error, StoreError) and not is_of_the_data(error.__cause__):
                 raise
             what = repr(str(error.__cause__ or error)[:80])
-            self._damage.note(Place(walk.table.name, f"cannot be read any further: {what}"))
+            self._damage.note(Place(walk.table.name, f"cannot be read further: {what}"))
             return None
 
     def _recall(self) -> None:
@@ -179,14 +187,14 @@ class Scrubber:
 
     def _remember(self) -> None:
         walk = self._walks[self._number]
-        after = None if self._after is None else [_told(cell) for cell in self._after]
+        after = None if self._after is None else [_json_cell(cell) for cell in self._after]
         written = json.dumps([walk.table.name, walk.is_of_seals, after])
         with self._database.writing() as writer:
             writer.execute(REMEMBER, (written,))
 
 
 def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
-    """Where to go on; at the beginning if nobody knows, for nothing depends on it."""
+    """Return where to resume; the beginning if that is unknown."""
     row = reader.execute(RECALL).fetchone()
     try:
         name, is_of_seals, after = json.loads(row[0]) if row else (None, False, None)
@@ -198,7 +206,7 @@ def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
     return 0, None
 
 
-def _told(cell: Any) -> Any:
+def _json_cell(cell: Any) -> Any:
     """A cell of a key as JSON can hold it; the keys of sessions are bytes."""
     return {HEX: cell.hex()} if isinstance(cell, bytes) else cell
 

@@ -14,12 +14,12 @@ from service.store.sqlite.file import leaves_in_doubt
 BUSY_TIMEOUT_S = 5.0
 N_KEPT = 4
 LOOK_AFTER_STEPS = 20_000
-"""Steps of the database's machine, some tens of microseconds, after which a read looks whether
-anybody still waits for it."""
+"""Instructions of SQLite, some tens of microseconds, after which a read checks whether its client
+still waits."""
 
 CLOCK = SystemClock()
 LONGEST_S = 120.0
-"""A read that takes longer is ended: while it lasts, the log beside the file only grows."""
+"""Maximum duration of a read, during which the log beside the file only grows."""
 
 
 class Readers:
@@ -28,11 +28,11 @@ class Readers:
     Parameters
     ----------
     now_s
-        Clock that only goes forward.
+        Monotonic clock.
     prepare
-        Makes a new connection fit for reading.
+        Prepares a new connection for reading.
     require
-        Raises where the file is no longer the one that was opened.
+        Raises an error if the file is no longer the one that was opened.
     """
 
     def __init__(
@@ -50,11 +50,11 @@ class Readers:
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
-        """Borrow a connection; one with which something went wrong is not used again."""
+        """Borrow a connection; one that raised an error is not used again."""
         reader = self._taken()
         try:
-            reader.set_progress_handler(self._is_in_vain(), LOOK_AFTER_STEPS)
-            reader.execute("BEGIN")  # one state of the database until the end
+            reader.set_progress_handler(self._should_end(), LOOK_AFTER_STEPS)
+            reader.execute("BEGIN")  # one state of the database for the whole read
             yield reader
             reader.set_progress_handler(None, 0)
             if reader.in_transaction:
@@ -65,14 +65,14 @@ class Readers:
         self._put_back(reader)
 
     def close(self) -> None:
-        """Close those that are not in use now, and the others as they are given back."""
+        """Close idle connections now, and the others when they are returned."""
         with self._lock:
             self._is_closed = True
             idle, self._idle = self._idle, []
         for reader in idle:
             reader.close()
 
-    def _is_in_vain(self) -> Callable[[], bool]:
+    def _should_end(self) -> Callable[[], bool]:
         """Whether a read that begins now should end: by the asker, or by time."""
         asker, end_s = ASKER.get(), self._now_s() + LONGEST_S
         return lambda: self._now_s() > end_s or (asker is not None and asker.has_gone)
@@ -104,11 +104,11 @@ class Readers:
 
 
 MAX_LOG_BYTES = 67_108_864
-"""Of the ``-wal`` file; one that has grown while somebody read for long is cut to it."""
+"""Size to which the ``-wal`` file is cut after a long read let it grow."""
 
 MIN_FREE_PAGES = 2000
 MIN_FREE_SHARE = 0.1
-"""Less free room than that is used again soon."""
+"""Less free space than this is soon used again."""
 
 PAGES_AT_ONCE = 200
 
@@ -117,20 +117,20 @@ ONLY_THEN = 2
 
 
 class Writer:
-    """Writes to a file that is up to date; used by one thread at a time, under `lock`.
+    """Writing connection to an upgraded file; used by one thread at a time, under `lock`.
 
-    A sync that fails is not tried again: the system may have dropped what was to be written and
-    say that all is well. The connection is closed, and before the next transaction the file is
-    opened anew and compared with the high-water mark beside it.
+    A failed sync is not repeated: the system may have dropped the data and report success. The
+    connection is closed, and before the next transaction the file is opened again and compared with
+    the high-water mark beside it.
 
     Parameters
     ----------
     connection
-        Open.
+        Open connection.
     marks
-        Whether it is the database that was here last.
+        High-water mark.
     prepare
-        Makes a connection fit for writing, within a transaction.
+        Prepares a connection for writing, within a transaction.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ class Writer:
         set_up(connection)
 
     def close(self) -> None:
-        """Release the file; closing twice is fine."""
+        """Close the connection; closing twice has no effect."""
         self.connection.close()
 
     @contextmanager
@@ -163,9 +163,9 @@ class Writer:
             raise
 
     def give_back(self) -> bool:
-        """Cut some free pages off the end of the file; whether there are more.
+        """Cut some free pages off the end of the file; return whether there are more.
 
-        A file that an older padwatch has made keeps them for itself, and uses them again.
+        A file created by an older padwatch keeps its free pages for reuse.
         """
         if self._number("auto_vacuum") != ONLY_THEN:
             return False
@@ -180,17 +180,17 @@ class Writer:
 
     def _reopen(self) -> None:
         self.connection.close()
-        said = self._marks.said()
+        in_file = self._marks.said()
         self.connection = opened(self._path)
         set_up(self.connection)
         with _begun(self.connection):
-            self._marks.open(self.connection, said)
+            self._marks.open(self.connection, in_file)
             self._prepare(self.connection)
         self._is_in_doubt = False
 
 
 def opened(path: Path) -> sqlite3.Connection:
-    """A connection that may write, and can be used by any thread."""
+    """Return a connection that may write and can be used by any thread."""
     return sqlite3.connect(
         path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False
     )
@@ -212,6 +212,6 @@ def _begun(connection: sqlite3.Connection) -> Iterator[None]:
         yield
         connection.execute("COMMIT")
     finally:
-        # a full disk has rolled back already; a refused commit leaves the transaction open
+        # a full disk rolls back by itself; a refused commit leaves the transaction open
         if connection.in_transaction:
             connection.execute("ROLLBACK")

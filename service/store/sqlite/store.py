@@ -22,18 +22,18 @@ from service.store.store import Store
 
 
 class SqliteStore(Store):
-    """One database file; may be used from several threads, writes are taken one at a time.
+    """Store in one database file; used from several threads, with one writer at a time.
 
     Parameters
     ----------
     path
-        Created, with its folder, if it does not exist.
+        Path of the file; created, with its folder, if missing.
     origin
-        What it is to hold; a file that holds the other is refused.
+        Origin of its data; a file with data of the other origin is refused.
     address
-        Who is to be told of events of alarms.
+        Function that returns the messages about an event of an alarm.
     spectra
-        How many spectra are kept.
+        Limits of stored spectra.
 
     Raises
     ------
@@ -73,24 +73,24 @@ class SqliteStore(Store):
 
     @property
     def _writer(self) -> sqlite3.Connection:
-        """The connection that writes now; another one after an error of the disk."""
+        """Current writing connection; replaced after an error of the disk."""
         return self._file.writer.connection
 
     @property
     def _lock(self) -> Lock:
-        """Held while somebody writes."""
+        """Lock of the writing connection."""
         return self._file.writer.lock
 
 
 def file_trail(database: Path) -> Trail:
-    """Trail of a database file, which is opened as it is read."""
+    """Return the audit trail of a database file; it is opened, but not changed, when it is read."""
     return Trail(partial(_opened, database), head_path(database))
 
 
 @contextmanager
 def _opened(database: Path) -> Iterator[sqlite3.Connection]:
     if not database.exists():
-        raise StoreError(f"{database.absolute()}: there is no database")
+        raise StoreError(f"{database.absolute()}: the database does not exist")
     uri = f"{database.absolute().as_uri()}?mode=ro"
     try:
         with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as reader:
@@ -101,5 +101,5 @@ def _opened(database: Path) -> Iterator[sqlite3.Connection]:
 
 
 def _exact(text: bytes) -> str:
-    """Text that tells every byte from every other, also where it is not UTF-8."""
+    """Decode text so that every byte stays distinguishable, also where it is not UTF-8."""
     return text.decode("utf-8", "surrogateescape")

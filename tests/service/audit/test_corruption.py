@@ -170,11 +170,11 @@ ALTERED: list[tuple[str, str]] = [
     ("DELETE FROM audit", "entries 1 to 9 are missing at the end: the head names 9"),
     (
         "DELETE FROM audit WHERE number = 3; UPDATE audit SET number = 3 WHERE number = 8",
-        "entry 3 is out of order: what stands there is entry 8",
+        "entry 3 is out of order: it holds entry 8",
     ),
     (
         "UPDATE audit SET number = 0 WHERE number = 3",
-        "entry 0 stands where entry 1 belongs",
+        "entry 0 is in the place of entry 1",
     ),
 ]
 

@@ -109,7 +109,7 @@ def test_roles_and_passwords_change_and_accounts_go(
 @pytest.mark.parametrize(
     ("arguments", "password", "said"),
     [
-        (("add", "anna"), PASSWORD, "there is an account anna already"),
+        (("add", "anna"), PASSWORD, "account anna already exists"),
         (("add", "=anna"), PASSWORD, "a name has 1 to 64"),
         (("add", "berta"), "short", "a password has 12 to 256 characters"),
         (("add", "berta"), b"\xff" * 12, "no UTF-8 text"),

@@ -94,7 +94,7 @@ async def test_what_cannot_be_deleted_is_told_once(old: OldStore, retaining: Ret
         for _ in range(3):
             await retaining.round()
 
-    assert [line["event"] for line in lines] == ["some of what is old cannot be deleted"]
+    assert [line["event"] for line in lines] == ["some old data cannot be deleted"]
 
 
 async def test_a_clock_that_is_years_ahead_or_less_than_a_day_of_results_makes_nothing_old(

@@ -60,7 +60,7 @@ def test_an_older_database_is_told_with_what_is_missing_and_since_when() -> None
 @pytest.mark.parametrize(
     ("changes", "kind", "said"),
     [
-        ({"nonce": "another"}, Kind.ROLLED_BACK, "transaction 150 is another one"),
+        ({"nonce": "another"}, Kind.ROLLED_BACK, "transaction 150 differs from"),
         (
             {"store": "00" * 16, "n_commits": 7},
             Kind.REPLACED,

@@ -27,7 +27,7 @@ def test_a_server_that_does_not_run_is_named(tmp_path: Path) -> None:
     said = refused(PostgresAddress(f"host={tmp_path} dbname=padwatch user=p"))
 
     assert said.startswith(f"PostgreSQL database padwatch at {tmp_path}: ")
-    assert said.endswith("see whether PostgreSQL runs and can be reached; it is tried again")
+    assert said.endswith("check that PostgreSQL runs and can be reached; padwatch retries")
 
 
 def test_a_database_or_a_role_that_is_not_there_is_said(postgres_server: PostgresServer) -> None:
@@ -43,7 +43,7 @@ def test_a_database_or_a_role_that_is_not_there_is_said(postgres_server: Postgre
     [
         (b"wrong", 0o600, "password authentication failed"),
         (b"", 0o600, "password_file"),
-        (b"x", 0o640, "can be read by others: chmod 600 it"),
+        (b"x", 0o640, "is readable by others: chmod 600 it"),
     ],
 )
 def test_a_wrong_password_is_refused_and_not_shown(
@@ -121,7 +121,7 @@ def test_a_standby_is_refused(own_place: PostgresPlace) -> None:
         (server.data / "standby.signal").unlink()
         server.start()
 
-    assert "is a standby, which only reads: name the primary" in said
+    assert "is a read-only standby: name the primary" in said
 
 
 def test_a_reader_can_write_nothing(postgres_store: PostgresStore) -> None:
@@ -139,7 +139,7 @@ def test_a_query_that_takes_too_long_ends_with_a_sentence(
         "service.store.postgres.database.READER_SETTINGS", "SET statement_timeout = '20ms';"
     )
     with (
-        pytest.raises(StoreError, match="it took too long: the database is too slow"),
+        pytest.raises(StoreError, match="the query timed out: the database is too slow"),
         postgres_store.database.reading() as reader,
     ):
         reader.execute("SELECT pg_sleep(10)")

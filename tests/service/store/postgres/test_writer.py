@@ -85,7 +85,7 @@ def test_a_stop_in_the_middle_of_a_transaction_leaves_nothing_of_it(
     own_store: PostgresStore, own_place: PostgresPlace
 ) -> None:
     with (  # noqa: PT012
-        pytest.raises(StoreError, match="it is tried again"),
+        pytest.raises(StoreError, match="padwatch retries"),
         own_store.database.writing() as w,
     ):
         w.execute("INSERT INTO series (unit, bearing) VALUES (?, ?)", ("U1", "UJB"))
