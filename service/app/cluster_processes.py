@@ -39,7 +39,7 @@ from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.processes import StreamSettings
 from service.settings.storage import Origin
-from service.store.holds import only_one
+from service.store.holds import exclusive_use
 from service.store.sharing import StreamPosition
 
 DRAIN_S = 3.0
@@ -151,7 +151,7 @@ async def run_analyse(
     around = Around(live)
     with ExitStack() as stack:
         if plant.store.postgresql is None:
-            stack.enter_context(only_one(database_path(plant)))
+            stack.enter_context(exclusive_use(database_path(plant)))
         store = open_store(part, Origin.LIVE, router_of(part, Origin.LIVE, around, clock))
         stack.callback(store.close)
         ground = Ground(

@@ -36,11 +36,11 @@ from service.notifications.sender import Deliveries
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import Tape
 from service.recordings.keeper import WaveformKeeper
-from service.reports.keeper import EvidenceKeeper
+from service.reports.keeper import EvidenceCollector
 from service.runtime.disk import SpaceWatch
 from service.runtime.heartbeats import Loop
 from service.settings.storage import Origin
-from service.store.loops import Retaining, Rolling, Scrubbing
+from service.store.loops import RetentionLoop, RollupLoop, ScrubLoop
 from service.store.retention import ages_of
 
 
@@ -58,10 +58,10 @@ class Analysis:
     recordings: WaveformKeeper
     alarms: AlarmEngine
     films: FilmKeeper
-    evidence: EvidenceKeeper
+    evidence: EvidenceCollector
     references: ReferencesInForce
-    rolling: Rolling
-    retaining: Retaining
+    rolling: RollupLoop
+    retaining: RetentionLoop
     space: SpaceWatch
     load: LoadWatch
     soundness: Soundness
@@ -99,7 +99,7 @@ class Analysis:
         loops: dict[str, Loop] = {"gather": self.rolling.run}
         if self.ground.origin is Origin.LIVE:
             loops["retain"] = self.retaining.run
-            loops["scrub"] = Scrubbing(self.ground.store.integrity, self.ground.clock).run
+            loops["scrub"] = ScrubLoop(self.ground.store.integrity, self.ground.clock).run
         return loops
 
     async def close(self) -> None:
@@ -201,8 +201,8 @@ async def analysis_on(
         films=films,
         evidence=evidence,
         references=references,
-        rolling=Rolling(store.rollups, clock),
-        retaining=Retaining(store.retention, ages_of(plant.retention), clock),
+        rolling=RollupLoop(store.rollups, clock),
+        retaining=RetentionLoop(store.retention, ages_of(plant.retention), clock),
         space=space,
         load=load,
         soundness=soundness,

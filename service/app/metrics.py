@@ -35,7 +35,7 @@ from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import Tape
 from service.recordings.keeper import WaveformKeeper
 from service.recordings.metrics import recording_metrics
-from service.reports.keeper import EvidenceKeeper
+from service.reports.keeper import EvidenceCollector
 from service.runtime.disk import SpaceWatch
 from service.runtime.metrics import counter, gauge
 from service.runtime.polls import TimedSource
@@ -71,7 +71,7 @@ class Watched:
     alarms: AlarmEngine
     films: FilmKeeper
     captures: Captures
-    evidence: EvidenceKeeper
+    evidence: EvidenceCollector
     deliveries: Deliveries
     timings: Timings
     clock: Clock
@@ -131,7 +131,7 @@ async def scrape(watched: Watched) -> Scrape:
         return Scrape(watched, None)
 
 
-def evidence_metrics(captures: Captures, evidence: EvidenceKeeper) -> Iterator[Metric]:
+def evidence_metrics(captures: Captures, evidence: EvidenceCollector) -> Iterator[Metric]:
     """Yield the families of captures and evidence."""
     counts = (
         ("captures_written", "Captures of samples around alarms.", captures.n_written),

@@ -24,7 +24,7 @@ from service.runtime.process import stop_on_signals
 from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
-from service.store.holds import only_one
+from service.store.holds import exclusive_use
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ async def run_service(
     plant, origin = performance.plant, performance.origin
     live = live_view(plant, clock)
     around = Around(live)
-    with only_one(database_path(plant)):
+    with exclusive_use(database_path(plant)):
         store = open_store(plant, origin, router_of(plant, origin, around, clock))
         beats, timings = Heartbeats(clock), Timings(performance.units, clock)
         ground = Ground(plant, origin, clock, store, live, beats, timings)

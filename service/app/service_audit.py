@@ -17,7 +17,7 @@ from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.configuration import built_from, configuration_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
-from service.store.access.audit_entries import AuditEntry, Deed
+from service.store.access.audit_entries import AuditAction, AuditEntry
 from service.store.audit import AuditQuery, AuditStore
 from service.store.port import StoreError
 
@@ -45,7 +45,7 @@ class Release:
     origin: str
 
 
-def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[Deed]:
+def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[AuditAction]:
     """Return the entries of a start; a changed configuration has its own entry before it.
 
     Parameters
@@ -54,15 +54,15 @@ def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) ->
         Newest entry of a start; None if there is none.
     """
     before = _configuration_of(last_start)
-    started = Deed(now_ns, PADWATCH, STARTED, SERVICE, after=vars(release))
+    started = AuditAction(now_ns, PADWATCH, STARTED, SERVICE, after=vars(release))
     if before is None or before == release.configuration:
         return [started]
     versions = ({CONFIGURATION: before}, {CONFIGURATION: release.configuration})
-    changed = Deed(now_ns, PADWATCH, CHANGED, CONFIGURATION, *versions)
+    changed = AuditAction(now_ns, PADWATCH, CHANGED, CONFIGURATION, *versions)
     return [changed, started]
 
 
-def stop_deed(release: Release, refusals: int, now_ns: int) -> Deed:
+def stop_deed(release: Release, refusals: int, now_ns: int) -> AuditAction:
     """Return the entry of a stop.
 
     Parameters
@@ -71,12 +71,12 @@ def stop_deed(release: Release, refusals: int, now_ns: int) -> Deed:
         Refused requests without an entry of their own since the last one with an entry.
     """
     after = {"n_refused_more": refusals} if refusals else None
-    return Deed(now_ns, PADWATCH, STOPPED, SERVICE, before=vars(release), after=after)
+    return AuditAction(now_ns, PADWATCH, STOPPED, SERVICE, before=vars(release), after=after)
 
 
-def step_deed(step_s: float, now_ns: int) -> Deed:
+def step_deed(step_s: float, now_ns: int) -> AuditAction:
     """Return the entry of a step of the host's clock; `now_ns` is the time after the step."""
-    return Deed(now_ns, PADWATCH, STEPPED, CLOCK, after={"by_s": round(step_s, 3)})
+    return AuditAction(now_ns, PADWATCH, STEPPED, CLOCK, after={"by_s": round(step_s, 3)})
 
 
 def _configuration_of(start: AuditEntry | None) -> str | None:

@@ -36,7 +36,7 @@ from service.measuring.acquirer import Bus
 from service.measuring.commands import InProcess
 from service.measuring.references_in_force import ReferencesInForce
 from service.measuring.timings import Timings
-from service.reports.routes import EvidenceDesk
+from service.reports.routes import EvidenceService
 from service.runtime.heartbeats import Heartbeats
 from service.runtime.polls import TimedSource
 from service.runtime.process import stop_on_signals
@@ -99,7 +99,7 @@ def serving_of(
     listener: socket.socket,
     desk: AccessDesk,
     announce: Callable[[str], None],
-    evidence: EvidenceDesk | None = None,
+    evidence: EvidenceService | None = None,
 ) -> Serving:
     """Build the server of a context; the OpenAPI document is rendered once, after the start."""
     app = application(context, evidence)

@@ -22,11 +22,11 @@ from service.recordings.retention import Caretaker, Custody, Gauge, RoomLimits
 from service.recordings.segment import MakeWriter, TapeSettings
 from service.reports.archive import EvidenceArchive
 from service.reports.capture_link import captures_in_use
-from service.reports.keeper import EvidenceFolders, EvidenceKeeper
+from service.reports.keeper import EvidenceCollector, EvidenceFolders
 from service.reports.maker import Maker
-from service.reports.room import EvidenceLimits, EvidenceRoom
-from service.reports.routes import EvidenceDesk
-from service.reports.snapshot import Camera
+from service.reports.room import EvidenceLimits, EvidenceRetention
+from service.reports.routes import EvidenceService
+from service.reports.snapshot import SnapshotTaker
 from service.reports.writer import EvidenceWriter
 from service.runtime.disk import SpaceLimits, SpaceWatch, measure_disk
 from service.settings.adapter_values import recorded_unit
@@ -200,11 +200,11 @@ def evidence_folders(plant: PlantFile) -> EvidenceFolders:
 
 
 def evidence_desk(
-    plant: PlantFile, store: Store, keeper: EvidenceKeeper, clock: Clock, downloads: Downloads
-) -> EvidenceDesk:
+    plant: PlantFile, store: Store, keeper: EvidenceCollector, clock: Clock, downloads: Downloads
+) -> EvidenceService:
     """Build the service that hands out evidence."""
     archive = EvidenceArchive(evidence_folders(plant), store)
-    return EvidenceDesk(archive, keeper, plant.evidence.trend_days, clock, downloads)
+    return EvidenceService(archive, keeper, plant.evidence.trend_days, clock, downloads)
 
 
 def evidence_of(
@@ -215,18 +215,20 @@ def evidence_of(
     store: Store,
     captures: Captures,
     clock: Clock,
-) -> EvidenceKeeper:
+) -> EvidenceCollector:
     """Build the collector of evidence; `watch` connects it to the alarms."""
     limits, folders = limits_of(plant), evidence_folders(plant)
     configuration = built_configuration(plant)
     maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
     writer = EvidenceWriter(folders.evidence, maker, store.films, limits)
-    camera = Camera({unit.id: unit for unit in plant.unit}, live, films)
-    room = EvidenceRoom(folders.evidence, limits, clock)
-    return EvidenceKeeper(folders, camera, writer, room, configuration, captures, clock)
+    camera = SnapshotTaker({unit.id: unit for unit in plant.unit}, live, films)
+    room = EvidenceRetention(folders.evidence, limits, clock)
+    return EvidenceCollector(folders, camera, writer, room, configuration, captures, clock)
 
 
-def watch(keeper: EvidenceKeeper, alarms: AlarmEngine, captures: Captures, origin: Origin) -> None:
+def watch(
+    keeper: EvidenceCollector, alarms: AlarmEngine, captures: Captures, origin: Origin
+) -> None:
     """Connect the collector of evidence to the alarms; a replay collects no evidence."""
     if origin is Origin.LIVE:
         alarms.show(keeper.see)

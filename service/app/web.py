@@ -22,7 +22,7 @@ from service.api.http.server import GuardedServer
 from service.api.problems import refuse_unknown_parameters
 from service.dashboard.assets import edition
 from service.dashboard.routes import dashboard_router
-from service.reports.routes import EvidenceDesk, evidence_router
+from service.reports.routes import EvidenceService, evidence_router
 from service.settings.plant import PlantFile
 from service.settings.processes import Doorway, is_loopback, why_closed
 from service.store.access.identities import Role, SessionLimits
@@ -116,7 +116,7 @@ def access_desk(
     return AccessDesk(store, clock, local_role, limits=limits)
 
 
-def application(context: Context, evidence: EvidenceDesk | None = None) -> GuardedApi:
+def application(context: Context, evidence: EvidenceService | None = None) -> GuardedApi:
     """Build the application.
 
     Parameters

@@ -35,7 +35,7 @@ def verify(
         verdict = trail.verify()
     except StoreError as error:
         fail(f"padwatch audit verify: {error}")
-    told = [number for number in verdict.told if number not in (known or [])]
+    told = [number for number in verdict.contradictions if number not in (known or [])]
     is_whole = verdict.is_whole and not told
     if json_output:
         document = {"is_whole": is_whole, **asdict(verdict), "told": told}

@@ -19,7 +19,7 @@ from service.cli.offline.backtest_files import SUFFIXES, ReadingsFile, stored_hi
 from service.cli.options import PlantPath, fail, read_plant_file
 from service.settings.core_values import watched_estimator
 from service.settings.plant import PlantFile
-from service.store.backup import AccessAfter, BackupError, access_before, back_up, take_back
+from service.store.backup import AccessAfter, BackupError, access_before, back_up, revoke_again
 from service.store.backup import restore as put_back
 from service.store.films import FilmStore
 from service.store.port import StoreError
@@ -75,7 +75,7 @@ def restore(
     except BackupError as error:
         fail(f"padwatch restore: {error}")
     with access_of(plant, "padwatch restore") as restored:
-        after = take_back(restored, access, now_ns)
+        after = revoke_again(restored, access, now_ns)
     before = None if done.before is None else str(done.before)
     found = {"database": str(done.database), "before": before, "schema": done.content.schema}
     if json_output:

@@ -7,7 +7,7 @@ import structlog
 from acquisition.clock import Clock
 from service.live.live_view import LiveView
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.store.access.audit_entries import Deed
+from service.store.access.audit_entries import AuditAction
 from service.store.port import StoreError
 from service.store.seals import Place
 from service.store.store import Store
@@ -109,8 +109,8 @@ class Soundness:
             self._told.update(news)
             log.error("stored rows are damaged", n_rows=len(news), first=str(news[0]))
 
-    def _deed(self, place: Place) -> Deed:
-        return Deed(
+    def _deed(self, place: Place) -> AuditAction:
+        return AuditAction(
             time_ns=self._clock.now_ns(),
             actor="padwatch",
             action="store.row_damaged",

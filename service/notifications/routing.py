@@ -9,7 +9,7 @@ from core.alarms.alarm import Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.limits import AlarmLevel
 from core.units import NS_PER_S
 from service.notifications.message import Composer, dumps
-from service.store.outbox import Letter
+from service.store.outbox import OutboxMessage
 
 ACTIVE = (AlarmState.UNACKNOWLEDGED, AlarmState.ACKNOWLEDGED)
 HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
@@ -92,7 +92,7 @@ class Router:
     ) -> None:
         self._routes, self._composer, self._now_ns = routes, composer, now_ns
 
-    def __call__(self, alarm: Alarm, event: AlarmEvent) -> Iterable[Letter]:
+    def __call__(self, alarm: Alarm, event: AlarmEvent) -> Iterable[OutboxMessage]:
         """Letters that tell of an event, one for each receiver that wants to know."""
         told = telling(alarm, event)
         found = [(r, one) for r in self._routes if told and (one := _for(r, event, told))]
@@ -102,7 +102,7 @@ class Router:
         message = self._composer.alarm(alarm, event, told.is_active, now_ns)
         body = dumps(message)
         return [
-            Letter(
+            OutboxMessage(
                 receiver=route.receiver,
                 event_id=message["id"],
                 body=body,

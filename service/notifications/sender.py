@@ -16,7 +16,7 @@ from service.notifications.channel import Carrier, Delivered, Failed, Outcome
 from service.notifications.message import loads
 from service.notifications.routing import QuietHours
 from service.runtime.heartbeats import UNHEARD, Heartbeats, Pulse
-from service.store.outbox import Backlog, LetterState, Outbox, StoredLetter
+from service.store.outbox import Backlog, MessageState, Outbox, StoredMessage
 from service.store.port import StoreError
 
 FIRST_S = 1.0
@@ -164,7 +164,7 @@ class Sender:
             return False
         return not await self._kept(lambda: self._outbox.urgent(self.receiver.name))
 
-    async def _deliver(self, letter: StoredLetter) -> bool:
+    async def _deliver(self, letter: StoredMessage) -> bool:
         """Try a letter once; return whether the receiver is done with it."""
         self._note(SenderState.SENDING)
         self._pulse.beat(MAX_CARRY_S)
@@ -175,10 +175,10 @@ class Sender:
         await self._finish(letter, outcome)
         return True
 
-    async def _finish(self, letter: StoredLetter, outcome: Outcome) -> None:
+    async def _finish(self, letter: StoredMessage, outcome: Outcome) -> None:
         """Write down what has come of it, also if the service is being stopped meanwhile."""
         is_delivered = isinstance(outcome, Delivered)
-        state = LetterState.DELIVERED if is_delivered else LetterState.REFUSED
+        state = MessageState.DELIVERED if is_delivered else MessageState.REFUSED
         now_ns = self._clock.now_ns()
         await self._kept(
             lambda: self._outbox.finish(letter.id, state, outcome.answer, now_ns), to_the_end=True
@@ -189,7 +189,7 @@ class Sender:
             tell(words, receiver=self.receiver.name, id=letter.event_id, answer=outcome.answer)
         self.status = SenderStatus(SenderState.SENDING)
 
-    async def _wait_after(self, letter: StoredLetter, failed: Failed) -> None:
+    async def _wait_after(self, letter: StoredMessage, failed: Failed) -> None:
         now_ns, before = self._clock.now_ns(), self.status
         if before.n_failures == 0:
             log.warning("not delivered", receiver=self.receiver.name, reason=failed.answer)

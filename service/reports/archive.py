@@ -70,7 +70,7 @@ class Occurrence:
 
 
 class EvidenceArchive:
-    """Reads what `EvidenceKeeper` has written; every method belongs into a thread."""
+    """Reads what `EvidenceCollector` has written; every method belongs into a thread."""
 
     def __init__(self, folders: EvidenceFolders, store: Store) -> None:
         self.folders, self._store = folders, store

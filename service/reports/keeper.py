@@ -1,4 +1,4 @@
-"""`EvidenceKeeper`: a bundle for every occurrence of an alarm, without ever being in the way."""
+"""`EvidenceCollector`: a bundle for every occurrence of an alarm, without ever being in the way."""
 
 import asyncio
 import os
@@ -17,8 +17,8 @@ from service.live.alarm_board import EvidenceStatus
 from service.recordings.around_alarms import Captures, Outcome
 from service.reports.capture_link import link, link_all, note_lost
 from service.reports.folders import clear_leftovers, note_beginning, place_of
-from service.reports.room import EvidenceRoom
-from service.reports.snapshot import Camera, Snapshot
+from service.reports.room import EvidenceRetention
+from service.reports.snapshot import Snapshot, SnapshotTaker
 from service.reports.writer import EvidenceWriter
 from service.runtime.files import write_whole
 from service.runtime.heartbeats import UNHEARD, Pulse
@@ -48,7 +48,7 @@ class EvidenceFolders:
     configurations: Path
 
 
-class EvidenceKeeper:
+class EvidenceCollector:
     """Takes snapshots on the event loop, and writes them in a thread of its own, oldest first.
 
     Attributes
@@ -62,9 +62,9 @@ class EvidenceKeeper:
     def __init__(
         self,
         folders: EvidenceFolders,
-        camera: Camera,
+        camera: SnapshotTaker,
         writer: EvidenceWriter,
-        room: EvidenceRoom,
+        room: EvidenceRetention,
         configuration: Configuration,
         captures: Captures,
         clock: Clock,

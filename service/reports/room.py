@@ -1,4 +1,4 @@
-"""`EvidenceRoom`: what bundles take of the disk, and which of them go when it is too much."""
+"""`EvidenceRetention`: what bundles take of the disk, and which of them go when it is too much."""
 
 import shutil
 from collections.abc import Iterable
@@ -50,7 +50,7 @@ class _Held:
     unit: str
 
 
-class EvidenceRoom:
+class EvidenceRetention:
     """Knows the size of every bundle, so that in a flood of alarms none costs a look at all.
 
     Lives in the thread that writes.

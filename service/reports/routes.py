@@ -30,7 +30,7 @@ from service.reports.archive import (
 )
 from service.reports.bundle import bundle_files
 from service.reports.document import Evidence
-from service.reports.keeper import EvidenceKeeper
+from service.reports.keeper import EvidenceCollector
 from service.reports.report.case import read_case
 from service.reports.report.page import POLICY, report_page
 from service.reports.tables import TableError
@@ -90,13 +90,13 @@ class Found:
     samples: SamplesState
 
 
-class EvidenceDesk:
+class EvidenceService:
     """Lists evidence, prints reports, hands out bundles."""
 
     def __init__(
         self,
         archive: EvidenceArchive,
-        keeper: EvidenceKeeper,
+        keeper: EvidenceCollector,
         trend_days: float,
         clock: Clock,
         downloads: Downloads,
@@ -195,7 +195,7 @@ SAFE = {"X-Content-Type-Options": "nosniff", "Referrer-Policy": "no-referrer"}
 log = structlog.get_logger()
 
 
-def evidence_router(context: Context, desk: EvidenceDesk | None) -> APIRouter:
+def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter:
     """Routes that show evidence, if any is kept; they change nothing."""
     router = APIRouter(
         prefix="/api/v1/alarms/{alarm}/evidence",
@@ -273,7 +273,7 @@ def evidence_router(context: Context, desk: EvidenceDesk | None) -> APIRouter:
     return router
 
 
-def _there(desk: EvidenceDesk | None) -> EvidenceDesk:
+def _there(desk: EvidenceService | None) -> EvidenceService:
     if desk is None:
         raise ProblemError(404, "No evidence", "no evidence is kept here")
     return desk
@@ -291,7 +291,7 @@ def _known(context: Context, alarm: str) -> str:
 
 
 async def _complete(
-    context: Context, desk: EvidenceDesk, alarm: str, occurrence: int
+    context: Context, desk: EvidenceService, alarm: str, occurrence: int
 ) -> Occurrence:
     """An occurrence whose evidence is there; otherwise say why it is not."""
     found = await desk.occurrence(_known(context, alarm), occurrence)

@@ -56,7 +56,7 @@ class Snapshot:
         return f"{self.event.identity.id} occurrence {self.event.occurrence}"
 
 
-class Camera:
+class SnapshotTaker:
     """Takes snapshots on the event loop; works in no time, since it only takes references."""
 
     def __init__(

@@ -17,10 +17,10 @@ from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
 from service.settings.alarm_kinds import ALARM_KINDS
-from service.store.access.audit_entries import Deed, Source
+from service.store.access.audit_entries import AuditAction, Source
 from service.store.audit import AuditChain
 from service.store.database import Connection, insert, upsert
-from service.store.outbox import Address, insert_letters, no_recipients
+from service.store.outbox import Address, insert_messages, no_recipients
 from service.store.port import AlarmQuery, StoredEvent, StoreError
 from service.store.sharing import DONE, answer_command
 from service.store.trends import BETWEEN_BOUNDS, IN_STATES, at_least, at_most, condition_arguments
@@ -67,8 +67,8 @@ def insert_alarms(
     for each in news:
         for event in each.events:
             if writer.execute(INSERT_EVENT, _event_row(event)).rowcount == 1:
-                insert_letters(writer, event, address(each.alarm, event))
-                audit.add(writer, _deeds(event, each))
+                insert_messages(writer, event, address(each.alarm, event))
+                audit.add(writer, _actions(event, each))
         writer.execute(UPSERT, _alarm_row(each.alarm))
         if each.command is not None:
             # in the same transaction: an unanswered command has changed nothing
@@ -86,7 +86,7 @@ def select_events(reader: Connection, query: AlarmQuery) -> list[StoredEvent]:
     return [StoredEvent(int(row[0]), _event(row[1:])) for row in rows]
 
 
-def _deeds(event: AlarmEvent, news: AlarmNews) -> list[Deed]:
+def _actions(event: AlarmEvent, news: AlarmNews) -> list[AuditAction]:
     """Return the audit entry of an event that a person caused; none for other events."""
     if not event.actor:
         return []
@@ -98,7 +98,7 @@ def _deeds(event: AlarmEvent, news: AlarmNews) -> list[Deed]:
         "occurrence": event.occurrence,
         **{name: asdict(hold) for name, hold in holds.items() if hold is not None},
     }
-    deed = Deed(
+    action = AuditAction(
         time_ns=event.time_ns,
         actor=event.actor,
         action=f"alarm.{event.change.value}",
@@ -109,7 +109,7 @@ def _deeds(event: AlarmEvent, news: AlarmNews) -> list[Deed]:
         source=Source.API,  # the only way to act on alarms
         peer=news.peer,
     )
-    return [deed]
+    return [action]
 
 
 def _arguments(query: AlarmQuery) -> dict[str, object]:

@@ -6,7 +6,7 @@ from dataclasses import asdict, astuple, dataclass, fields, replace
 from pathlib import Path
 from threading import Lock
 
-from service.store.access.audit_entries import FIRST, AuditEntry, Deed, chained
+from service.store.access.audit_entries import FIRST, AuditAction, AuditEntry, chained
 from service.store.access.audit_verification import (
     HEAD_DIFFERED,
     AuditHead,
@@ -87,16 +87,16 @@ class AuditChain:
             if self._is_due or self.head_error is not None:
                 self._update_head()
 
-    def add(self, writer: Connection, deeds: Iterable[Deed]) -> None:
+    def add(self, writer: Connection, actions: Iterable[AuditAction]) -> None:
         """Add entries within a transaction; the first one compares the head with the chain."""
-        for deed in deeds:
+        for action in actions:
             newest = newest_of(writer)
             if not self._is_due and self.head_error is None:
                 difference = self._difference(writer, newest)
                 if difference is not None:
-                    newest = _insert(writer, _head_differed(deed, newest, difference), newest)
+                    newest = _insert(writer, _head_differed(action, newest, difference), newest)
             self._is_due = True
-            _insert(writer, deed, newest)
+            _insert(writer, action, newest)
 
     def _difference(self, writer: Connection, newest: AuditHead) -> str | None:
         """Return how the head contradicts the chain; a head that lags behind does not."""
@@ -151,7 +151,7 @@ class AuditStore(AuditedTables):
         """Error of the last attempt to write the head file; None if it succeeded."""
         return self._audit.head_error
 
-    def record(self, deeds: Sequence[Deed]) -> None:
+    def record(self, actions: Sequence[AuditAction]) -> None:
         """Write entries about actions that change nothing in the store; durable on return.
 
         Raises
@@ -160,7 +160,7 @@ class AuditStore(AuditedTables):
             If they were not written.
         """
         with self._writing() as writer:
-            self._audit.add(writer, deeds)
+            self._audit.add(writer, actions)
 
     def entries(self, query: AuditQuery) -> list[AuditEntry]:
         """Return entries, newest first."""
@@ -252,15 +252,15 @@ def begin_head(path: Path) -> None:
         write_head(path, AuditHead())
 
 
-def _insert(writer: Connection, deed: Deed, newest: AuditHead) -> AuditHead:
-    entry = chained(deed, newest.number + 1, newest.hash)
+def _insert(writer: Connection, action: AuditAction, newest: AuditHead) -> AuditHead:
+    entry = chained(action, newest.number + 1, newest.hash)
     writer.execute(INSERT, astuple(entry))
     return AuditHead(entry.number, entry.hash)
 
 
-def _head_differed(deed: Deed, newest: AuditHead, why: str) -> Deed:
-    return Deed(
-        time_ns=deed.time_ns,
+def _head_differed(action: AuditAction, newest: AuditHead, why: str) -> AuditAction:
+    return AuditAction(
+        time_ns=action.time_ns,
         actor="padwatch",
         action=HEAD_DIFFERED,
         object="audit",

@@ -17,7 +17,7 @@ from service.runtime.files import create_private, put_in_place, sync_folder
 from service.settings.storage import Origin
 from service.store.access.identities import KeyState
 from service.store.access.tables import AccessStore
-from service.store.highwater.commits import adopt_copy
+from service.store.highwater.commits import adopt_restored
 from service.store.schema import MIGRATIONS
 from service.store.sqlite.checking import structure_findings
 from service.store.sqlite.migrating import APPLICATION_IDS
@@ -264,7 +264,7 @@ def _replace(copy: Path, database: Path, now_ns: int) -> Path | None:
             checked(aside)
             before = _keep(database, now_ns)
             put_in_place(aside, database)
-            adopt_copy(database)
+            adopt_restored(database)
         except BaseException:
             aside.unlink(missing_ok=True)
             raise
@@ -359,7 +359,7 @@ def access_before(database: Path) -> AccessBefore | None:
         return None
 
 
-def take_back(access: AccessStore, before: AccessBefore | None, now_ns: int) -> AccessAfter:
+def revoke_again(access: AccessStore, before: AccessBefore | None, now_ns: int) -> AccessAfter:
     """End all sessions of a copy, and revoke the keys that were revoked since it was made.
 
     Raises

@@ -7,7 +7,7 @@ from enum import StrEnum
 from core.baseline.baseline import BearingBaseline
 from core.change.shaft_response import ShaftResponse
 from core.machine.unit import Estimator
-from service.store.access.audit_entries import Deed, acting
+from service.store.access.audit_entries import AuditAction, acting
 from service.store.audit import AuditedTables
 from service.store.database import Connection, insert, upsert
 from service.store.documents import baseline_from_json, response_from_json, to_json
@@ -204,7 +204,7 @@ class BaselineTables(AuditedTables):
             raise StoreError(f"the response of a shaft: {error}") from error
 
     def _add_steps(self, writer: Connection, steps: Sequence[StoredStep]) -> None:
-        self._audit.add(writer, _deeds(writer, steps))
+        self._audit.add(writer, _actions(writer, steps))
         rows = [tuple(getattr(step, name) for name in STEP_COLUMNS) for step in steps]
         writer.executemany(INSERT_STEP, rows)
 
@@ -221,9 +221,9 @@ def _select_steps(reader: Connection, unit: str, bearing: str) -> list[StoredSte
     ]
 
 
-def _deeds(writer: Connection, steps: Sequence[StoredStep]) -> list[Deed]:
+def _actions(writer: Connection, steps: Sequence[StoredStep]) -> list[AuditAction]:
     """Return audit entries about steps before they are written; automatic learning has none."""
-    deeds = []
+    actions = []
     for place in dict.fromkeys((step.unit, step.bearing) for step in steps):
         done = _select_steps(writer, *place)
         for step in steps:
@@ -231,13 +231,13 @@ def _deeds(writer: Connection, steps: Sequence[StoredStep]) -> list[Deed]:
                 before = versions_after(done)
                 done.append(step)
                 if step.step is not BaselineStep.LEARNED or step.actor != PADWATCH:
-                    deeds.append(_deed(step, before, versions_after(done)))
-    return deeds
+                    actions.append(_action(step, before, versions_after(done)))
+    return actions
 
 
-def _deed(step: StoredStep, before: Versions, after: Versions) -> Deed:
+def _action(step: StoredStep, before: Versions, after: Versions) -> AuditAction:
     parts = (step.unit, step.bearing, step.version)
-    return Deed(
+    return AuditAction(
         time_ns=step.time_ns,
         actor=step.actor,
         action=f"baseline.{step.step.value}",

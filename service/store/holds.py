@@ -174,7 +174,9 @@ def lock_path(database: Path) -> Path:
 
 
 @contextmanager
-def only_one(database: Path, look: Callable[[Path], FileSystem] = file_system_of) -> Iterator[None]:
+def exclusive_use(
+    database: Path, look: Callable[[Path], FileSystem] = file_system_of
+) -> Iterator[None]:
     """Exclude other services from a database.
 
     The lock ends with the process; the file stays and has no meaning of its own.

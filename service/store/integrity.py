@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from service.store.access.audit_entries import Deed
+from service.store.access.audit_entries import AuditAction
 from service.store.audit import AuditChain
 from service.store.highwater.commits import CommitMarks, MarkFinding
 from service.store.seals import DamageLog, Place
@@ -19,7 +19,7 @@ class Integrity:
         High-water mark beside a database file.
     damage
         Damaged rows found since the start.
-    look_on
+    check_some
         Check some further rows; return True when all rows have been checked once.
     require_file
         Raise `StoreError` if the database file was removed or replaced since it was opened.
@@ -30,11 +30,11 @@ class Integrity:
         chain: AuditChain,
         marks: CommitMarks | None = None,
         damage: DamageLog | None = None,
-        look_on: Callable[[], bool] = lambda: True,
+        check_some: Callable[[], bool] = lambda: True,
         require_file: Callable[[], None] = lambda: None,
     ) -> None:
         self._chain, self._marks, self._damage = chain, marks, damage or DamageLog()
-        self.look_on, self.require_file = look_on, require_file
+        self.check_some, self.require_file = check_some, require_file
 
     @property
     def found(self) -> Sequence[MarkFinding]:
@@ -68,13 +68,13 @@ class Integrity:
         if found and self._marks is not None:
             with self._chain.writing() as writer:
                 self._marks.adopt(writer)
-                self._chain.add(writer, [_deed(finding, now_ns) for finding in found])
+                self._chain.add(writer, [_action(finding, now_ns) for finding in found])
             self._marks.adopted()
         return found
 
 
-def _deed(finding: MarkFinding, now_ns: int) -> Deed:
-    return Deed(
+def _action(finding: MarkFinding, now_ns: int) -> AuditAction:
+    return AuditAction(
         time_ns=now_ns,
         actor="padwatch",
         action=f"store.{finding.kind}",

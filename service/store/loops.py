@@ -10,14 +10,14 @@ from service.store.port import StoreError
 from service.store.retention import Ages, RetentionStore
 from service.store.rollups.gathering import RollupStore
 
-RETAINING_PERIOD_S = 600.0
+RETENTION_PERIOD_S = 600.0
 """Pause when no data are due for deletion."""
 
-RETAINING_REST_SHARE = 9.0
+RETENTION_REST_SHARE = 9.0
 """Ratio of pause to work: the loop takes a tenth of one core, and others can write."""
 
 
-class Retaining:
+class RetentionLoop:
     """Loop that deletes old data, some of each bearing in turn, with pauses.
 
     Ages are counted from the newest time with a day of results up to it, so that a clock that is
@@ -37,7 +37,7 @@ class Retaining:
         """Run forever."""
         while True:
             if not await self.round(pulse):
-                await rest(RETAINING_PERIOD_S, self._clock, pulse)
+                await rest(RETENTION_PERIOD_S, self._clock, pulse)
 
     async def round(self, pulse: Pulse = UNHEARD) -> bool:
         """Delete once from each bearing; return whether any data were due."""
@@ -63,18 +63,18 @@ class Retaining:
         begun_s = self._clock.monotonic_s()
         found = await asyncio.to_thread(self._store.delete, series, self._limits, now_ns)
         taken_s = self._clock.monotonic_s() - begun_s
-        await rest_after(taken_s, RETAINING_REST_SHARE, self._clock, pulse)
+        await rest_after(taken_s, RETENTION_REST_SHARE, self._clock, pulse)
         return found
 
 
-ROLLING_PERIOD_S = 20.0
+ROLLUP_PERIOD_S = 20.0
 """Pause when no readings are due."""
 
-ROLLING_REST_SHARE = 3.0
+ROLLUP_REST_SHARE = 3.0
 """Ratio of pause to work: aggregating an old database takes a quarter of one core."""
 
 
-class Rolling:
+class RollupLoop:
     """Loop that aggregates readings into roll-ups, one bearing after the other, with pauses."""
 
     def __init__(self, rollups: RollupStore, clock: Clock) -> None:
@@ -86,9 +86,9 @@ class Rolling:
     async def run(self, pulse: Pulse = UNHEARD) -> None:
         """Run forever."""
         while True:
-            pulse.beat(ROLLING_PERIOD_S)
+            pulse.beat(ROLLUP_PERIOD_S)
             if not await self._round(pulse):
-                await self._clock.sleep(ROLLING_PERIOD_S)
+                await self._clock.sleep(ROLLUP_PERIOD_S)
 
     async def _round(self, pulse: Pulse) -> bool:
         """Aggregate once for each bearing that is due; return whether there was any."""
@@ -96,11 +96,11 @@ class Rolling:
         try:
             due = await asyncio.to_thread(self._rollups.due, now_ns)
             for series in due:
-                pulse.beat(ROLLING_PERIOD_S)
+                pulse.beat(ROLLUP_PERIOD_S)
                 begun_s = self._clock.monotonic_s()
                 await asyncio.to_thread(self._rollups.gather, series, now_ns)
                 taken_s = self._clock.monotonic_s() - begun_s
-                await rest_after(taken_s, ROLLING_REST_SHARE, self._clock, pulse)
+                await rest_after(taken_s, ROLLUP_REST_SHARE, self._clock, pulse)
         except StoreError as error:
             self._trouble.note(str(error))
             return False
@@ -108,15 +108,15 @@ class Rolling:
         return bool(due)
 
 
-SCRUBBING_REST_SHARE = 49.0
+SCRUB_REST_SHARE = 49.0
 """Ratio of pause to work: the loop takes a fiftieth of one core."""
 
 MIN_REST_S = 0.2
-SCRUBBING_PERIOD_S = 86_400.0
+SCRUB_PERIOD_S = 86_400.0
 """Pause after all rows have been checked."""
 
 
-class Scrubbing:
+class ScrubLoop:
     """Loop that searches for damaged rows, a few at a time, with pauses."""
 
     def __init__(self, integrity: Integrity, clock: Clock) -> None:
@@ -130,13 +130,13 @@ class Scrubbing:
         while True:
             pulse.beat(LOOK_S)
             if await self.look(pulse):
-                await rest(SCRUBBING_PERIOD_S, self._clock, pulse)
+                await rest(SCRUB_PERIOD_S, self._clock, pulse)
 
     async def look(self, pulse: Pulse = UNHEARD) -> bool:
         """Check some rows and pause; return whether all rows have been checked once."""
         begun_s = self._clock.monotonic_s()
         try:
-            is_around = await asyncio.to_thread(self._integrity.look_on)
+            is_around = await asyncio.to_thread(self._integrity.check_some)
         except StoreError as error:
             self._trouble.note(str(error))
             await self._clock.sleep(LOOK_S)
@@ -144,8 +144,8 @@ class Scrubbing:
         self._trouble.note(None)
         taken_s = self._clock.monotonic_s() - begun_s
         await rest_after(
-            max(MIN_REST_S / SCRUBBING_REST_SHARE, taken_s),
-            SCRUBBING_REST_SHARE,
+            max(MIN_REST_S / SCRUB_REST_SHARE, taken_s),
+            SCRUB_REST_SHARE,
             self._clock,
             pulse,
         )

@@ -9,7 +9,7 @@ from core.alarms.alarm import Alarm, AlarmEvent
 from service.store.database import Connection, Tables
 
 
-class LetterState(StrEnum):
+class MessageState(StrEnum):
     """State of a message; all but `WAITING` are final."""
 
     WAITING = "waiting"
@@ -18,12 +18,12 @@ class LetterState(StrEnum):
     EXPIRED = "expired"
 
 
-DEAD = (LetterState.REFUSED, LetterState.EXPIRED)
+DEAD = (MessageState.REFUSED, MessageState.EXPIRED)
 """States of messages that are never delivered."""
 
 
 @dataclass(frozen=True)
-class Letter:
+class OutboxMessage:
     """Message about an event of an alarm to one receiver.
 
     Parameters
@@ -51,17 +51,17 @@ class Letter:
     closes: bool
 
 
-Address = Callable[[Alarm, AlarmEvent], Iterable[Letter]]
+Address = Callable[[Alarm, AlarmEvent], Iterable[OutboxMessage]]
 """Function that returns the messages about an event of an alarm."""
 
 
-def no_recipients(alarm: Alarm, event: AlarmEvent) -> Iterable[Letter]:  # noqa: ARG001
+def no_recipients(alarm: Alarm, event: AlarmEvent) -> Iterable[OutboxMessage]:  # noqa: ARG001
     """Return no messages."""
     return ()
 
 
 @dataclass(frozen=True)
-class StoredLetter:
+class StoredMessage:
     """Message in the outbox.
 
     Parameters
@@ -82,7 +82,7 @@ class StoredLetter:
     body: str
     queued_ns: int
     is_urgent: bool
-    state: LetterState
+    state: MessageState
     n_attempts: int
     answer: str
     done_ns: int | None
@@ -108,7 +108,7 @@ class Backlog:
     n_waiting: int
     oldest_ns: int | None
     n_dead: int
-    last_dead: StoredLetter | None
+    last_dead: StoredMessage | None
     delivered_ns: int | None
 
 
@@ -161,34 +161,36 @@ COUNT = """
 """
 
 
-def insert_letters(writer: Connection, event: AlarmEvent, letters: Iterable[Letter]) -> None:
+def insert_messages(
+    writer: Connection, event: AlarmEvent, messages: Iterable[OutboxMessage]
+) -> None:
     """Queue the messages about an event that has just been stored for the first time."""
     of = {"alarm": event.identity.id, "number": event.number}
-    writer.executemany(INSERT, [{**vars(letter), **of} for letter in letters])
+    writer.executemany(INSERT, [{**vars(message), **of} for message in messages])
 
 
 class Outbox(Tables):
     """Durable messages; a change is on the disk when its method returns."""
 
-    def waiting(self, receiver: str, limit: int) -> list[StoredLetter]:
+    def waiting(self, receiver: str, limit: int) -> list[StoredMessage]:
         """Return the first messages that wait for a receiver, in order."""
         with self._reading() as reader:
-            return [_letter(row) for row in reader.execute(SELECT_WAITING, (receiver, limit))]
+            return [_message(row) for row in reader.execute(SELECT_WAITING, (receiver, limit))]
 
     def urgent(self, receiver: str) -> bool:
         """Return whether any message that waits for a receiver ends quiet hours."""
         with self._reading() as reader:
             return bool(reader.execute(SELECT_URGENT, (receiver,)).fetchone()[0])
 
-    def finish(self, letter: int, state: LetterState, answer: str, now_ns: int) -> None:
+    def finish(self, message: int, state: MessageState, answer: str, now_ns: int) -> None:
         """Record that a message was delivered or refused; repeating it has no effect."""
         with self._writing() as writer:
-            writer.execute(FINISH, (state.value, answer[:MAX_ANSWER], now_ns, letter))
+            writer.execute(FINISH, (state.value, answer[:MAX_ANSWER], now_ns, message))
 
-    def fail(self, letter: int, answer: str) -> None:
+    def fail(self, message: int, answer: str) -> None:
         """Record a failed attempt; the message keeps waiting."""
         with self._writing() as writer:
-            writer.execute(FAIL, (answer[:MAX_ANSWER], letter))
+            writer.execute(FAIL, (answer[:MAX_ANSWER], message))
 
     def expire(self, receiver: str, before_ns: int, answer: str, now_ns: int) -> int:
         """Give up messages whose queueing and event are older than a time; return their number."""
@@ -209,10 +211,10 @@ class Outbox(Tables):
 
 
 def _backlog(reader: Connection, receiver: str) -> Backlog:
-    n_waiting, oldest_ns = reader.execute(COUNT, (receiver, LetterState.WAITING.value)).fetchone()
+    n_waiting, oldest_ns = reader.execute(COUNT, (receiver, MessageState.WAITING.value)).fetchone()
     dead = [reader.execute(COUNT, (receiver, state.value)).fetchone()[0] for state in DEAD]
     ends = [_last(reader, receiver, state) for state in DEAD]
-    delivered = _last(reader, receiver, LetterState.DELIVERED)
+    delivered = _last(reader, receiver, MessageState.DELIVERED)
     return Backlog(
         receiver=receiver,
         n_waiting=int(n_waiting),
@@ -223,15 +225,15 @@ def _backlog(reader: Connection, receiver: str) -> Backlog:
     )
 
 
-def _last(reader: Connection, receiver: str, state: LetterState) -> StoredLetter | None:
+def _last(reader: Connection, receiver: str, state: MessageState) -> StoredMessage | None:
     row = reader.execute(SELECT_LAST, (receiver, state.value)).fetchone()
-    return _letter(row) if row else None
+    return _message(row) if row else None
 
 
-def _letter(row: tuple[Any, ...]) -> StoredLetter:
+def _message(row: tuple[Any, ...]) -> StoredMessage:
     found = dict(zip(COLUMNS.split(", "), row, strict=True))
-    now = {"is_urgent": bool(found["is_urgent"]), "state": LetterState(found["state"])}
-    return StoredLetter(**found | now)
+    now = {"is_urgent": bool(found["is_urgent"]), "state": MessageState(found["state"])}
+    return StoredMessage(**found | now)
 
 
 OUTBOX_TABLES = """

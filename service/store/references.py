@@ -7,7 +7,7 @@ from typing import Any, Generic, TypeVar
 
 from core.alarms.judgements import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
-from service.store.access.audit_entries import Deed, acting
+from service.store.access.audit_entries import AuditAction, acting
 from service.store.audit import AuditedTables
 from service.store.database import insert
 from service.store.port import StoreError
@@ -129,8 +129,8 @@ class _References(AuditedTables, Generic[_Reference]):
             rows = writer.execute(statement, row[: len(self.key)])
             before = [self._load(each) for each in rows]
             if reference not in before:
-                deed = self._deed(before[0] if before else None, reference)
-                self._audit.add(writer, [deed])
+                action = self._action(before[0] if before else None, reference)
+                self._audit.add(writer, [action])
                 writer.execute(insert(self.table, self.columns), row)
 
     def in_force(self) -> list[_Reference]:
@@ -158,7 +158,7 @@ class _References(AuditedTables, Generic[_Reference]):
     def _load(self, row: tuple[Any, ...]) -> _Reference:
         raise NotImplementedError
 
-    def _deed(self, before: _Reference | None, reference: _Reference) -> Deed:
+    def _action(self, before: _Reference | None, reference: _Reference) -> AuditAction:
         raise NotImplementedError
 
 
@@ -189,8 +189,8 @@ class GapReferenceStore(_References[GapReference]):
         except ValueError as error:
             raise StoreError(f"a reference of unit {unit} bearing {bearing}: {error}") from error
 
-    def _deed(self, before: GapReference | None, reference: GapReference) -> Deed:
-        return Deed(
+    def _action(self, before: GapReference | None, reference: GapReference) -> AuditAction:
+        return AuditAction(
             time_ns=reference.set_ns,
             actor=reference.author,
             action="gap_reference.set",
@@ -231,9 +231,11 @@ class VectorReferenceStore(_References[SetVectorReference]):
             raise StoreError(f"a 1× reference of unit {unit} bearing {bearing}: {error}") from error
         return SetVectorReference(reference, set_ns, author, note)
 
-    def _deed(self, before: SetVectorReference | None, reference: SetVectorReference) -> Deed:
+    def _action(
+        self, before: SetVectorReference | None, reference: SetVectorReference
+    ) -> AuditAction:
         its = reference.reference
-        return Deed(
+        return AuditAction(
             time_ns=reference.set_ns,
             actor=reference.author,
             action="order1_reference.set",

@@ -147,9 +147,9 @@ class SealedTable:
         forget = f"DELETE FROM {self.seals} WHERE {self.matched('OLD.')};"  # noqa: S608
         bodies = {"INSERT": put, "UPDATE": forget + put, "DELETE": forget}
         return [
-            f"CREATE TEMP TRIGGER sealed_{self.name}_{deed.lower()} AFTER {deed} ON"
+            f"CREATE TEMP TRIGGER sealed_{self.name}_{change.lower()} AFTER {change} ON"
             f" main.{self.name} BEGIN {body} END"
-            for deed, body in bodies.items()
+            for change, body in bodies.items()
         ]
 
     def view(self, before: str = "") -> str:

@@ -106,7 +106,7 @@ class Backoff:
         place = place_of(peer)
         with self._lock:
             self._accounts.forget(name)
-            self._peers.take_back(place)
+            self._peers.revoke_again(place)
             self._known[name, place] = None
             self._known.move_to_end((name, place))
             if len(self._known) > self._max_remembered:
@@ -138,7 +138,7 @@ class FailureBook:
         if len(self._failures) > self._max_remembered:
             self._failures.popitem(last=False)
 
-    def take_back(self, whom: Hashable) -> None:
+    def revoke_again(self, whom: Hashable) -> None:
         """Count one failure less."""
         found = self._failures.pop(whom, None)
         if found is not None and found.number > 1:

@@ -9,7 +9,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from acquisition.clock import Clock
 from service.api.auth.gate import SAFE
 from service.api.load import Allowance
-from service.store.access.audit_entries import Acting, Deed, Source, acting, acting_as
+from service.store.access.audit_entries import Acting, AuditAction, Source, acting, acting_as
 from service.store.audit import AuditStore
 from service.store.port import StoreError
 
@@ -36,14 +36,14 @@ class Refusals:
         self._allowance = Allowance(N_AT_ONCE, SECONDS_EACH, clock.monotonic_s())
         self.n_more = 0
 
-    async def note(self, deed: Deed, status: int) -> None:
+    async def note(self, deed: AuditAction, status: int) -> None:
         """Write a refusal with the number of unwritten ones before it, or count it."""
         if not self._allowance.take(self._clock.monotonic_s()):
             self.n_more += 1
             return
         n_before, self.n_more = self.n_more, 0
         after = {"status": status} | ({"n_refused_more": n_before} if n_before else {})
-        entry = Deed(**{**vars(deed), "after": after})
+        entry = AuditAction(**{**vars(deed), "after": after})
         try:
             await asyncio.to_thread(self._audit.record, [entry])
         except StoreError as error:
@@ -81,9 +81,9 @@ class AuditTrail:
             if scope["method"] not in SAFE and answer.status in REFUSED:
                 await self._refusals.note(self._deed(scope, answer), answer.status)
 
-    def _deed(self, scope: Scope, answer: "_Answer") -> Deed:
+    def _deed(self, scope: Scope, answer: "_Answer") -> AuditAction:
         who = acting()
-        return Deed(
+        return AuditAction(
             time_ns=self._clock.now_ns(),
             actor=who.actor,
             action="request.refused",

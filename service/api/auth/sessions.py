@@ -23,7 +23,7 @@ from service.api.auth.gate import caller_of, identity_of, must_wait, wrong_login
 from service.api.context import Context
 from service.api.problems import ProblemError, described_problems
 from service.api.values import ApiModel, RequestModel
-from service.store.access.audit_entries import Deed, acting, name_actor
+from service.store.access.audit_entries import AuditAction, acting, name_actor
 from service.store.access.identities import Identity, Means, Permission, Role
 from service.store.audit import AuditStore
 from service.store.port import StoreError
@@ -100,7 +100,7 @@ async def record(audit: AuditStore, clock: Clock, action: str, name: str) -> Non
     """
     name_actor(name)
     who = acting()
-    deed = Deed(clock.now_ns(), name, action, name, source=who.source, peer=who.peer)
+    deed = AuditAction(clock.now_ns(), name, action, name, source=who.source, peer=who.peer)
     await asyncio.to_thread(audit.record, [deed])
 
 

@@ -13,7 +13,7 @@ from service.api.values import ApiModel, Time
 from service.notifications.sender import ReceiverView, SenderStatus
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
-from service.store.outbox import Backlog, LetterState, StoredLetter
+from service.store.outbox import Backlog, MessageState, StoredMessage
 
 SenderStateName = Literal[
     "idle", "sending", "retrying", "quiet", "store_fails", "not_in_the_plant_file"
@@ -155,12 +155,12 @@ def _receiver(view: ReceiverView) -> ReceiverModel:
     )
 
 
-def _dead(letter: StoredLetter | None) -> DeadLetterModel | None:
+def _dead(letter: StoredMessage | None) -> DeadLetterModel | None:
     if letter is None or letter.done_ns is None:
         return None
     return DeadLetterModel(
         event_id=letter.event_id,
-        outcome="refused" if letter.state is LetterState.REFUSED else "expired",
+        outcome="refused" if letter.state is MessageState.REFUSED else "expired",
         reason=letter.answer,
         time=rfc3339(letter.done_ns),
     )

@@ -32,7 +32,7 @@ class Source(StrEnum):
 
 
 @dataclass(frozen=True)
-class Deed:
+class AuditAction:
     """Action to be recorded in the audit trail.
 
     Parameters
@@ -130,13 +130,13 @@ def digest(values: Sequence[object]) -> str:
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
-def chained(deed: Deed, number: int, previous_hash: str) -> AuditEntry:
+def chained(action: AuditAction, number: int, previous_hash: str) -> AuditEntry:
     """Return the entry of an action that follows another entry."""
     columns = (
-        *(number, deed.time_ns, storable(deed.actor, MAX_NAME), deed.source.value),
-        None if deed.peer is None else storable(deed.peer, MAX_NAME),
-        *(storable(deed.action, MAX_NAME), storable(deed.object, MAX_NAME)),
-        *(canonical(deed.before), canonical(deed.after), storable(deed.reason, MAX_REASON)),
+        *(number, action.time_ns, storable(action.actor, MAX_NAME), action.source.value),
+        None if action.peer is None else storable(action.peer, MAX_NAME),
+        *(storable(action.action, MAX_NAME), storable(action.object, MAX_NAME)),
+        *(canonical(action.before), canonical(action.after), storable(action.reason, MAX_REASON)),
         previous_hash,
     )
     return AuditEntry(*columns, digest(columns))

@@ -108,7 +108,7 @@ class Verdict:
         Defect of what follows; None if there is none.
     n_behind
         Number of entries by which the head lags, as after a crash; the next entry repairs it.
-    told
+    contradictions
         Numbers of entries which record that the head contradicted the chain.
     is_shared
         Whether other hosts, each with its own head, write to the trail as well. The head then lags
@@ -119,7 +119,7 @@ class Verdict:
     hash: str
     finding: Finding | None
     n_behind: int = 0
-    told: tuple[int, ...] = ()
+    contradictions: tuple[int, ...] = ()
     is_shared: bool = False
 
     @property
@@ -148,19 +148,21 @@ def walk(
         Whether other hosts write to the trail as well.
     """
     number, hash_, at_head = 0, FIRST, ""
-    told: list[int] = []
+    contradictions: list[int] = []
     for entry in entries:
         finding = _wrong(entry, number, hash_, rename)
         if finding is not None:
-            return Verdict(number, hash_, finding, told=tuple(told), is_shared=is_shared)
+            return Verdict(
+                number, hash_, finding, contradictions=tuple(contradictions), is_shared=is_shared
+            )
         number, hash_ = entry.number, entry.hash
         if entry.action == HEAD_DIFFERED:
-            told.append(number)
+            contradictions.append(number)
         if isinstance(head, AuditHead) and number == head.number:
             at_head = hash_
     finding = _wrong_head(number, at_head, head, is_shared)
     n_behind = 0 if finding or isinstance(head, str) else number - head.number
-    return Verdict(number, hash_, finding, n_behind, tuple(told), is_shared)
+    return Verdict(number, hash_, finding, n_behind, tuple(contradictions), is_shared)
 
 
 def _wrong(

@@ -43,10 +43,10 @@ class Role(StrEnum):
 
     def may(self, permission: Permission) -> bool:
         """Return whether the role has a permission."""
-        return self.rank >= LEAST_ROLE[permission].rank
+        return self.rank >= MIN_ROLE[permission].rank
 
 
-LEAST_ROLE: Mapping[Permission, Role] = MappingProxyType(
+MIN_ROLE: Mapping[Permission, Role] = MappingProxyType(
     {
         Permission.READ: Role.VIEWER,
         Permission.ACT_ON_ALARMS: Role.OPERATOR,

@@ -7,7 +7,7 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
-from service.store.access.audit_entries import Deed, Document, acting
+from service.store.access.audit_entries import AuditAction, Document, acting
 from service.store.access.identities import ApiKey, Role, Session
 from service.store.audit import AuditChain, AuditedTables
 from service.store.database import Connection, Reading
@@ -42,14 +42,14 @@ class Account:
     must_change: bool = False
 
 
-def account_deed(
+def _account_action(
     done: str, name: str, now_ns: int, before: Role | None = None, after: Role | None = None
-) -> Deed:
+) -> AuditAction:
     """Return the audit entry about a change of an account, with its role before and after."""
-    return _deed(f"account.{done}", name, now_ns, _role_document(before), _role_document(after))
+    return _action(f"account.{done}", name, now_ns, _role_document(before), _role_document(after))
 
 
-def key_deed(done: str, id_: str, now_ns: int, made: ApiKey | None = None) -> Deed:
+def _key_action(done: str, id_: str, now_ns: int, made: ApiKey | None = None) -> AuditAction:
     """Return the audit entry about a change of a key, with its permissions if it is new."""
     after = None
     if made is not None:
@@ -59,16 +59,20 @@ def key_deed(done: str, id_: str, now_ns: int, made: ApiKey | None = None) -> De
             "units": list(made.units),
             "expires_ns": made.expires_ns,
         }
-    return _deed(f"key.{done}", id_, now_ns, None, after)
+    return _action(f"key.{done}", id_, now_ns, None, after)
 
 
 def _role_document(role: Role | None) -> Document:
     return None if role is None else {"role": role.value}
 
 
-def _deed(action: str, object_: str, now_ns: int, before: Document, after: Document) -> Deed:
+def _action(
+    action: str, object_: str, now_ns: int, before: Document, after: Document
+) -> AuditAction:
     who = acting()
-    return Deed(now_ns, who.actor, action, object_, before, after, source=who.source, peer=who.peer)
+    return AuditAction(
+        now_ns, who.actor, action, object_, before, after, source=who.source, peer=who.peer
+    )
 
 
 MAX_SESSIONS = 16
@@ -109,7 +113,7 @@ class AccountStore(AuditedTables):
                 return  # already written by a call whose outcome was unknown: hashes are unique
             if not insert_account(writer, name, role, password_hash, now_ns, must_change):
                 raise AccessRefusedError(f"account {name} already exists")
-            self._audit.add(writer, [account_deed("added", name, now_ns, after=role)])
+            self._audit.add(writer, [_account_action("added", name, now_ns, after=role)])
 
     def get(self, name: str) -> Account | None:
         """Return an account; None if there is none of that name."""
@@ -129,7 +133,7 @@ class AccountStore(AuditedTables):
             if role is not Role.ADMIN:
                 _require_other_admin(writer, name, before)
             writer.execute("UPDATE account SET role = ? WHERE name = ?", (role.value, name))
-            self._audit.add(writer, [account_deed("role_set", name, now_ns, before, role)])
+            self._audit.add(writer, [_account_action("role_set", name, now_ns, before, role)])
 
     def set_password(
         self, name: str, password_hash: str, now_ns: int, must_change: bool = False
@@ -143,7 +147,7 @@ class AccountStore(AuditedTables):
                 (password_hash, now_ns, int(must_change), name),
             )
             writer.execute("DELETE FROM session WHERE account = ?", (name,))
-            self._audit.add(writer, [account_deed("password_set", name, now_ns)])
+            self._audit.add(writer, [_account_action("password_set", name, now_ns)])
 
     def rehash(self, account: Account, password_hash: str) -> None:
         """Write a new hash of the same password, unless the password has changed meanwhile."""
@@ -164,7 +168,7 @@ class AccountStore(AuditedTables):
             if writer.execute(IS_OTHER, (name,)).fetchone()[0]:
                 _require_other_admin(writer, name, role)
             writer.execute("DELETE FROM account WHERE name = ?", (name,))
-            self._audit.add(writer, [account_deed("removed", name, now_ns, before=role)])
+            self._audit.add(writer, [_account_action("removed", name, now_ns, before=role)])
 
 
 class SessionStore(AuditedTables):
@@ -264,7 +268,7 @@ class KeyStore(AuditedTables):
             if found and _key(found) == key:
                 return  # already written by a call whose outcome was unknown
             writer.execute("INSERT INTO api_key VALUES (?, ?, ?, ?, ?, ?, ?, NULL, NULL)", made)
-            self._audit.add(writer, [key_deed("created", key.id, key.created_ns, key)])
+            self._audit.add(writer, [_key_action("created", key.id, key.created_ns, key)])
 
     def get(self, id_: str) -> ApiKey | None:
         """Return a key; None if the id is unknown."""
@@ -288,7 +292,7 @@ class KeyStore(AuditedTables):
         with self._writing() as writer:
             is_news = writer.execute(revoke, (now_ns, id_)).rowcount == 1
             if is_news:
-                self._audit.add(writer, [key_deed("revoked", id_, now_ns)])
+                self._audit.add(writer, [_key_action("revoked", id_, now_ns)])
         return is_news
 
 
@@ -320,7 +324,7 @@ class SetUpStore(AuditedTables):
                 return False
             writer.execute("DELETE FROM set_up_token")
             insert_account(writer, name, Role.ADMIN, password_hash, now_ns)
-            self._audit.add(writer, [account_deed("set_up", name, now_ns, after=Role.ADMIN)])
+            self._audit.add(writer, [_account_action("set_up", name, now_ns, after=Role.ADMIN)])
         return True
 
 

@@ -195,7 +195,7 @@ class CommitMarks:
         self.found: Sequence[MarkFinding] = ()
         self.error: str | None = None
 
-    def open(self, writer: Connection, said: Mark | str | None) -> None:
+    def open(self, writer: Connection, in_file: Mark | str | None) -> None:
         """Compare the file with a database that has just been opened, within a transaction.
 
         A database without a mark gets one, as does a folder without a file.
@@ -205,10 +205,10 @@ class CommitMarks:
         if mark is None:
             mark = Mark(_random_hex(16), self._host, 0, _random_hex(8), self._now_ns())
             writer.execute(PUT, astuple(mark))
-            if said is None:
+            if in_file is None:
                 self._file.replace(mark)
                 return
-        self.found = compared("is not there" if said is None else said, mark, self._host)
+        self.found = compared("is not there" if in_file is None else in_file, mark, self._host)
 
     def count(self, writer: Connection) -> None:
         """Count the current transaction, within it."""
@@ -235,10 +235,10 @@ class CommitMarks:
 
     def adopt(self, writer: Connection) -> None:
         """Accept the database as the newest, within a transaction."""
-        last, said = select_mark(writer), self.said()
+        last, in_file = select_mark(writer), self.in_file()
         if last is None:
             raise StoreError("the database has lost its high-water mark")
-        n_before = said.n_commits if isinstance(said, Mark) else 0
+        n_before = in_file.n_commits if isinstance(in_file, Mark) else 0
         # above both, so that no earlier mark ever fits again
         self._put(writer, last, max(last.n_commits, n_before) + 1)
 
@@ -257,7 +257,7 @@ class CommitMarks:
         self._newest = Mark(last.store, self._host, n_commits, _random_hex(8), self._now_ns())
         writer.execute(PUT, astuple(self._newest))
 
-    def said(self) -> Mark | str | None:
+    def in_file(self) -> Mark | str | None:
         """Return the mark in the file, or the reason why it is unreadable; None if there is none.
 
         It must be read before the database: the file may lag behind, but not lead.
@@ -285,7 +285,7 @@ def _random_hex(n_bytes: int) -> str:
     return os.urandom(n_bytes).hex()
 
 
-def adopt_copy(database: Path) -> None:
+def adopt_restored(database: Path) -> None:
     """Write the mark of a restored database to the file beside it.
 
     Raises

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from service.settings.storage import Origin
-from service.store.access.audit_entries import Deed, acting
+from service.store.access.audit_entries import AuditAction, acting
 from service.store.access.audit_verification import AuditHead, write_head
 from service.store.audit import Trail, newest_of
 from service.store.outbox import Address, no_recipients
@@ -75,10 +75,10 @@ def _begin_head(database: PostgresDatabase, head: Path) -> bool:
     return newest != AuditHead()
 
 
-def _begun(head: Path) -> Deed:
+def _begun(head: Path) -> AuditAction:
     """Return an entry about a new head, so that the removal of a head is visible in the trail."""
     who = acting()
-    return Deed(
+    return AuditAction(
         time_ns=time.time_ns(),
         actor="padwatch",
         action=HEAD_BEGUN,

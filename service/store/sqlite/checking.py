@@ -149,7 +149,7 @@ class Scrubber:
         self._after: Key | None = None
         self._n_looks = 0
 
-    def look_on(self) -> bool:
+    def check_some(self) -> bool:
         """Check some rows; return whether all rows have been checked once.
 
         Raises
@@ -202,7 +202,7 @@ def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
         return 0, None
     for number, walk in enumerate(ways):
         if (walk.table.name, walk.is_of_seals) == (name, is_of_seals) and _is_key(walk, after):
-            return number, None if after is None else tuple(_cell(told) for told in after)
+            return number, None if after is None else tuple(_cell(stored) for stored in after)
     return 0, None
 
 
@@ -211,17 +211,19 @@ def _json_cell(cell: Any) -> Any:
     return {HEX: cell.hex()} if isinstance(cell, bytes) else cell
 
 
-def _cell(told: Any) -> Any:
-    return bytes.fromhex(told[HEX]) if isinstance(told, dict) else told
+def _cell(stored: Any) -> Any:
+    return bytes.fromhex(stored[HEX]) if isinstance(stored, dict) else stored
 
 
 def _is_key(walk: Walk, after: Any) -> bool:
     if after is None:
         return True
     fits = isinstance(after, list) and len(after) == len(walk.table.key)
-    return fits and all(isinstance(told, int | float | str) or _is_hex(told) for told in after)
+    return fits and all(
+        isinstance(stored, int | float | str) or _is_hex(stored) for stored in after
+    )
 
 
-def _is_hex(told: Any) -> bool:
-    is_one = isinstance(told, dict) and list(told) == [HEX] and isinstance(told[HEX], str)
-    return is_one and re.fullmatch("([0-9a-f]{2})*", told[HEX]) is not None
+def _is_hex(stored: Any) -> bool:
+    is_one = isinstance(stored, dict) and list(stored) == [HEX] and isinstance(stored[HEX], str)
+    return is_one and re.fullmatch("([0-9a-f]{2})*", stored[HEX]) is not None

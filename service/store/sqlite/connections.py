@@ -180,7 +180,7 @@ class Writer:
 
     def _reopen(self) -> None:
         self.connection.close()
-        in_file = self._marks.said()
+        in_file = self._marks.in_file()
         self.connection = opened(self._path)
         set_up(self.connection)
         with _begun(self.connection):

@@ -123,7 +123,7 @@ class SqliteDatabase:
 
     def _prepare(self, connection: sqlite3.Connection, origin: Origin) -> bool:
         """Upgrade the file; return whether it had an audit trail before."""
-        in_file = self.marks.said()
+        in_file = self.marks.in_file()
         for setting in (f"page_size = {PAGE_BYTES}", "auto_vacuum = INCREMENTAL"):
             connection.execute(f"PRAGMA {setting}")  # effective only in a new file
         had_trail = connection.execute(HAS_TRAIL).fetchone() is not None

@@ -61,7 +61,7 @@ class SqliteStore(Store):
                 self._chain,
                 database.marks,
                 database.damage,
-                scrubber.look_on,
+                scrubber.check_some,
                 database.file.require,
             )
         except OSError as error:

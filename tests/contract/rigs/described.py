@@ -5,12 +5,12 @@ from typing import Any
 from service.api.app import GuardedApi
 from service.api.context import Context
 from service.app.web import application
-from service.reports.routes import EvidenceDesk
+from service.reports.routes import EvidenceService
 
 _DOCUMENTS: dict[frozenset[str], dict[str, Any]] = {}
 
 
-def described_app(context: Context, evidence: EvidenceDesk | None = None) -> GuardedApi:
+def described_app(context: Context, evidence: EvidenceService | None = None) -> GuardedApi:
     """Build the application of a context, with the description of an earlier one like it."""
     app = application(context, evidence)
     operations = frozenset(app.declared)

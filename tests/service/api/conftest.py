@@ -43,8 +43,8 @@ from service.measuring.references_in_force import ReferencesInForce
 from service.measuring.simulated_sources import simulated_feed
 from service.notifications.sender import Deliveries
 from service.recordings.segment import CaptureFile
-from service.reports.keeper import EvidenceKeeper
-from service.reports.routes import EvidenceDesk
+from service.reports.keeper import EvidenceCollector
+from service.reports.routes import EvidenceService
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
@@ -78,11 +78,11 @@ class Service:
     references: ReferencesInForce
     alarms: AlarmEngine
     recorder: Recorder
-    evidence: EvidenceKeeper
+    evidence: EvidenceCollector
     films: FilmKeeper
     loops: dict[str, str | None]
     context: Context
-    desk: EvidenceDesk
+    desk: EvidenceService
 
     @cached_property
     def app(self) -> FastAPI:

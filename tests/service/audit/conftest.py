@@ -6,17 +6,17 @@ from pathlib import Path
 import pytest
 from rigs.database_copy import copy_database
 
-from service.store.access.audit_entries import Deed, Source
+from service.store.access.audit_entries import AuditAction, Source
 from service.store.sqlite import SqliteStore
 
 T0 = 1_767_225_600_000_000_000
 
 
 @pytest.fixture
-def deed() -> Callable[..., Deed]:
+def deed() -> Callable[..., AuditAction]:
     """Builds deeds."""
 
-    def build(n: int = 0, **changes: object) -> Deed:
+    def build(n: int = 0, **changes: object) -> AuditAction:
         arguments: dict[str, object] = {
             "time_ns": T0 + n * 1_000_000_007,
             "actor": "A. Name",
@@ -28,7 +28,7 @@ def deed() -> Callable[..., Deed]:
             "source": Source.API,
             "peer": "192.0.2.7" if n % 2 else None,
         }
-        return Deed(**{**arguments, **changes})  # type: ignore[arg-type]
+        return AuditAction(**{**arguments, **changes})  # type: ignore[arg-type]
 
     return build
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from rigs.tiers import fast_and_long
 
-from service.store.access.audit_entries import Deed
+from service.store.access.audit_entries import AuditAction
 from service.store.access.audit_verification import head_path
 from service.store.audit import COLUMNS
 from service.store.sqlite import SqliteStore
@@ -48,7 +48,7 @@ class Bench:
 
 
 @pytest.fixture
-def bench(path: Path, deed: Callable[..., Deed]) -> Bench:
+def bench(path: Path, deed: Callable[..., AuditAction]) -> Bench:
     with closing(SqliteStore(path)) as store:
         store.audit.record([deed(n) for n in range(N_ENTRIES)])
     return Bench(path)
@@ -186,7 +186,7 @@ def test_the_first_wrong_entry_is_named(bench: Bench) -> None:
 
 
 def test_a_whole_trail_of_another_database_is_not_taken_for_this_one(
-    bench: Bench, tmp_path: Path, deed: Callable[..., Deed]
+    bench: Bench, tmp_path: Path, deed: Callable[..., AuditAction]
 ) -> None:
     with closing(SqliteStore(tmp_path / "other.sqlite3")) as other:
         other.audit.record([deed(n, actor="somebody else") for n in range(N_ENTRIES)])

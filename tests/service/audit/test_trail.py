@@ -12,14 +12,14 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from core.samples.gaps import Gap
-from service.store.access.audit_entries import MAX_DOCUMENT, MAX_NAME, AuditEntry, Deed
+from service.store.access.audit_entries import MAX_DOCUMENT, MAX_NAME, AuditAction, AuditEntry
 from service.store.access.audit_verification import HEAD_DIFFERED, AuditHead, head_path, read_head
 from service.store.audit import AuditQuery, Trail
 from service.store.port import StoreError, UnitGap
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.store import file_trail
 
-Build = Callable[..., Deed]
+Build = Callable[..., AuditAction]
 
 
 def all_of(store: SqliteStore) -> list[AuditEntry]:
@@ -133,8 +133,8 @@ def test_a_crash_before_the_head_was_written_is_no_tampering_and_is_repaired(
         again.audit.record([deed(3)])
     repaired = file_trail(path).verify()
 
-    assert (after_crash.finding, after_crash.n_behind, after_crash.told) == (None, 2, ())
-    assert (repaired.finding, repaired.n_behind, repaired.told) == (None, 0, ())
+    assert (after_crash.finding, after_crash.n_behind, after_crash.contradictions) == (None, 2, ())
+    assert (repaired.finding, repaired.n_behind, repaired.contradictions) == (None, 0, ())
     assert repaired.n_entries == 4
 
 
@@ -167,7 +167,7 @@ def test_a_cut_trail_stays_noticed_after_the_service_has_gone_on(
 
     verdict = file_trail(path).verify()
     told = all_of(store)[2]
-    assert (verdict.is_whole, verdict.told) == (True, (3,))
+    assert (verdict.is_whole, verdict.contradictions) == (True, (3,))
     assert (told.actor, told.action) == ("padwatch", HEAD_DIFFERED)
     assert told.reason == (
         "the head names entry 4, the trail ended at 2" if with_head else "the head is not there"
@@ -179,7 +179,7 @@ def test_a_database_that_was_put_in_the_place_of_another_tells_so(path: Path, de
         path.unlink(missing_ok=True)
         with closing(SqliteStore(path)) as store:
             store.audit.record([deed(0)])
-    assert file_trail(path).verify().told == (1,)
+    assert file_trail(path).verify().contradictions == (1,)
 
 
 def test_a_head_that_cannot_be_written_stops_no_deed_and_is_written_later(
@@ -232,7 +232,7 @@ def test_a_trail_is_verified_while_others_write(
         writing = pool.map(lambda n: store.audit.record([deed(n)]), range(100))
         verdicts = [file_trail(path).verify() for _ in range(30)]
         list(writing)
-    assert [(v.finding, v.told) for v in verdicts] == [(None, ())] * 30
+    assert [(v.finding, v.contradictions) for v in verdicts] == [(None, ())] * 30
 
 
 def test_where_there_is_no_trail_that_is_said(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 from rigs.command_line import padwatch
 from typer.testing import Result
 
-from service.store.access.audit_entries import Deed
+from service.store.access.audit_entries import AuditAction
 from service.store.access.audit_verification import head_path
 from service.store.sqlite import SqliteStore
 
@@ -27,7 +27,9 @@ def database(plant_path: Path) -> Path:
     """A plant's database with an entry for each hostile name."""
     path = plant_path.with_name("data") / "padwatch.sqlite3"
     store = SqliteStore(path)
-    store.audit.record([Deed(T0, name, "x", name, reason=name, after=name) for name in HOSTILE])
+    store.audit.record(
+        [AuditAction(T0, name, "x", name, reason=name, after=name) for name in HOSTILE]
+    )
     store.close()
     return path
 
@@ -55,7 +57,7 @@ def test_an_altered_entry_is_named(plant_path: Path, database: Path) -> None:
 def test_a_restored_backup_can_be_said_to_be_known(plant_path: Path, database: Path) -> None:
     head_path(database).unlink()
     store = SqliteStore(database)
-    store.audit.record([Deed(T0, "A", "x", "y")])
+    store.audit.record([AuditAction(T0, "A", "x", "y")])
     store.close()
     number = len(HOSTILE) + 1
     unknown, known = audit("verify", plant_path), audit("verify", plant_path, f"--known={number}")

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from service.store.outbox import LetterState
+from service.store.outbox import MessageState
 from service.store.port import AlarmQuery, StoreError
 
 ROOT = Path(__file__).parents[3]
@@ -36,7 +36,7 @@ def test_an_event_that_is_written_twice_is_told_once_even_after_it_was_delivered
     for _ in range(2):
         store.append([], [], [room.news(0)])
     (letter,) = store.outbox.waiting("desk", 9)
-    store.outbox.finish(letter.id, LetterState.DELIVERED, "200", 1)
+    store.outbox.finish(letter.id, MessageState.DELIVERED, "200", 1)
 
     store.append([], [], [room.news(0)])
 
@@ -58,8 +58,8 @@ def test_letters_that_were_given_up_wait_again_in_their_old_order(room: Any) -> 
     store = room.open_store()
     store.append([], [], [room.news(n) for n in range(4)])
     first, second, *_ = store.outbox.waiting("desk", 9)
-    store.outbox.finish(first.id, LetterState.REFUSED, "401", 5)
-    store.outbox.finish(second.id, LetterState.DELIVERED, "200", 6)
+    store.outbox.finish(first.id, MessageState.REFUSED, "401", 5)
+    store.outbox.finish(second.id, MessageState.DELIVERED, "200", 6)
 
     assert store.outbox.revive("desk", 7) == 1
 

@@ -18,7 +18,7 @@ from core.limits import AlarmLevel, Judgement
 from service.notifications.channel import Failed, Secret, SecretError
 from service.notifications.routing import QuietHours
 from service.notifications.sender import SenderState, wait_s
-from service.store.outbox import LetterState
+from service.store.outbox import MessageState
 
 DANGER = Judgement(AlarmLevel.DANGER, value=260.0, limit=250.0, reason="above_limit")
 
@@ -129,7 +129,7 @@ async def test_what_is_refused_for_ever_is_kept_as_such_and_holds_up_nothing(
     assert (backlog.n_waiting, backlog.n_dead) == (0, 1)
     assert backlog.last_dead is not None
     assert backlog.last_dead.answer == f"{status[:3]} no such plant"
-    assert backlog.last_dead.state is LetterState.REFUSED
+    assert backlog.last_dead.state is MessageState.REFUSED
 
 
 @pytest.mark.parametrize("n_events", fast_and_long(100, 1000))

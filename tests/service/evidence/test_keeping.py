@@ -19,7 +19,7 @@ from service.reports import keeper as module
 from service.reports.archive import DamagedEvidenceError
 from service.reports.document import Evidence
 from service.reports.folders import INCOMPLETE, place_of
-from service.reports.snapshot import Camera
+from service.reports.snapshot import SnapshotTaker
 
 Make = Callable[..., Any]
 NOBODY: frozenset[tuple[str, int]] = frozenset()
@@ -49,7 +49,7 @@ def samples(rig: Any, capturing: frozenset[tuple[str, int]] = NOBODY) -> str:
     return str(rig.archive.samples(found, capturing).value)
 
 
-class Expecting(Camera):
+class Expecting(SnapshotTaker):
     """A service that keeps the samples around alarms."""
 
     def take(self, event: AlarmEvent, now_ns: int, samples_expected: bool) -> Any:

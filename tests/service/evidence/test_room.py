@@ -11,9 +11,9 @@ from unittest.mock import Mock
 import pytest
 
 from service.reports.folders import Place, clear_leftovers, places, removed
-from service.reports.room import SURVEY_S, EvidenceLimits, EvidenceRoom
+from service.reports.room import SURVEY_S, EvidenceLimits, EvidenceRetention
 
-RoomOf = Callable[..., EvidenceRoom]
+RoomOf = Callable[..., EvidenceRetention]
 KB = b"x" * 1000
 
 OLDEST, OLD, YOUNG, NEWEST = (
@@ -35,8 +35,8 @@ def root(tmp_path: Path) -> Path:
 def room_of(root: Path, stepped_clock: Any) -> RoomOf:
     """Builds what makes room, at the beginning of 2026, by the limits it is given."""
 
-    def build(soft: int, hard: int = 8000, most: int = 200) -> EvidenceRoom:
-        return EvidenceRoom(root, EvidenceLimits(soft, hard, 30.0, most), stepped_clock)
+    def build(soft: int, hard: int = 8000, most: int = 200) -> EvidenceRetention:
+        return EvidenceRetention(root, EvidenceLimits(soft, hard, 30.0, most), stepped_clock)
 
     return build
 

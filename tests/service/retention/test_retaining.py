@@ -9,7 +9,7 @@ from structlog.testing import capture_logs
 from acquisition.clock import Clock
 from core.units import DAY_NS
 from service.settings.storage import RetentionSettings
-from service.store.loops import LOOK_S, RETAINING_PERIOD_S, RETAINING_REST_SHARE, Retaining
+from service.store.loops import LOOK_S, RETENTION_PERIOD_S, RETENTION_REST_SHARE, RetentionLoop
 from service.store.port import StoreError
 from service.store.retention import Ages, ages_of
 
@@ -61,34 +61,36 @@ def old(stepped_clock: Clock) -> OldStore:
 
 
 @pytest.fixture
-def retaining(old: OldStore, stepped_clock: Clock) -> Retaining:
-    return Retaining(old, LIMITS, stepped_clock)
+def retaining(old: OldStore, stepped_clock: Clock) -> RetentionLoop:
+    return RetentionLoop(old, LIMITS, stepped_clock)
 
 
 async def test_bearings_take_turns_until_nothing_is_old(
-    old: OldStore, retaining: Retaining
+    old: OldStore, retaining: RetentionLoop
 ) -> None:
     assert [await retaining.round() for _ in range(4)] == [True, True, True, False]
     assert old.done == [1, 2] * 4
 
 
-async def test_it_rests_longer_than_it_works(retaining: Retaining, stepped_clock: Clock) -> None:
+async def test_it_rests_longer_than_it_works(
+    retaining: RetentionLoop, stepped_clock: Clock
+) -> None:
     begun_s = stepped_clock.monotonic_s()
     await retaining.round()
 
     lasted_s = stepped_clock.monotonic_s() - begun_s
-    assert lasted_s == pytest.approx(2.0 * (1.0 + RETAINING_REST_SHARE))
-    assert LOOK_S < RETAINING_PERIOD_S
+    assert lasted_s == pytest.approx(2.0 * (1.0 + RETENTION_REST_SHARE))
+    assert LOOK_S < RETENTION_PERIOD_S
 
 
-async def test_a_store_that_fails_is_asked_again(old: OldStore, retaining: Retaining) -> None:
+async def test_a_store_that_fails_is_asked_again(old: OldStore, retaining: RetentionLoop) -> None:
     old.refusal = "disk full"
     assert not await retaining.round()
     old.refusal = None
     assert await retaining.round()
 
 
-async def test_what_cannot_be_deleted_is_told_once(old: OldStore, retaining: Retaining) -> None:
+async def test_what_cannot_be_deleted_is_told_once(old: OldStore, retaining: RetentionLoop) -> None:
     old.held_up = "roll-ups are damaged"
     with capture_logs() as lines:
         for _ in range(3):
@@ -98,7 +100,7 @@ async def test_what_cannot_be_deleted_is_told_once(old: OldStore, retaining: Ret
 
 
 async def test_a_clock_that_is_years_ahead_or_less_than_a_day_of_results_makes_nothing_old(
-    old: OldStore, retaining: Retaining, stepped_clock: Clock
+    old: OldStore, retaining: RetentionLoop, stepped_clock: Clock
 ) -> None:
     stepped_clock.step(20.0 * 365.0 * 86_400.0)  # type: ignore[attr-defined]
     await retaining.round()

@@ -11,7 +11,7 @@ from core.limits import AlarmLevel, Judgement
 from service.store.access.identities import ApiKey, Role
 from service.store.audit import AuditQuery
 from service.store.baselines import BaselineStep, StoredStep
-from service.store.outbox import LetterState
+from service.store.outbox import MessageState
 from service.store.references import GapReference, ReferenceSource, SetVectorReference
 from service.store.sharing import Command, OpenCommand
 from service.store.store import Store
@@ -48,7 +48,7 @@ def test_nothing_waits_for_anybody_in_a_new_outbox(store: Store) -> None:
     assert list(store.outbox.backlogs()) == []
     assert not store.outbox.urgent("desk")
     assert store.outbox.expire("desk", 5, "too old", 6) == store.outbox.revive("desk", 7) == 0
-    store.outbox.finish(1, LetterState.DELIVERED, "200", 8)
+    store.outbox.finish(1, MessageState.DELIVERED, "200", 8)
     assert list(store.alarms()) == []
 
 

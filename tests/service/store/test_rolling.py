@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import pytest
 from rigs.standing_clock import StandingClock
 
-from service.store.loops import ROLLING_PERIOD_S, Rolling
+from service.store.loops import ROLLUP_PERIOD_S, RollupLoop
 from service.store.port import StoreError
 
 
@@ -38,7 +38,7 @@ class Clock(StandingClock):
 
     async def sleep(self, duration_s: float) -> None:
         self.s += duration_s
-        if duration_s == ROLLING_PERIOD_S and not any(self._pile.pieces):
+        if duration_s == ROLLUP_PERIOD_S and not any(self._pile.pieces):
             raise asyncio.CancelledError
 
 
@@ -46,14 +46,14 @@ async def rested_s(pile: Pile) -> float:
     """Gather everything; returns for how long the loop has rested."""
     clock = Clock(pile)
     with pytest.raises(asyncio.CancelledError):
-        await Rolling(pile, clock).run()
+        await RollupLoop(pile, clock).run()
     return clock.s
 
 
 async def test_all_that_is_due_is_gathered_before_the_loop_rests() -> None:
     pile = Pile(3, 0, 5)
 
-    assert await rested_s(pile) == ROLLING_PERIOD_S
+    assert await rested_s(pile) == ROLLUP_PERIOD_S
     assert pile.pieces == [0, 0, 0]
 
 
@@ -61,5 +61,5 @@ async def test_a_store_that_fails_is_asked_again_later() -> None:
     pile = Pile(2)
     pile.failures = 3
 
-    assert await rested_s(pile) == 4 * ROLLING_PERIOD_S
+    assert await rested_s(pile) == 4 * ROLLUP_PERIOD_S
     assert pile.pieces == [0]

@@ -16,7 +16,7 @@ from service.runtime.heartbeats import PATIENCE_S, Heartbeats
 from service.runtime.periodic import LOOK_S
 from service.store.access.identities import Role, Session
 from service.store.audit import AuditQuery
-from service.store.loops import Scrubbing
+from service.store.loops import ScrubLoop
 from service.store.seals import Place
 from service.store.sqlite import SqliteStore
 from service.store.sqlite import checking as scrubbing
@@ -39,7 +39,7 @@ def _filled(path: Path) -> None:
 def once_around(store: SqliteStore) -> int:
     """How many looks it takes."""
     n_looks = 1
-    while not store.integrity.look_on():
+    while not store.integrity.check_some():
         n_looks += 1
     return n_looks
 
@@ -85,7 +85,7 @@ def test_after_a_restart_it_goes_on_where_it_was_also_among_keys_of_bytes(
     n_with_restarts, is_around = 0, False
     while not is_around:
         with closing(SqliteStore(path)) as store:
-            is_around = store.integrity.look_on()
+            is_around = store.integrity.check_some()
         n_with_restarts += 1
     assert n_with_restarts == n_looks
 
@@ -125,7 +125,7 @@ async def test_what_it_finds_is_told_in_the_audit_trail_and_makes_the_alarm(
     execute(f"DELETE FROM assessment WHERE time_ns = {at(3)}")  # noqa: S608
     with closing(SqliteStore(path)) as store:
         soundness = Soundness(store, stepped_clock, LiveView([], stepped_clock, 30.0))
-        loop = Scrubbing(store.integrity, stepped_clock)
+        loop = ScrubLoop(store.integrity, stepped_clock)
         while not await loop.look():
             pass
         await soundness.look()
@@ -139,8 +139,8 @@ async def test_a_disk_that_stands_still_makes_the_loop_rest_but_not_fall_silent(
     stepped_clock: Any,
 ) -> None:
     beats = Heartbeats(stepped_clock)
-    slow_disk: Any = SimpleNamespace(look_on=lambda: stepped_clock.step(30.0))
-    loop = Scrubbing(slow_disk, stepped_clock)
+    slow_disk: Any = SimpleNamespace(check_some=lambda: stepped_clock.step(30.0))
+    loop = ScrubLoop(slow_disk, stepped_clock)
     slept_s = []
 
     async def sleep(duration_s: float) -> None:

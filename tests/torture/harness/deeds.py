@@ -25,7 +25,7 @@ from core.samples.gaps import Gap
 from core.spectra.cross_spectrum import average
 from service.store.audit import AuditQuery
 from service.store.film_readings import FilmQuery
-from service.store.outbox import Letter
+from service.store.outbox import OutboxMessage
 from service.store.port import AlarmQuery, TrendQuery, UnitGap
 from service.store.spectra import SpectraLimits, SpectraQuery
 from service.store.store import Store
@@ -38,7 +38,7 @@ NAMES = tuple(quantity.name for quantity in CATALOGUE)
 
 
 @dataclass(frozen=True)
-class Deed:
+class AuditAction:
     """One transaction: a result with its spectrum, a gap, an alarm, a letter, a film's reading."""
 
     assessment: Assessment
@@ -52,7 +52,7 @@ class Deed:
 
 
 @cache
-def deed(seed: int, number: int, build: Build) -> Deed:
+def deed(seed: int, number: int, build: Build) -> AuditAction:
     """What is done in a transaction."""
     readings = {name: value(seed, number, name) for name in NAMES}
     some = {n: v if v > 0.1 else missing(Reason.NOT_MEASURED) for n, v in readings.items()}
@@ -60,7 +60,7 @@ def deed(seed: int, number: int, build: Build) -> Deed:
     phasors = np.full((1, 4, 2), 1.0 + value(seed, number, "spectrum"), dtype=complex)
     spectrum = average(np.arange(1.0, 3.0), phasors, np.ones((1, 4), dtype=bool))
     result = replace(build(time_ns, **some), spectrum=spectrum)
-    return Deed(result, _gap(seed, number), _alarm(readings, number), _film(seed, number))
+    return AuditAction(result, _gap(seed, number), _alarm(readings, number), _film(seed, number))
 
 
 def _alarm(readings: Mapping[str, float], number: int) -> AlarmNews:
@@ -98,11 +98,11 @@ def _film(seed: int, number: int) -> FilmNews:
     return FilmNews(reading, (said, said), (INITIAL_DECISION, INITIAL_DECISION))
 
 
-def letters(alarm: Alarm, event: AlarmEvent) -> Iterator[Letter]:
+def letters(alarm: Alarm, event: AlarmEvent) -> Iterator[OutboxMessage]:
     """Tell somebody of every alarm that is raised."""
     if event.change is AlarmChange.RAISED:
         body = f"{event.value!r}"
-        yield Letter(
+        yield OutboxMessage(
             *(RECEIVER, alarm.identity.subject, body, event.time_ns),
             is_urgent=False,
             is_active=True,
@@ -179,7 +179,7 @@ def loss(store: Store, seed: int, acknowledged: int, offered: int, build: Build)
     )
 
 
-def _parts_of(done: Deed, number: int) -> dict[str, object]:
+def _parts_of(done: AuditAction, number: int) -> dict[str, object]:
     """What a transaction leaves in every part of the store; not in all of them something."""
     values = [v for one in done.film.reading.values for v in (one.ln_k, one.shaft_um_pk)]
     due: dict[str, object] = {

@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
-from harness.deeds import Deed, letters
+from harness.deeds import AuditAction, letters
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
 
@@ -31,7 +31,7 @@ T = TypeVar("T")
 def main() -> None:
     """Append them, here or in one process after the other."""
     with Path(sys.argv[1]).open("rb") as file:
-        deeds: list[Deed] = pickle.load(file)  # noqa: S301  our own
+        deeds: list[AuditAction] = pickle.load(file)  # noqa: S301  our own
     folder, *bugs = sys.argv[2:]
     if folder != "-":
         sys.exit(_endure(Path(folder), deeds, bugs))
@@ -46,7 +46,7 @@ def main() -> None:
         print("END", os.waitstatus_to_exitcode(status), flush=True)
 
 
-def _endure(folder: Path, deeds: Sequence[Deed], bugs: Sequence[str]) -> int:
+def _endure(folder: Path, deeds: Sequence[AuditAction], bugs: Sequence[str]) -> int:
     acks = os.open(folder / "acks", os.O_WRONLY | os.O_CREAT)
     errors = os.open(folder / "errors", os.O_WRONLY | os.O_CREAT)
     path = folder / "data" / DATABASE
@@ -79,7 +79,7 @@ def _tried(do: Callable[[], T], errors: int) -> T | None:
     return None
 
 
-def _append(store: SqliteStore, deed: Deed, bugs: Sequence[str]) -> bool:
+def _append(store: SqliteStore, deed: AuditAction, bugs: Sequence[str]) -> bool:
     if "in_two_parts" in bugs or "two_transactions" in bugs:
         store.append([deed.assessment], [deed.gap])
         store.append([], [], [deed.alarm], [deed.film])

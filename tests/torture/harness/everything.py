@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from harness.deeds import T0_NS, Build, deed
-from service.store.access.audit_entries import Deed
+from service.store.access.audit_entries import AuditAction
 from service.store.access.identities import ApiKey, Role
 from service.store.port import StoreError
 from service.store.references import GapReference, ReferenceSource
@@ -54,7 +54,7 @@ def _others(store: SqliteStore) -> None:
     store.access.accounts.add("B. Name", Role.VIEWER, "$argon2id$" + "y" * 80, T0_NS)
     store.access.keys.add(ApiKey("k1", "wall", b"d" * 32, Role.VIEWER, ("U1",), 5, 9, None, None))
     store.audit.record(
-        [Deed(T0_NS + n, "A", "told", "something", after={"n": n}) for n in range(9)]
+        [AuditAction(T0_NS + n, "A", "told", "something", after={"n": n}) for n in range(9)]
     )
     with store.database.writing() as writer:
         for statement in OTHERS:

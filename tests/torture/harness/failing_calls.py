@@ -13,7 +13,7 @@ from typing import IO
 
 import pytest
 
-from harness.deeds import Deed
+from harness.deeds import AuditAction
 from harness.tape import environment, python
 
 PATIENCE_S = 120.0
@@ -89,7 +89,7 @@ class FailingCalls:
 
 
 @contextmanager
-def failing_calls(folder: Path, deeds: Sequence[Deed], *bugs: str) -> Iterator[FailingCalls]:
+def failing_calls(folder: Path, deeds: Sequence[AuditAction], *bugs: str) -> Iterator[FailingCalls]:
     """Start what processes are begun from."""
     with (folder / "deeds").open("wb") as file:
         pickle.dump(list(deeds), file)

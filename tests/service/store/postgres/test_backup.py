@@ -6,7 +6,7 @@ from harness.places import PostgresPlace
 from rigs.assessments import assessment
 from rigs.store_fixtures import at, query
 
-from service.store.access.audit_entries import Deed
+from service.store.access.audit_entries import AuditAction
 from service.store.postgres.store import server_trail
 
 
@@ -16,10 +16,10 @@ def test_a_dump_of_a_live_database_is_put_back_with_all_that_it_guards(
     server, dump = own_place.server, own_place.server.folder / "padwatch.dump"
     with closing(own_place.open()) as store:
         store.append([assessment(at(0), speed_rpm=92.3)], [])
-        store.audit.record([Deed(1, "anna", "test.done", "before the copy")])
+        store.audit.record([AuditAction(1, "anna", "test.done", "before the copy")])
         there = own_place.address.conninfo
         server.run("pg_dump", "--format=custom", f"--file={dump}", f"--dbname={there}")
-        store.audit.record([Deed(2, "anna", "test.done", "after it")])
+        store.audit.record([AuditAction(2, "anna", "test.done", "after it")])
     back = PostgresPlace(server, f"{own_place.database}_back", own_place.head.parent)
     server.create(back.database)
     server.run("pg_restore", f"--dbname={back.address.conninfo}", "--exit-on-error", dump)

@@ -105,7 +105,7 @@ def test_a_role_that_may_not_write_is_refused(postgres_place: PostgresPlace) -> 
     said = refused(PostgresAddress(there))
 
     assert "permission denied" in said
-    assert "give it the rights" in said
+    assert "grant the rights" in said
 
 
 def test_a_standby_is_refused(own_place: PostgresPlace) -> None:
@@ -156,7 +156,7 @@ def test_a_full_disk_is_named_as_such(
         "CREATE TRIGGER full_disk BEFORE INSERT ON assessment"
         " FOR EACH ROW EXECUTE FUNCTION full_disk()"
     )
-    with pytest.raises(StoreError, match="the disk of the database is full: make room there"):
+    with pytest.raises(StoreError, match="the disk of the database is full: free space there"):
         postgres_store.append([assessment()], [])
     postgres_place.unguard("full_disk", "assessment")
     postgres_store.append([assessment()], [])

@@ -15,7 +15,7 @@ from rigs.store_fixtures import Build
 
 from core.monitor.assessment import Assessment
 from service.settings.storage import Origin
-from service.store.access.audit_entries import Deed
+from service.store.access.audit_entries import AuditAction
 from service.store.audit import AuditQuery
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore
@@ -37,7 +37,7 @@ def write(
         all_there.wait(60)
         for n, one in enumerate(made):
             store.append([one], [])
-            store.audit.record([Deed(n, f"process {number}", "test.done", f"{n}")])
+            store.audit.record([AuditAction(n, f"process {number}", "test.done", f"{n}")])
 
 
 def all_write(place: PostgresPlace, folder: Path, build: Build) -> list[int]:
@@ -85,11 +85,11 @@ def test_a_host_that_comes_later_begins_its_head_and_says_so(
     postgres_place: PostgresPlace, tmp_path: Path
 ) -> None:
     with closing(postgres_place.open()) as store:
-        store.audit.record([Deed(1, "anna", "test.done", "one")])
+        store.audit.record([AuditAction(1, "anna", "test.done", "one")])
     elsewhere = tmp_path / "elsewhere" / "head.json"
     with closing(PostgresStore(postgres_place.address, elsewhere)) as store:
         actions = [entry.action for entry in store.audit.entries(AuditQuery())]
-        store.audit.record([Deed(n, "anna", "test.done", "two") for n in range(70)])
+        store.audit.record([AuditAction(n, "anna", "test.done", "two") for n in range(70)])
 
     assert actions == [HEAD_BEGUN, "test.done"]
     assert server_trail(postgres_place.address, elsewhere).verify().is_whole
@@ -101,7 +101,7 @@ def test_a_trail_that_was_cut_is_noticed_by_every_host(
     postgres_store: PostgresStore, postgres_place: PostgresPlace
 ) -> None:
     for n in range(3):
-        postgres_store.audit.record([Deed(n, "anna", "test.done", str(n))])
+        postgres_store.audit.record([AuditAction(n, "anna", "test.done", str(n))])
     with pytest.raises(postgres_place.refusal, match="kept"):
         postgres_place.execute("DELETE FROM audit WHERE number = 3")
     with pytest.raises(postgres_place.refusal, match="kept"):

@@ -8,7 +8,7 @@ from rigs.rolled_trends import gather_all
 
 from acquisition.clock import Clock
 from core.units import DAY_NS
-from service.store.loops import Retaining
+from service.store.loops import RetentionLoop
 from service.store.store import Store
 
 YEAR_NS = 365 * DAY_NS
@@ -53,9 +53,9 @@ async def test_a_clock_a_year_ahead_makes_results_old_after_a_day_of_them(
     stepped_clock.step(step_s)  # type: ignore[attr-defined]
     ahead = [at + YEAR_NS for at in hours(48, 24)]
     measure(store, ahead[:1])
-    await Retaining(store.retention, limits, stepped_clock).round()
+    await RetentionLoop(store.retention, limits, stepped_clock).round()
     assert n_single(store) == 51
     measure(store, ahead[1:])
-    await Retaining(store.retention, limits, stepped_clock).round()
+    await RetentionLoop(store.retention, limits, stepped_clock).round()
 
     assert n_single(store) == 25
