@@ -36,7 +36,7 @@ from service.notifications.sender import Deliveries
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import Tape
 from service.recordings.keeper import WaveformKeeper
-from service.reports.keeper import EvidenceCollector
+from service.reports.collector import EvidenceCollector
 from service.runtime.disk import SpaceWatch
 from service.runtime.heartbeats import Loop
 from service.settings.storage import Origin

@@ -35,7 +35,7 @@ from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import Tape
 from service.recordings.keeper import WaveformKeeper
 from service.recordings.metrics import recording_metrics
-from service.reports.keeper import EvidenceCollector
+from service.reports.collector import EvidenceCollector
 from service.runtime.disk import SpaceWatch
 from service.runtime.metrics import counter, gauge
 from service.runtime.polls import TimedSource

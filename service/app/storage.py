@@ -21,10 +21,10 @@ from service.recordings.keeper import WatchKeeping, WaveformKeeper
 from service.recordings.retention import Caretaker, Custody, Gauge, RoomLimits
 from service.recordings.segment import MakeWriter, TapeSettings
 from service.reports.archive import EvidenceArchive
-from service.reports.capture_link import captures_in_use
-from service.reports.keeper import EvidenceCollector, EvidenceFolders
-from service.reports.maker import Maker
-from service.reports.room import EvidenceLimits, EvidenceRetention
+from service.reports.collector import EvidenceCollector, EvidenceFolders
+from service.reports.document import Maker
+from service.reports.folders import captures_in_use
+from service.reports.retention import EvidenceLimits, EvidenceRetention
 from service.reports.routes import EvidenceService
 from service.reports.snapshot import SnapshotTaker
 from service.reports.writer import EvidenceWriter

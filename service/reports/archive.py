@@ -1,8 +1,8 @@
-"""`EvidenceArchive`: what there is of the occurrences of an alarm, honestly."""
+"""Archive of evidence: the bundles of an alarm read back, as a document or as a ZIP file."""
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import islice
@@ -13,10 +13,18 @@ from pydantic import ValidationError
 from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import ANNOUNCED, AlarmEvent
 from service.recordings.around_alarms import is_captured
-from service.reports.capture_link import CapturePart, linked
+from service.reports.collector import EvidenceFolders
 from service.reports.document import Evidence
-from service.reports.folders import DOCUMENT, Place, kept_since_ns, parsed, places, removed
-from service.reports.keeper import EvidenceFolders
+from service.reports.folders import (
+    DOCUMENT,
+    CapturePart,
+    Place,
+    kept_since_ns,
+    linked,
+    parsed,
+    places,
+    removed,
+)
 from service.runtime.times import compact
 from service.settings.configuration import canonical
 from service.store.films import FilmStore
@@ -210,3 +218,46 @@ def _of_event(event: AlarmEvent, found: Sequence[Place]) -> Place | None:
 
 def _without_hash(content: dict[str, object]) -> dict[str, object]:
     return {key: value for key, value in content.items() if key != "sha256"}
+
+
+README = """Evidence of an alarm, made by padwatch.
+
+report.html             one page to read or print
+evidence.json           all of it; its keys are described in docs/how-to/evidence.md of padwatch
+spectra.parquet         cross-spectra of all bearings of the unit
+orbits.parquet          the newest turns of the shaft
+trend.parquet           readings of the film before the alarm
+configuration.json      settings of the plant, without secrets; not for a key of some units
+capture.json            which recording holds the samples around the alarm
+samples/                that recording: padwatch recording info|verify|export reads it
+"""
+
+
+def bundle_files(
+    archive: EvidenceArchive, found: Occurrence, page: str, has_configuration: bool
+) -> Mapping[str, Path | bytes]:
+    """The files of a bundle by their names in it.
+
+    Parameters
+    ----------
+    has_configuration
+        Whether the settings of the whole plant are among them.
+
+    Raises
+    ------
+    DamagedEvidenceError, LookupError
+        If it cannot be read, or is not there.
+    """
+    if found.place is None:
+        raise LookupError("there is no bundle")
+    files: dict[str, Path | bytes] = {"README.txt": README.encode(), "report.html": page.encode()}
+    files |= {path.name: path for path in sorted(found.place.folder.iterdir())}
+    if has_configuration:
+        configuration = archive.configuration(archive.document(found.place).configuration)
+        if configuration is not None:
+            files["configuration.json"] = configuration
+    capture = linked(found.place.folder)
+    samples = None if capture is None else capture_folder(found.place, capture)
+    if samples is not None:
+        files |= {f"samples/{path.name}": path for path in sorted(samples.iterdir())}
+    return files

@@ -7,9 +7,9 @@ from html import escape
 
 from core.quality import Reason
 from core.units import NS_PER_S
+from service.reports.case import Case
 from service.reports.parts import BearingPart, CellPart, ComparisonPart
 from service.reports.plots import Plot, Scale, TimeScale, Values, around
-from service.reports.report.case import Case
 from service.reports.tables import Columns
 
 

@@ -27,12 +27,12 @@ from service.reports.archive import (
     EvidenceState,
     Occurrence,
     SamplesState,
+    bundle_files,
 )
-from service.reports.bundle import bundle_files
+from service.reports.case import read_case
+from service.reports.collector import EvidenceCollector
 from service.reports.document import Evidence
-from service.reports.keeper import EvidenceCollector
-from service.reports.report.case import read_case
-from service.reports.report.page import POLICY, report_page
+from service.reports.page import POLICY, report_page
 from service.reports.tables import TableError
 from service.runtime.files import zipped
 from service.runtime.times import rfc3339

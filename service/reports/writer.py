@@ -6,14 +6,11 @@ from pathlib import Path
 
 from core.monitor.assessment import Assessment
 from core.units import DAY_NS
-from service.reports.compared import cell_of, comparisons
-from service.reports.composed import composed, not_known, sealed
-from service.reports.document import file_part
+from service.reports.contents import cell_of, comparisons, members_of
+from service.reports.document import Maker, composed, file_part, not_known, sealed
 from service.reports.folders import DOCUMENT, INCOMPLETE, Place, place_of
-from service.reports.maker import Maker
-from service.reports.members import members_of
 from service.reports.parts import ComparisonPart
-from service.reports.room import EvidenceLimits
+from service.reports.retention import EvidenceLimits
 from service.reports.snapshot import Snapshot
 from service.reports.tables import ORBITS, SPECTRA, TREND, orbits_table, spectra_table, trend_table
 from service.runtime.files import sync_folder, write_synced

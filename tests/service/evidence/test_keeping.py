@@ -15,7 +15,7 @@ from core.quality import Reading
 from service.recordings.around_alarms import Outcome
 from service.recordings.folders import ALARM
 from service.recordings.segment import _write_alarms
-from service.reports import keeper as module
+from service.reports import collector as module
 from service.reports.archive import DamagedEvidenceError
 from service.reports.document import Evidence
 from service.reports.folders import INCOMPLETE, place_of

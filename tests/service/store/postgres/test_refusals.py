@@ -33,9 +33,9 @@ def test_a_server_that_does_not_run_is_named(tmp_path: Path) -> None:
 def test_a_database_or_a_role_that_is_not_there_is_said(postgres_server: PostgresServer) -> None:
     there = postgres_server.conninfo("nothing_like_it")
 
-    assert "does not exist; create it, as the how-to" in refused(PostgresAddress(there))
+    assert "does not exist; create it (see the how-to" in refused(PostgresAddress(there))
     there = there.replace("user=postgres", "user=nobody_here")
-    assert "does not exist; create it, as the how-to" in refused(PostgresAddress(there))
+    assert "does not exist; create it (see the how-to" in refused(PostgresAddress(there))
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,15 @@ from acquisition.clock import Clock
 from core.alarms.alarm import ANNOUNCED, AlarmEvent, AlarmNews
 from service.live.alarm_board import EvidenceStatus
 from service.recordings.around_alarms import Captures, Outcome
-from service.reports.capture_link import link, link_all, note_lost
-from service.reports.folders import clear_leftovers, note_beginning, place_of
-from service.reports.room import EvidenceRetention
+from service.reports.folders import (
+    clear_leftovers,
+    link,
+    link_all,
+    note_beginning,
+    note_lost,
+    place_of,
+)
+from service.reports.retention import EvidenceRetention
 from service.reports.snapshot import Snapshot, SnapshotTaker
 from service.reports.writer import EvidenceWriter
 from service.runtime.files import write_whole
