@@ -15,7 +15,7 @@ from core.change.film_judge import FilmFinding, FilmNews
 from core.change.settings import FilmRules
 from core.condition.cells import BearingCondition, Cell, CellGrid, FilmConditions
 from core.machine.unit import Estimator
-from core.monitor.assessment import Assessment, AveragingWindow
+from core.monitor.assessment import Assessment
 from core.monitor.catalogue import BY_NAME
 from core.quality import Level, Reading
 from core.stiffness.estimators import ESTIMATORS
@@ -57,12 +57,12 @@ LEVEL_WORDS: dict[Level, QualityWord] = {
 
 
 def bearing_part(found: Assessment, film: FilmNews | None, rules: FilmRules | None) -> BearingPart:
-    """One bearing."""
+    """Return the state of one bearing."""
     watched = None if rules is None else rules.estimators.get(found.bearing)
     return BearingPart(
         bearing=found.bearing,
         time=rfc3339(found.time_ns),
-        window=_window(found.window),
+        window=WindowPart.model_validate(found.window, from_attributes=True),
         evidence=found.evidence.value,
         speed_source=found.speed_source.value,
         condition=_condition(found.condition, rules),
@@ -74,7 +74,7 @@ def bearing_part(found: Assessment, film: FilmNews | None, rules: FilmRules | No
 
 
 def reading_part(name: str, reading: Reading) -> ReadingPart:
-    """One reading of the catalogue."""
+    """Return one reading of the catalogue."""
     return ReadingPart(
         value=finite(reading.value),
         unit=BY_NAME[name].unit,
@@ -87,7 +87,7 @@ def reading_part(name: str, reading: Reading) -> ReadingPart:
 
 
 def cell_bounds(cell: Cell | None, grid: CellGrid | None) -> list[tuple[float, float]] | None:
-    """Limits of a cell along each axis."""
+    """Return the limits of a cell along each axis."""
     if cell is None or grid is None:
         return None
     widths = (grid.eccentricity_width, grid.temperature_width_c, grid.attitude_width_deg)
@@ -110,18 +110,6 @@ def _estimators(found: Assessment, watched: Estimator | None) -> Iterator[Estima
             )
 
 
-def _window(window: AveragingWindow) -> WindowPart:
-    return WindowPart(
-        epoch=window.epoch,
-        first_index=window.first_index,
-        stop_index=window.stop_index,
-        n_segments=window.n_segments,
-        n_segments_wanted=window.n_segments_wanted,
-        coverage=window.coverage,
-        duration_s=window.duration_s,
-    )
-
-
 def _condition(found: BearingCondition | None, rules: FilmRules | None) -> ConditionPart | None:
     if found is None:
         return None
@@ -135,14 +123,7 @@ def _condition(found: BearingCondition | None, rules: FilmRules | None) -> Condi
 
 def _budget(budget: Budget) -> list[BudgetLinePart]:
     lines = (
-        BudgetLinePart(
-            name=line.name,
-            kind=line.kind.value,
-            distribution=line.distribution.value,
-            width=line.width,
-            sensitivity=line.sensitivity,
-            contribution=line.contribution,
-        )
+        BudgetLinePart.model_validate(line, from_attributes=True)
         for line in budget.lines
         if math.isfinite(line.contribution) and math.isfinite(line.width)
     )
@@ -195,12 +176,12 @@ MAX_MEMBERS = 2000
 
 @dataclass(frozen=True)
 class Members:
-    """All settled readings of a cell in the learning period, both directions."""
+    """Settled readings of a cell in the learning period, both directions."""
 
     history: StiffnessHistory
 
     def part(self, direction: Direction) -> MembersPart:
-        """Those of one direction, spread evenly if they are many."""
+        """Return the readings of one direction, spread evenly if they are many."""
         row, found = AXES.index(direction), self.history
         measured = np.flatnonzero(np.isfinite(found.ln_k[row]))
         step = max(1, -(-measured.size // MAX_MEMBERS))
@@ -227,7 +208,7 @@ class Members:
 def members_of(
     store: FilmStore, cell: Cell, baseline: BearingBaseline, rules: FilmRules
 ) -> Members:
-    """Read the members of a cell.
+    """Return the readings of a cell.
 
     Raises
     ------
@@ -258,24 +239,24 @@ def members_of(
 
 
 N_EXPECTED = 60
-"""Points of the line that shows what is expected."""
+"""Number of points of the line of expected stiffness."""
 
 
 def comparisons(
     news: FilmNews, baseline: BearingBaseline | None, rules: FilmRules, members: Members | None
 ) -> list[ComparisonPart]:
-    """Both directions of a bearing's film.
+    """Return the comparisons of both directions of a bearing's film.
 
     Parameters
     ----------
     members
-        Readings of the cell that the baseline stands on; None if they could not be read.
+        Readings of the cell; None if they are unreadable.
     """
     return [_comparison(news, axis, baseline, rules, members) for axis in AXES]
 
 
 def cell_of(news: FilmNews, rules: FilmRules) -> Cell | None:
-    """The cell of a reading; None where its condition is not known."""
+    """Return the cell of a reading; None if its condition is unknown."""
     here = _here(news)
     if not rules.grid.is_known(here)[0]:
         return None
@@ -327,7 +308,7 @@ def _own_cell(learned: QuantityBaseline, cell: Cell) -> CellStatistics | None:
 
 
 def _expected_at(learned: QuantityBaseline, conditions: FilmConditions) -> list[float]:
-    """Expected stiffness at each condition; not a number where nothing is known."""
+    """Return the expected stiffness at each condition; NaN if unknown."""
     place = learned.table.find(learned.grid.cells(conditions))
     known = learned.is_known(conditions) & (place >= 0)
     nothing = np.full(len(conditions), np.nan)
@@ -337,7 +318,7 @@ def _expected_at(learned: QuantityBaseline, conditions: FilmConditions) -> list[
 
 
 def _line(learned: QuantityBaseline, news: FilmNews) -> ExpectedPart | None:
-    """What is expected over all eccentricities at the oil temperature of the reading."""
+    """Return the expected stiffness by eccentricity at the oil temperature of the reading."""
     seen = [cell.cell[0] for cell in learned.table.cells]
     here, width = news.reading, learned.grid.eccentricity_width
     if not seen or not math.isfinite(here.oil_temperature_c):
@@ -380,7 +361,7 @@ def _time_scales(
     decision: Decision, learned: QuantityBaseline, rules: FilmRules
 ) -> Iterator[TimeScalePart]:
     if len(decision.evidence.scales) != len(learned.time_scatter):
-        return  # nothing has been gathered with this baseline
+        return  # the evidence was not gathered with this baseline
     for found in decision.evidence.findings(learned):
         yield TimeScalePart(
             time_scale_h=found.time_scale_h,

@@ -33,53 +33,53 @@ VERSION = 1
 
 
 class AlarmPart(EvidencePart):
-    """The alarm and the event that began this occurrence of it."""
+    """Alarm, and the event that began this occurrence."""
 
     id: Annotated[str, Field(examples=["U1:UJB:stiffness_x"])]
     """Identifier."""
 
     unit: Annotated[str, Field(examples=["U1"])]
-    """Unit; "plant" for the service itself."""
+    """Unit; "plant" for alarms about the service itself."""
 
     subject: Annotated[str, Field(examples=["UJB"])]
-    """Bearing, channel or part that it is about."""
+    """Bearing, channel or component of the alarm."""
 
     kind: Annotated[str, Field(examples=["stiffness_x"])]
-    """What is wrong."""
+    """Kind of alarm."""
 
     occurrence: int
-    """Counts how often it was raised or rose in level."""
+    """Number of times that the alarm was raised or rose in level."""
 
     change: Annotated[str, Field(examples=["raised"])]
-    """raised or escalated."""
+    """Change of the alarm: raised or escalated."""
 
     level: LevelWord | None
-    """Level that it has since."""
+    """Level after the event."""
 
     state: Annotated[str, Field(examples=["unacknowledged"])]
-    """State that it had since."""
+    """State after the event."""
 
     time: Moment
-    """When."""
+    """Time of the event."""
 
     time_ns: int
-    """The same, nanoseconds since 1970 UTC."""
+    """Time of the event, nanoseconds since 1970 UTC."""
 
     value: float | None
-    """What was compared with the limit; of a film's change, in ln."""
+    """Value compared with the limit; of a change of a film, in ln."""
 
     limit: float | None
-    """The limit."""
+    """Limit."""
 
     value_unit: str | None
-    """Unit of both."""
+    """Unit of value and limit."""
 
     reason: Annotated[str, Field(examples=["film"])]
-    """Why, in a word."""
+    """Reason in a word."""
 
 
 class UnitPart(EvidencePart):
-    """The unit at that moment."""
+    """Unit at the time of the alarm."""
 
     id: Annotated[str, Field(examples=["U1"])]
     """Identifier."""
@@ -88,85 +88,85 @@ class UnitPart(EvidencePart):
     """Name, or empty."""
 
     link: Annotated[str, Field(examples=["connected"])]
-    """Whether samples arrived."""
+    """State of the link to the samples."""
 
     link_reason: str | None
-    """Why not."""
+    """Reason for that state."""
 
     last_sample: Moment | None
-    """Time of the newest sample, by the device's clock."""
+    """Time of the newest sample by the device's clock."""
 
 
 class FilePart(EvidencePart):
-    """A file beside this one."""
+    """File of the bundle."""
 
     size: int
-    """Bytes."""
+    """Size in bytes."""
 
     sha256: Sha256
-    """Hash of its bytes."""
+    """SHA-256 of its content."""
 
 
 class Evidence(EvidencePart):
-    """All that was known when an alarm was raised, or rose in level."""
+    """State of a unit when an alarm was raised, or rose in level."""
 
     format: Literal["padwatch-evidence"]
-    """Always this."""
+    """Name of the format."""
 
     version: Literal[1]
-    """Of the format."""
+    """Version of the format."""
 
     made_by: Annotated[str, Field(examples=["padwatch 0.1.0"])]
     """Program and its version."""
 
     origin: Literal["live", "replay"]
-    """Whether a machine was watched, or a recording played."""
+    """Origin of the data: a live machine, or a replayed recording."""
 
     plant: Annotated[str, Field(examples=["Itaipu"])]
     """Name of the plant."""
 
     taken: Moment
-    """When this was noted down, host time."""
+    """Host time at which the state was recorded."""
 
     configuration: Sha256
-    """Version of the configuration: names the file that holds it in full."""
+    """Version of the configuration, which names its file."""
 
     alarm: AlarmPart
-    """The alarm."""
+    """Alarm."""
 
     unit: UnitPart | None
-    """The unit; null for the service itself."""
+    """Unit; null for alarms about the service itself."""
 
     bearing: str | None
-    """Bearing that the alarm is about, if it is about one."""
+    """Bearing of the alarm, if any."""
 
     direction: Direction | None
-    """Direction, likewise."""
+    """Direction of the alarm, if any."""
 
     bearings: list[BearingPart]
     """All bearings of the unit, that of the alarm first."""
 
     comparisons: list[ComparisonPart]
-    """The films of the alarm's bearing with what they were compared with."""
+    """Comparisons of the films of the alarm's bearing."""
 
     limits: dict[str, Any]
-    """Settings that applied, as in the plant file: of alarms, films, analysis and the bearing."""
+    """Settings in force, as in the plant file: of alarms, films, analysis and the bearing."""
 
     missing: list[str]
-    """What could not be had, in sentences."""
+    """Missing data, in sentences."""
 
     samples_expected: bool
     """Whether the samples around the alarm were going to be kept."""
 
     files: dict[str, FilePart]
-    """The files beside this one, but for those that came later."""
+    """Other files of the bundle, except those added later."""
 
     sha256: Sha256
-    """Of this document without this line: keys sorted, no spaces, UTF-8."""
+    """SHA-256 of this document without this key: keys sorted, no spaces, UTF-8."""
 
 
 def file_part(path: Path) -> FilePart:
-    """Size and hash of a file."""
+    """Return size and hash of a file."""
     hashed, size = hashlib.sha256(), 0
     with path.open("rb") as file:
         while chunk := file.read(CHUNK):
@@ -177,12 +177,12 @@ def file_part(path: Path) -> FilePart:
 
 @dataclass(frozen=True)
 class Maker:
-    """Who makes bundles, and of which plant.
+    """Origin of bundles.
 
     Parameters
     ----------
     made_by
-        Program and its version; the host and its user are nothing for a reader of evidence.
+        Program and its version, without the host and its user.
     """
 
     plant: PlantFile
@@ -192,9 +192,8 @@ class Maker:
 
 
 def sealed(document: dict[str, Any]) -> bytes:
-    """The document as its file has it, with the hash of all the rest."""
-    nobody = "0" * 64
-    blank = Evidence(**document, sha256=nobody)
+    """Return the content of a document file, with the hash of the rest."""
+    blank = Evidence(**document, sha256="0" * 64)
     content = blank.model_dump(mode="json", by_alias=True)
     content.pop("sha256")
     whole = blank.model_copy(update={"sha256": hashlib.sha256(canonical(content)).hexdigest()})
@@ -202,7 +201,7 @@ def sealed(document: dict[str, Any]) -> bytes:
 
 
 def composed(snapshot: Snapshot, maker: Maker) -> dict[str, Any]:
-    """All of a document that needs neither store nor disk."""
+    """Return the fields of a document that need neither store nor disk."""
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -267,7 +266,7 @@ def _direction(snapshot: Snapshot) -> Direction | None:
 
 
 def _limits(snapshot: Snapshot, plant: PlantFile, rules: FilmRules | None) -> dict[str, Any]:
-    """Settings that applied, without secrets."""
+    """Return the settings in force, without secrets."""
     found: dict[str, Any] = {
         "alarms": plant.alarms.model_dump(mode="json"),
         "analysis": plant.analysis.model_dump(mode="json"),
@@ -285,7 +284,7 @@ def _limits(snapshot: Snapshot, plant: PlantFile, rules: FilmRules | None) -> di
 
 
 def not_known(snapshot: Snapshot) -> list[str]:
-    """What was not known yet when the alarm came."""
+    """Return sentences about data that were unknown at the time of the alarm."""
     own: BearingSnapshot | None = snapshot.bearings.get(snapshot.bearing or "")
     found = [
         f"bearing {each} had no result yet"

@@ -91,27 +91,27 @@ SAMPLES = {
 CONDITION = ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
 
 LONGEST = 160
-"""Characters of what somebody wrote that a report has room for."""
+"""Maximum length of free text in a report."""
 
 
 def plain(name: str) -> str:
-    """A name as words."""
+    """Return a name as words."""
     return name.replace("_", " ")
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
-    """At most so long that the page stays one page."""
+    """Shorten a text so that the report fits on one page."""
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
 def headline(evidence: Evidence) -> str:
-    """What and where in one line."""
+    """Return unit, subject and kind of the alarm."""
     alarm = evidence.alarm
     return f"{alarm.unit} {alarm.subject}: {kind_words(alarm.kind)}"
 
 
 def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
-    """Name and words of each fact."""
+    """Yield the name and text of each fact."""
     evidence, alarm = case.evidence, case.evidence.alarm
     unit = evidence.unit
     where = [evidence.plant, unit.name if unit and unit.name else alarm.unit, alarm.subject]
@@ -129,7 +129,7 @@ def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
 
 
 def value_words(case: Case) -> str:
-    """Value and limit; of a film's change, in percent with its interval."""
+    """Return value and limit; of a change of a film, in percent with its interval."""
     alarm, found = case.evidence.alarm, finding(case)
     if alarm.kind in FILM_KINDS and found is not None and found.change is not None:
         limit = (
@@ -146,7 +146,7 @@ def value_words(case: Case) -> str:
 
 
 def change_words(found: FindingPart) -> str:
-    """A change in ln as percent, with its interval."""
+    """Return a change in ln as percent, with its interval."""
     if found.change is None:
         return "–"
     if found.change_std is None:
@@ -157,12 +157,12 @@ def change_words(found: FindingPart) -> str:
 
 
 def percent(change: float) -> str:
-    """A change in ln as percent."""
+    """Return a change in ln as percent."""
     return f"{100.0 * math.expm1(change):+.1f} %".replace("-", "−")
 
 
 def condition_words(bearing: BearingPart) -> str:
-    """Under which condition the bearing ran."""
+    """Return the operating condition of the bearing."""
     words = []
     if bearing.condition is not None:
         settled = "" if bearing.condition.is_settled else ", not settled"
@@ -176,28 +176,28 @@ def condition_words(bearing: BearingPart) -> str:
 
 
 def number_words(reading: ReadingPart) -> str:
-    """A number with its unit."""
+    """Return a number with its unit."""
     unit = "" if reading.unit == "1" else f" {reading.unit}"
     return "–" if reading.value is None else f"{reading.value:.4g}{unit}"
 
 
 def state_words(case: Case) -> str:
-    """Where the occurrence stands after its newest event."""
+    """Return the state after the newest event."""
     if not case.events:
         return "its events are not in the store"
     return plain(case.events[-1].state_after.value)
 
 
 def seen_words(case: Case) -> str:
-    """Who has acknowledged the occurrence, and when."""
+    """Return who acknowledged the occurrence, and when."""
     seen = [each for each in case.events if each.change is AlarmChange.ACKNOWLEDGED]
     if not seen:
-        return "nobody has acknowledged it"
+        return "not acknowledged"
     return f"{seen[-1].actor}, {day_and_time(seen[-1].time_ns)}"
 
 
 def finding(case: Case) -> FindingPart | None:
-    """What was said of the alarm's film."""
+    """Return the finding about the alarm's film."""
     film = None if case.bearing is None else case.bearing.film
     if film is None:
         return None
@@ -205,7 +205,7 @@ def finding(case: Case) -> FindingPart | None:
 
 
 def story(case: Case) -> str:
-    """What has happened, in a sentence or two."""
+    """Describe the change in one or two sentences."""
     found = finding(case)
     if case.evidence.alarm.kind not in FILM_KINDS or found is None or found.change is None:
         return ""
@@ -229,11 +229,11 @@ def story(case: Case) -> str:
 GN_PER_M = 1e9
 
 MAX_EVENTS, MAX_ACTOR, MAX_NOTE = 6, 32, 84
-"""That a page has room for: lines, and characters in one."""
+"""Limits of the table of events: rows, and characters per cell."""
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of words."""
+    """Return an HTML table of escaped text."""
     head = "".join(f"<th>{escape(each)}</th>" for each in heads)
     body = "".join(
         "<tr>" + "".join(f'<td class="n">{escape(cell)}</td>' for cell in row) + "</tr>"
@@ -243,7 +243,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def estimators_table(bearing: BearingPart) -> str:
-    """All estimators side by side."""
+    """Return the table of all estimators."""
     heads = ["Estimator"]
     for axis in AXES:
         heads += [f"k {axis}, GN/m (± random ± systematic, std)", f"coherence {axis}"]
@@ -259,7 +259,7 @@ def estimators_table(bearing: BearingPart) -> str:
 
 
 def films_table(evidence: Evidence) -> str:
-    """What was said of the films of all bearings at that moment."""
+    """Return the table of the films of all bearings at the time of the alarm."""
     found = [each for each in evidence.bearings if each.film is not None]
     if not found:
         return ""
@@ -269,7 +269,7 @@ def films_table(evidence: Evidence) -> str:
 
 
 def events_table(case: Case) -> str:
-    """What has happened to the occurrence, and who did it."""
+    """Return the table of the events of the occurrence."""
     shown = list(case.events)[-MAX_EVENTS:]
     n_more = len(case.events) - len(shown)
     title = "What has happened" + (f" ({n_more} earlier not shown)" if n_more else "")
@@ -278,7 +278,7 @@ def events_table(case: Case) -> str:
 
 
 def footer(case: Case) -> str:
-    """Versions and hashes."""
+    """Return versions and hashes."""
     evidence, found = case.evidence, case.comparison
     baseline = None if found is None else found.baseline
     words = [f"configuration {evidence.configuration}"]
@@ -339,16 +339,16 @@ def _event(event: AlarmEvent) -> tuple[str, str, str, str]:
 
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
-"""For the header of the answer and for the page that somebody opens from a bundle."""
+"""Content security policy of the response, and of the page opened from a bundle."""
 
 
 def report_page(case: Case, now_ns: int) -> str:
-    """The report of an occurrence.
+    """Return the report of an occurrence.
 
     Parameters
     ----------
     now_ns
-        When it is printed: what has come since the alarm is shown up to then.
+        Time of the report; later data are shown up to it.
     """
     evidence = case.evidence
     title, level = escape(headline(evidence)), evidence.alarm.level or "alert"
