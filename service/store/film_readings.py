@@ -41,7 +41,7 @@ class FilmQuery:
     states
         Operating states; empty for all.
     newest
-        Maximum number of readings, of which the newest are returned; None for all.
+        Maximum number of readings, the newest being returned; None for all.
     """
 
     unit: str

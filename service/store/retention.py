@@ -22,9 +22,9 @@ from service.store.rollups.writing import (
     forget_width,
     minutes_of,
     rolled_columns,
-    select_gone,
+    select_deleted,
     select_mark,
-    set_gone,
+    set_deleted,
 )
 from service.store.trends import Span
 
@@ -96,14 +96,14 @@ class Step(Enum):
 
 def _delete_readings(writer: Connection, series: int, before_ns: int) -> Step:
     """Delete the next old single readings of a bearing."""
-    gone = select_gone(writer, series)
+    deleted = select_deleted(writer, series)
     limit_ns = _floor(min(before_ns, select_mark(writer, series)))
-    span = _next_readings(writer, series, (gone.readings_ns, limit_ns))
+    span = _next_readings(writer, series, (deleted.readings_ns, limit_ns))
     end_ns = _verified_until(writer, series, span)
     if end_ns <= span[0]:
         return Step.NONE
     writer.execute(DELETE_READINGS, (series, span[0], end_ns))
-    set_gone(writer, series, SINGLE_S, end_ns)
+    set_deleted(writer, series, SINGLE_S, end_ns)
     return Step.DONE
 
 
@@ -113,10 +113,10 @@ def _delete_rollups(width_s: int, writer: Connection, series: int, before_ns: in
     Roll-ups that disagree with wider ones stay and block later ones: finer data are gone, so they
     cannot be aggregated again, and one time marks the end of what was deleted.
     """
-    width_ns, gone = width_s * NS_PER_S, select_gone(writer, series)
+    width_ns, deleted = width_s * NS_PER_S, select_deleted(writer, series)
     finer_s = {wider // NS_PER_S: finer // NS_PER_S for finer, wider in pairwise((0, *WIDTHS_NS))}
-    limit_ns = _floor(min(before_ns, gone.of(finer_s[width_s])))
-    span = _next_cells(writer, series, width_s, (gone.of(width_s), limit_ns))
+    limit_ns = _floor(min(before_ns, deleted.of(finer_s[width_s])))
+    span = _next_cells(writer, series, width_s, (deleted.of(width_s), limit_ns))
     if span[0] >= span[1] or writer.execute(REDONE, (series, *span)).fetchone():
         return Step.NONE  # late readings are merged first
     fine = select_cells(writer, series, width_ns, span, rolled_columns())
@@ -124,7 +124,7 @@ def _delete_rollups(width_s: int, writer: Connection, series: int, before_ns: in
     if fine is None or not all(_agrees(writer, series, fine, w, span) for w in wider_ns):
         return Step.BLOCKED
     forget_width(writer, series, width_ns, span)
-    set_gone(writer, series, width_s, span[1])
+    set_deleted(writer, series, width_s, span[1])
     return Step.DONE
 
 

@@ -81,7 +81,7 @@ _VERSION = 2
 Later versions write repeated values as references, so that equal rows may differ."""
 
 
-def begun(table: str) -> int:
+def initial_crc(table: str) -> int:
     """Return the initial value of the checksums of a table."""
     return zlib.crc32(table.encode())
 
@@ -217,7 +217,7 @@ class Seals:
     def begin(self, writer: sqlite3.Connection) -> None:
         """Create missing checksums within a transaction, and maintain them on this connection."""
         self.tables = {table.name: table for table in _tables(writer)}
-        self.teach(writer)
+        self.register_functions(writer)
         (schema,) = writer.execute("PRAGMA main.user_version").fetchone()
         now = (FORMAT * PER_FORMAT + schema,)
         writer.execute(SCHEMA)
@@ -235,20 +235,20 @@ class Seals:
             for statement in table.create:
                 writer.execute(statement)
 
-    def know(self, reader: sqlite3.Connection) -> None:
+    def load(self, reader: sqlite3.Connection) -> None:
         """Read which tables have checksums, in a database that another process may be writing."""
         there = {name for (name,) in reader.execute("SELECT name FROM main.sqlite_master")}
         self.tables = {t.name: t for t in _tables(reader) if t.seals in there}
-        self.teach(reader)
+        self.register_functions(reader)
 
-    def guard(self, reader: sqlite3.Connection) -> None:
+    def install_views(self, reader: sqlite3.Connection) -> None:
         """Let a connection see intact rows only."""
-        self.teach(reader)
+        self.register_functions(reader)
         for table in self.tables.values():
             reader.execute(table.view())
             reader.execute(table.view(WHOLE))
 
-    def teach(self, connection: sqlite3.Connection) -> None:
+    def register_functions(self, connection: sqlite3.Connection) -> None:
         """Register the functions that compute checksums on a connection."""
         for name in self.tables:
             connection.create_function(SEAL + name, -1, _sealed(name), deterministic=True)
@@ -256,7 +256,7 @@ class Seals:
             connection.create_function(IS_WHOLE + name, -1, is_whole, deterministic=True)
 
     def _is_whole(self, name: str) -> Callable[..., bool]:
-        begun_with = begun(name)
+        begun_with = initial_crc(name)
 
         def is_whole(seal: int | None, *cells: Cell) -> bool:
             return seal_of(begun_with, cells) == seal or self._noted(name, cells)
@@ -275,7 +275,7 @@ class Seals:
 
 
 def _sealed(name: str) -> Callable[..., int]:
-    begun_with = begun(name)
+    begun_with = initial_crc(name)
     return lambda *cells: seal_of(begun_with, cells)
 
 

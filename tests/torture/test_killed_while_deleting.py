@@ -109,7 +109,9 @@ def test_planted_bug_of_a_mark_in_a_transaction_of_its_own_is_found(
     path.write_bytes(old_file)
     with closing(SqliteStore(path)) as store:
         before = by_the_hour(store)
-        monkeypatch.setattr(deleting, "set_gone", lambda *_: None)  # killed before the second one
+        monkeypatch.setattr(
+            deleting, "set_deleted", lambda *_: None
+        )  # killed before the second one
         (series,) = store.retention.series()
         store.retention.delete(series, {"readings_days": 0}, LATER_NS)
         fine = TrendQuery("U1", "UJB", ("speed_rpm",), T0_NS, T0_NS + HOUR_NS, 5000, 1)

@@ -17,7 +17,7 @@ from service.store.buckets import (
 from service.store.database import Connection
 from service.store.port import Trend, TrendQuery
 from service.store.rollups.rows import ANYTHING, HOUR_NS, WIDTHS_NS, Cells, Conditions, select_cells
-from service.store.rollups.writing import Gone, select_gone, select_mark
+from service.store.rollups.writing import DeletedUntil, select_deleted, select_mark
 from service.store.series import find_series
 from service.store.trends import Span, arguments, select_page, select_readings, storable, too_large
 
@@ -40,9 +40,9 @@ class Cover:
     Parameters
     ----------
     summaries
-        Roll-ups of which every reading is requested, aggregated into buckets.
+        Roll-ups whose readings are all requested, aggregated into buckets.
     spans
-        Spans of which single readings must be read.
+        Spans whose single readings must be read.
     rolled_spans
         Spans of the roll-ups.
     n_rolled
@@ -61,7 +61,7 @@ class Cover:
 def covered(
     reader: Connection,
     query: TrendQuery,
-    gone: Gone,
+    deleted: DeletedUntil,
     whole: Span,
     bucket_ns: int,
 ) -> Cover:
@@ -72,7 +72,7 @@ def covered(
 
     Parameters
     ----------
-    gone
+    deleted
         Times up to which data of the bearing were deleted.
     bucket_ns
         Width of the requested buckets.
@@ -86,10 +86,10 @@ def covered(
     if series is None:
         return Cover()
     covering = _Covering(reader, query, series, bucket_ns)
-    for stretch in gone.stretches(whole):
-        if stretch[0] < gone.readings_ns:
+    for stretch in deleted.stretches(whole):
+        if stretch[0] < deleted.readings_ns:
             covering.take_coarse(
-                stretch, [w for w in gone.kept_ns(stretch[0]) if bucket_ns % w == 0]
+                stretch, [w for w in deleted.kept_ns(stretch[0]) if bucket_ns % w == 0]
             )
         else:
             covering.take(stretch, [w for w in WIDTHS_NS if bucket_ns % w == 0])
@@ -197,7 +197,7 @@ class _Covering:
             self.cover.rolled_spans += _runs(np.unique(chosen.time_ns), width_ns)
 
     def _cut(self, conditions: Conditions) -> npt.NDArray[np.bool_]:
-        """Return the cells of which only some readings may be requested."""
+        """Return the cells whose readings may be requested only in part."""
         asked = self._asked
         sides = (
             (asked["eccentricity_low"], conditions.eccentricity_low, -1.0),
@@ -242,25 +242,27 @@ def read_trend(reader: Connection, query: TrendQuery) -> Trend:
     QueryTooLargeError
         If too many single readings would have to be read.
     """
-    gone = _gone(reader, query)
+    deleted = _deleted(reader, query)
     whole = (storable(query.start_ns), storable(query.end_ns))
-    coarse_ns = gone.readings_ns if whole[0] < gone.readings_ns else None
+    coarse_ns = deleted.readings_ns if whole[0] < deleted.readings_ns else None
     if query.is_page:
         found = page(select_page(reader, query), query.max_points, query.hole_ns)
     else:
-        finest_ns = gone.finest_ns(whole[0]) or 1
+        finest_ns = deleted.finest_ns(whole[0]) or 1
         width_ns = bucket_width_ns(*whole, query.max_points, finest_ns)
-        found = _read(reader, query, gone, whole, width_ns)
+        found = _read(reader, query, deleted, whole, width_ns)
     return replace(found, coarse_until_ns=coarse_ns)
 
 
-def _gone(reader: Connection, query: TrendQuery) -> Gone:
+def _deleted(reader: Connection, query: TrendQuery) -> DeletedUntil:
     series = find_series(reader, query.unit, query.bearing)
-    return Gone({}) if series is None else select_gone(reader, series)
+    return DeletedUntil({}) if series is None else select_deleted(reader, series)
 
 
-def _read(reader: Connection, query: TrendQuery, gone: Gone, whole: Span, width_ns: int) -> Trend:
-    cover = covered(reader, query, gone, whole, width_ns)
+def _read(
+    reader: Connection, query: TrendQuery, deleted: DeletedUntil, whole: Span, width_ns: int
+) -> Trend:
+    cover = covered(reader, query, deleted, whole, width_ns)
     n_single, singles = select_readings(reader, query, cover.spans, width_ns)
     if cover.is_coarse or cover.n_rolled + n_single > query.max_points:
         return bucketed(Summaries.together([*cover.summaries, singles]), width_ns)

@@ -6,12 +6,12 @@ from service.store.database import Connection, Tables
 from service.store.rollups.rows import HOUR_NS, WIDTHS_NS, select_cells, together
 from service.store.rollups.writing import (
     MINUTE_NS,
-    Gone,
+    DeletedUntil,
     forget_width,
     insert_cells,
     minutes_of,
     rolled_columns,
-    select_gone,
+    select_deleted,
     select_mark,
 )
 from service.store.trends import Span
@@ -19,7 +19,7 @@ from service.store.trends import Span
 DELETE_HOUR = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?"
 
 
-def merge_late(writer: Connection, series: int, hour_ns: int, gone: Gone) -> None:
+def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUntil) -> None:
     """Merge late readings of an hour whose single readings were deleted into its roll-ups.
 
     The readings are deleted in the same transaction, so that each is either stored or merged. A
@@ -30,7 +30,7 @@ def merge_late(writer: Connection, series: int, hour_ns: int, gone: Gone) -> Non
     minutes = minutes_of(writer, series, hour)
     if minutes is None:
         return
-    for width_ns in gone.kept_ns(hour_ns):
+    for width_ns in deleted.kept_ns(hour_ns):
         late = minutes.gathered(width_ns)
         before = select_cells(writer, series, width_ns, hour, rolled_columns())
         forget_width(writer, series, width_ns, hour)
@@ -64,17 +64,17 @@ def gather_next(writer: Connection, series: int, now_ns: int) -> None:
         writer.execute(SET_MARK, (series, until_ns))
 
 
-def gather_anew(writer: Connection, series: int) -> None:
+def gather_again(writer: Connection, series: int) -> None:
     """Aggregate again the hours that received readings since they were aggregated."""
     mark_ns = select_mark(writer, series)
     hours = writer.execute(
         "SELECT start_ns FROM rollup_redo WHERE series = ? ORDER BY start_ns LIMIT ?",
         (series, MAX_REDONE),
     ).fetchall()
-    gone = select_gone(writer, series)
+    deleted = select_deleted(writer, series)
     for (hour_ns,) in hours:
-        if hour_ns < gone.readings_ns:
-            merge_late(writer, series, hour_ns, gone)
+        if hour_ns < deleted.readings_ns:
+            merge_late(writer, series, hour_ns, deleted)
         else:
             _gather_hour(writer, series, (hour_ns, min(hour_ns + HOUR_NS, mark_ns)))
         writer.execute(
@@ -147,5 +147,5 @@ class RollupStore(Tables):
             If nothing was aggregated.
         """
         with self._writing() as writer:
-            gather_anew(writer, series)
+            gather_again(writer, series)
             gather_next(writer, series, now_ns)

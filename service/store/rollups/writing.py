@@ -110,7 +110,7 @@ SET_DELETED = """
 
 
 @dataclass(frozen=True)
-class Gone:
+class DeletedUntil:
     """Times up to which data of a bearing were deleted.
 
     Parameters
@@ -144,13 +144,13 @@ class Gone:
         return list(pairwise(cuts))
 
 
-def select_gone(reader: Connection, series: int) -> Gone:
+def select_deleted(reader: Connection, series: int) -> DeletedUntil:
     """Return the times up to which data of a bearing were deleted."""
-    return Gone(
+    return DeletedUntil(
         {int(width): int(until) for width, until in reader.execute(SELECT_DELETED, (series,))}
     )
 
 
-def set_gone(writer: Connection, series: int, width_s: int, until_ns: int) -> None:
+def set_deleted(writer: Connection, series: int, width_s: int, until_ns: int) -> None:
     """Record a deletion in its transaction."""
     writer.execute(SET_DELETED, (series, width_s, until_ns))

@@ -60,7 +60,7 @@ def findings(path: Path, progress: Callable[[float], None] = lambda _: None) -> 
         ) as reader:
             mark = _mark_inside(reader)  # now: a running service changes both
             yield from (Finding("structure", each) for each in structure_findings(reader))
-            seals.know(reader)
+            seals.load(reader)
             _look_at_rows(reader, seals, log, progress)
             mark = mark or select_mark(reader)
             if mark is not None:
@@ -207,7 +207,7 @@ def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
 
 
 def _json_cell(cell: Any) -> Any:
-    """A cell of a key as JSON can hold it; the keys of sessions are bytes."""
+    """Return a value of a key as JSON; keys of sessions are bytes."""
     return {HEX: cell.hex()} if isinstance(cell, bytes) else cell
 
 

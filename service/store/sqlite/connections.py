@@ -73,7 +73,7 @@ class Readers:
             reader.close()
 
     def _should_end(self) -> Callable[[], bool]:
-        """Whether a read that begins now should end: by the asker, or by time."""
+        """Return a callback that ends a read after a timeout or when the client has gone."""
         asker, end_s = ASKER.get(), self._now_s() + LONGEST_S
         return lambda: self._now_s() > end_s or (asker is not None and asker.has_gone)
 

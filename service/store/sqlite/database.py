@@ -20,7 +20,7 @@ from service.store.sqlite.file import (
     error_message,
     held,
     is_of_the_row,
-    why_cut,
+    truncation_of,
 )
 from service.store.sqlite.migrating import migrate
 
@@ -65,12 +65,12 @@ class SqliteDatabase:
         self.damage = DamageLog()
         self.seals = Seals(self.damage)
         self.file = OpenedFile(path)
-        self._readers = Readers(path, prepare=self.seals.guard, require=self.file.require)
+        self._readers = Readers(path, prepare=self.seals.install_views, require=self.file.require)
         self.marks = CommitMarks(MarkFile(mark_path(path)), SystemClock().now_ns)
         with self._store_errors():
             if (unusable := why_unusable(path)) is not None:
                 raise StoreError(unusable)
-            if (cut := why_cut(path)) is not None:
+            if (cut := truncation_of(path)) is not None:
                 raise StoreError(f"{path}: {cut}")
             connection = opened(path)
             try:

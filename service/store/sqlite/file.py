@@ -83,7 +83,7 @@ _LARGEST_PAGE = 65_536
 """Stored as 1."""
 
 
-def why_cut(path: Path) -> str | None:
+def truncation_of(path: Path) -> str | None:
     """Return why a database file is incomplete; None if its length is plausible.
 
     With a log beside it the file may end anywhere, since the log holds the page being written.

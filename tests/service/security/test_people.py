@@ -51,7 +51,7 @@ def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(
 ) -> None:
     people.add("anna", Role.VIEWER, PASSWORD, T0)
     before = access.accounts.get("anna")
-    with pytest.raises(AccessRefusedError, match="an account anna already"):
+    with pytest.raises(AccessRefusedError, match="account anna already exists"):
         people.add("ANNA", Role.ADMIN, PASSWORD, T0)
     with pytest.raises(NameRefusedError):
         people.add("=anna", Role.VIEWER, PASSWORD, T0)
