@@ -242,7 +242,7 @@ async def test_a_capture_that_was_finished_just_before_a_crash_is_linked_after_i
 
 
 async def test_samples_that_were_expected_and_never_came_are_lost(rig: Any, news: Make) -> None:
-    rig.keeper._camera = Expecting({u.id: u for u in rig.plant.unit}, rig.live, rig.films)
+    rig.keeper._taker = Expecting({u.id: u for u in rig.plant.unit}, rig.live, rig.films)
     await rig.write(news())
 
     assert samples(rig, frozenset({(SHAFT, 1)})) == "being_made"
