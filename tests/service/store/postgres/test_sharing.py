@@ -68,7 +68,7 @@ def test_processes_write_at_the_same_time_and_the_trail_is_one_chain(
         verdict = server_trail(postgres_place.address, head).verify()
         assert verdict.is_whole
         assert verdict.n_entries >= N_PROCESSES * N_WRITES
-        assert not verdict.told
+        assert not verdict.contradictions
 
 
 def test_a_database_is_brought_up_to_date_by_one_of_two_that_open_it(
