@@ -236,7 +236,7 @@ def test_a_trail_is_verified_while_others_write(
 
 
 def test_where_there_is_no_trail_that_is_said(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="the database does not exist"):
+    with pytest.raises(StoreError, match="there is no database"):
         file_trail(tmp_path / "nothing.sqlite3").verify()
     sqlite3.connect(tmp_path / "other.sqlite3").close()
     (tmp_path / "broken.sqlite3").write_bytes(b"no database at all" * 500)
