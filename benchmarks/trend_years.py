@@ -21,13 +21,12 @@ from core.monitor.catalogue import CATALOGUE
 from service.api.routes.trend_groups import trend_groups
 from service.api.routes.trends import trend_columns, trend_model
 from service.store.buckets import Summaries
-from service.store.port import TrendQuery
-from service.store.rollups.making import insert_cells
-from service.store.rollups.rolling import SET_MARK
+from service.store.port import TrendQuery, ValueRange
+from service.store.rollups.gathering import SET_MARK
 from service.store.rollups.rows import HOUR_NS, NS_PER_S, WIDTHS_NS, Cells, Conditions
+from service.store.rollups.writing import insert_cells
 from service.store.series import Layout, columns_of, remember_layout, series_of
 from service.store.sqlite import SqliteStore
-from service.store.value_range import ValueRange
 
 N_BEARINGS = 60
 HOP_NS = 853_333_333

@@ -36,7 +36,7 @@ from service.settings.configuration import Configuration
 from service.settings.films import FilmAlarmSettings
 from service.settings.storage import Origin
 from service.settings.units import UnitSettings
-from service.store.port import Store
+from service.store.store import Store
 
 
 class LiveState(Protocol):

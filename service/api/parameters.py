@@ -10,7 +10,7 @@ from core.units import NS_PER_S
 from service.api.problems import ProblemError
 from service.api.values import OperatingStateName
 from service.runtime.times import EPOCH, rfc3339
-from service.store.value_range import ValueRange
+from service.store.port import ValueRange
 
 FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 

@@ -15,7 +15,6 @@ from service.app.service_health import Pressure, health_of
 from service.app.storage import (
     captures_of,
     evidence_of,
-    retention_limits,
     space_watch,
     tape_of,
     watch,
@@ -37,11 +36,12 @@ from service.notifications.sender import Deliveries
 from service.recordings.around_alarms import Captures
 from service.recordings.continuous_recorder import ContinuousRecorder
 from service.recordings.keeper import RecordingIndexer
-from service.reports.keeper import EvidenceCollector
+from service.reports.collector import EvidenceCollector
 from service.runtime.disk import SpaceWatch
 from service.runtime.heartbeats import Loop
 from service.settings.storage import Origin
 from service.store.loops import RetentionLoop, RollupLoop, ScrubLoop
+from service.store.retention import ages_of
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,7 @@ async def analysis_on(
         evidence=evidence,
         references=references,
         rolling=RollupLoop(store.rollups, clock),
-        retaining=RetentionLoop(store.retention, retention_limits(plant.retention), clock),
+        retaining=RetentionLoop(store.retention, ages_of(plant.retention), clock),
         space=space,
         load=load,
         soundness=soundness,

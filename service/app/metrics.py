@@ -27,7 +27,7 @@ from service.notifications.metrics import delivery_metrics
 from service.notifications.sender import ReceiverView
 from service.recordings.around_alarms import Captures
 from service.recordings.metrics import recording_metrics
-from service.reports.keeper import EvidenceCollector
+from service.reports.collector import EvidenceCollector
 from service.runtime.metrics import counter, gauge
 from service.runtime.polls import TimedSource
 from service.store.port import StoreError

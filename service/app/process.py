@@ -21,7 +21,7 @@ from service.settings.core_values import analysis_of
 from service.settings.plant import PlantFile
 from service.settings.sources.devices import ModbusVectorSettings
 from service.settings.storage import Origin
-from service.store.port import Store
+from service.store.store import Store
 
 STALE_HOPS = 2.5
 """A result older than this many refreshes is no longer current."""

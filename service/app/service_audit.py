@@ -15,8 +15,8 @@ from service.measuring.service_alarms import STEP_S
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
-from service.store.access.audit_entries import AuditEntry, AuditAction
-from service.store.audit_port import AuditQuery, AuditStore
+from service.store.access.audit_entries import AuditAction, AuditEntry
+from service.store.audit import AuditQuery, AuditStore
 from service.store.port import StoreError
 
 PADWATCH, SERVICE, CONFIGURATION, CLOCK = "padwatch", "service", "configuration", "clock"

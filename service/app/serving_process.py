@@ -42,7 +42,7 @@ from service.runtime.service_manager import NO_MANAGER, ServiceManager
 from service.settings.core_values import chatter_rule_of, machine_of
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
-from service.store.port import Store
+from service.store.store import Store
 
 GC_THRESHOLDS = (20_000, 20, 20)
 """Rare collections: requests and blocks leave few reference cycles."""

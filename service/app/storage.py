@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from acquisition.clock import Clock
-from core.units import DAY_NS
 from service.api.downloads import Downloads
 from service.app.recordings import recording_writer
 from service.live.live_view import LiveView
@@ -21,10 +20,10 @@ from service.recordings.keeper import RecordingIndexer, RecordingLock
 from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
 from service.recordings.segment import SegmentSettings
 from service.reports.archive import EvidenceArchive
-from service.reports.capture_link import captures_in_use
-from service.reports.keeper import EvidenceFolders, EvidenceCollector
-from service.reports.maker import Maker
-from service.reports.room import EvidenceLimits, EvidenceRetention
+from service.reports.collector import EvidenceCollector, EvidenceFolders
+from service.reports.document import Maker
+from service.reports.folders import captures_in_use
+from service.reports.retention import EvidenceLimits, EvidenceRetention
 from service.reports.routes import EvidenceService
 from service.reports.snapshot import SnapshotTaker
 from service.reports.writer import EvidenceWriter
@@ -34,20 +33,19 @@ from service.settings.configuration import Configuration, built_from, configurat
 from service.settings.core_values import analysis_of, film_rules_of
 from service.settings.plant import PlantFile, SpectraSettings
 from service.settings.sources.devices import ModbusVectorSettings
-from service.settings.storage import Origin, RetentionSettings, SpaceSettings
+from service.settings.storage import Origin, SpaceSettings
 from service.settings.units import UnitSettings
 from service.store.access.audit_verification import head_path
 from service.store.audit import Trail
 from service.store.outbox import Address, no_recipients
-from service.store.port import Store
-from service.store.retention.limits import RetentionLimits
-from service.store.spectra_port import SpectraLimits, TierLimits
+from service.store.spectra import SpectraLimits, TierLimits
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.trail import file_trail
-from service.store.waveform_port import WaveformKind
+from service.store.sqlite.store import file_trail
+from service.store.store import Store
+from service.store.waveforms import WaveformKind
 
 if TYPE_CHECKING:
-    from service.store.postgres.address import PostgresAddress
+    from service.store.postgres.connection import PostgresAddress
 
 DATABASE = "padwatch.sqlite3"
 
@@ -104,13 +102,13 @@ def open_trail(plant: PlantFile) -> Trail:
     """Open the audit trail of the plant's database for reading."""
     if plant.store.postgresql is None:
         return file_trail(database_path(plant))
-    from service.store.postgres.trail import server_trail
+    from service.store.postgres.store import server_trail
 
     return server_trail(_postgres_address(plant, plant.store.postgresql), head_file(plant))
 
 
 def _postgres_address(plant: PlantFile, conninfo: str) -> "PostgresAddress":
-    from service.store.postgres.address import PostgresAddress
+    from service.store.postgres.connection import PostgresAddress
 
     return PostgresAddress(conninfo, plant.store.password_path)
 
@@ -222,7 +220,9 @@ def evidence_of(
     return EvidenceCollector(folders, camera, writer, room, configuration, captures, clock)
 
 
-def watch(keeper: EvidenceCollector, alarms: AlarmEngine, captures: Captures, origin: Origin) -> None:
+def watch(
+    keeper: EvidenceCollector, alarms: AlarmEngine, captures: Captures, origin: Origin
+) -> None:
     """Connect the collector of evidence to the alarms; a replay collects no evidence."""
     if origin is Origin.LIVE:
         alarms.set_observer(keeper.see)
@@ -293,18 +293,3 @@ def retention_rules(plant: PlantFile) -> RetentionRules:
         gauge=SpaceGauge(roots, space_limits(plant.space), measure_disk),
         in_use=partial(captures_in_use, data / EVIDENCE),
     )
-
-
-def retention_limits(settings: RetentionSettings) -> RetentionLimits:
-    """Return the retention limits of the plant file; an age of 0 is no limit."""
-    return RetentionLimits(
-        readings_ns=_age_ns(settings.readings_days),
-        minutes_ns=_age_ns(settings.minutes_days),
-        ten_minutes_ns=_age_ns(settings.ten_minutes_days),
-        films_ns=_age_ns(settings.films_days),
-        letters_ns=_age_ns(settings.messages_days),
-    )
-
-
-def _age_ns(days: float) -> int | None:
-    return round(days * DAY_NS) if days > 0.0 else None

@@ -26,7 +26,7 @@ from service.reports.routes import EvidenceService, evidence_router
 from service.settings.plant import PlantFile
 from service.settings.processes import is_loopback, why_closed
 from service.store.access.identities import Role, SessionLimits
-from service.store.access.port import AccessStore
+from service.store.access.tables import AccessStore
 
 HSTS = ("Strict-Transport-Security", "max-age=31536000")
 """Browsers that received this header use HTTPS only."""

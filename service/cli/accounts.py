@@ -27,7 +27,7 @@ from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.access.audit_entries import Acting, Source, acting_as
 from service.store.access.identities import MAX_DAYS, ApiKey, Role, account_name
-from service.store.access.port import AccessStore
+from service.store.access.tables import AccessStore
 
 
 @contextmanager

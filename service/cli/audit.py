@@ -31,9 +31,9 @@ def verify(
     file beside the database.
     """
     verdict = open_trail(load_plant_file(plant_file)).verify()
-    unknown = [number for number in verdict.told if number not in (known or [])]
+    unknown = [number for number in verdict.contradictions if number not in (known or [])]
     is_whole = verdict.is_whole and not unknown
-    document = {"is_whole": is_whole, **asdict(verdict), "told": unknown}
+    document = {"is_whole": is_whole, **asdict(verdict), "contradictions": unknown}
     print_result(document, _lines(verdict, unknown), json_output)
     if not is_whole:
         raise typer.Exit(1)

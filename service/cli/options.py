@@ -24,9 +24,10 @@ from service.settings.plant import PlantFile
 from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
 from service.store.access.identities import NameRefusedError
-from service.store.access.port import AccessRefusedError
+from service.store.access.tables import AccessRefusedError
 from service.store.backup import BackupError
-from service.store.port import Store, StoreError
+from service.store.port import StoreError
+from service.store.store import Store
 
 
 def option(meaning: str, *names: str, **limits: Any) -> Any:

@@ -38,7 +38,7 @@ from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.sources.mapping import ImportMapping
 from service.settings.toml_file import load_toml
-from service.store.waveform_port import WaveformFile, WaveformKind
+from service.store.waveforms import WaveformFile, WaveformKind
 
 app = command_group("Look into recordings, check them, export and import them.")
 

@@ -34,7 +34,7 @@ from service.settings.core_values import machine_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.access.audit_entries import Acting, Source, acting_as
-from service.store.gap_reference import GapReference, ReferenceSource
+from service.store.references import GapReference, ReferenceSource
 
 
 def bearing_references(

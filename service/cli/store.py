@@ -28,7 +28,7 @@ from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.backup import AccessAfter, access_before, back_up, revoke_again
 from service.store.backup import restore as put_back
-from service.store.film_port import FilmStore
+from service.store.films import FilmStore
 from service.store.port import StoreError
 from service.store.sqlite.checking import Finding, findings
 

@@ -13,7 +13,8 @@ from service.measuring.alarm_engine import PlantPart
 from service.runtime.heartbeats import Heartbeats, Loop, Pulse
 from service.settings.plant import PlantFile
 from service.store.database import Hold
-from service.store.port import Store, StoreError
+from service.store.port import StoreError
+from service.store.store import Store
 
 log = structlog.get_logger()
 

@@ -23,7 +23,7 @@ from service.measuring.reported_alarms import SHARED, is_shared
 from service.measuring.service_alarms import reporting_unit
 from service.settings.core_values import film_rules_of
 from service.settings.plant import PlantFile
-from service.store.film_port import FilmStore
+from service.store.films import FilmStore
 
 MAX_DRIFT = 1e-3
 """Upper bound of the relative drift of two monotonic clocks."""

@@ -29,8 +29,9 @@ from service.measuring.recorder import NotStoredError, Recorder
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import TroubleLog, periodic
 from service.store.access.audit_entries import Acting, Source, acting, acting_as
-from service.store.port import Store, StoreError
+from service.store.port import StoreError
 from service.store.sharing import DONE, OPEN, Answer, Command, CommandState, OpenCommand
+from service.store.store import Store
 
 WAIT_S = 5.0
 """Longest wait for the process that analyses the unit."""

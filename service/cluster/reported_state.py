@@ -31,8 +31,9 @@ from service.measuring.snapshots import alarm_state, plant_signs, unit_signs, un
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import TroubleLog, periodic
 from service.settings.units import UnitSettings
-from service.store.port import Store, StoreError
+from service.store.port import StoreError
 from service.store.sharing import UnitBeat, UnitReport, UnitStates
+from service.store.store import Store
 
 REPORT_EVERY_S = 1.0
 

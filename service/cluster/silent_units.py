@@ -21,8 +21,9 @@ from service.measuring.reported_alarms import (
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import periodic
 from service.settings.units import UnitSettings
-from service.store.port import Store, StoreError
+from service.store.port import StoreError
 from service.store.sharing import UnitBeat
+from service.store.store import Store
 
 SILENT_AFTER_S = 30.0
 """Time without reports before the alarm. A standby takes over within seconds, a restart within

@@ -8,8 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 from core.alarms import operation
 from core.alarms.operation import Action
 from core.machine.unit import Estimator
-from service.store.baselines import Versions
-from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
+from service.store.baselines import BaselineEntry, BaselineStep, StoredStep, Versions
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from core.condition.operating_state import STEADY
 from core.units import DAY_NS
 from service.live.commands import FilmPlace
 from service.settings.films import FilmAlarmSettings
-from service.store.baselines import Versions
-from service.store.film_port import BaselineEntry, FilmHistory, FilmQuery, FilmStore
+from service.store.baselines import BaselineEntry, Versions
+from service.store.film_readings import FilmHistory, FilmQuery
+from service.store.films import FilmStore
 
 RECENT_DAYS = 7.0
 

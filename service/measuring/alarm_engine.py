@@ -48,7 +48,8 @@ from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.settings.units import UnitSettings
 from service.store.access.audit_entries import ActedNews, acting
-from service.store.port import AlarmQuery, Store
+from service.store.port import AlarmQuery
+from service.store.store import Store
 
 log = structlog.get_logger()
 

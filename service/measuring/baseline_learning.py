@@ -15,8 +15,9 @@ from core.change.shaft_response import ShaftResponse, learn_response
 from core.units import DAY_NS
 from service.live.commands import FilmPlace
 from service.settings.films import FilmAlarmSettings
-from service.store.baselines import Versions, versions_after
-from service.store.film_port import BaselineStep, FilmHistory, FilmQuery, FilmStore, StoredStep
+from service.store.baselines import BaselineStep, StoredStep, Versions, versions_after
+from service.store.film_readings import FilmHistory, FilmQuery
+from service.store.films import FilmStore
 
 PADWATCH = "padwatch"
 """Author of baselines that are learned and accepted automatically."""

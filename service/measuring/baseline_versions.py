@@ -17,7 +17,8 @@ from core.units import DAY_NS
 from service.live.commands import FilmPlace
 from service.measuring.baseline_learning import common_rows
 from service.store.baselines import versions_after
-from service.store.film_port import FilmHistory, FilmQuery, FilmStore
+from service.store.film_readings import FilmHistory, FilmQuery
+from service.store.films import FilmStore
 
 TAIL_NS = 2 * DAY_NS
 """History that the operating state is computed from: longer than the warm-up."""

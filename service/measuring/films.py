@@ -23,8 +23,8 @@ from service.runtime.heartbeats import UNHEARD, Pulse
 from service.settings.core_values import film_rules_of
 from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
-from service.store.baselines import Versions
-from service.store.film_port import FilmStore, StoredStep
+from service.store.baselines import StoredStep, Versions
+from service.store.films import FilmStore
 from service.store.port import StoreError
 
 log = structlog.get_logger()

@@ -8,8 +8,9 @@ from acquisition.clock import Clock
 from service.live.live_view import LiveView
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.store.access.audit_entries import AuditAction
-from service.store.port import Store, StoreError
+from service.store.port import StoreError
 from service.store.seals import Place
+from service.store.store import Store
 
 log = structlog.get_logger()
 

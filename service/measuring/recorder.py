@@ -22,8 +22,9 @@ from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import NO_SPECTRUM
 from service.live.live_view import LiveView
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.store.port import RefusedRowError, Store, StoreError, UnitGap
+from service.store.port import RefusedRowError, StoreError, UnitGap
 from service.store.sharing import StreamPosition
+from service.store.store import Store
 
 FILE = "parked.jsonl"
 

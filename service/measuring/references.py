@@ -18,8 +18,9 @@ from core.units import s_from_ns
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import TroubleLog
 from service.runtime.times import rfc3339
-from service.store.gap_reference import GapReference, MicrometrePair
-from service.store.port import Store, StoredReadings, StoreError
+from service.store.port import StoredReadings, StoreError
+from service.store.references import GapReference, MicrometrePair
+from service.store.store import Store
 
 log = structlog.get_logger()
 

@@ -15,7 +15,7 @@ from acquisition.recordings.manifest import MANIFEST
 from acquisition.recordings.reader import open_recording
 from acquisition.recordings.summary import summary_of
 from service.recordings.folders import DAMAGED, UNFINISHED, finished, is_recording, n_bytes_of
-from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState, WaveformStore
+from service.store.waveforms import WaveformFile, WaveformKind, WaveformState, WaveformStore
 
 Key = tuple[WaveformKind, str]
 

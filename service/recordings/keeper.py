@@ -17,7 +17,7 @@ from service.recordings.retention import (
     SpaceGauge,
 )
 from service.runtime.heartbeats import UNHEARD, Pulse
-from service.store.waveform_port import WaveformKind
+from service.store.waveforms import WaveformKind
 
 log = structlog.get_logger()
 

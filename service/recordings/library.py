@@ -18,7 +18,7 @@ from core.samples.blocks import SampleBlock
 from core.units import ns_from_s
 from service.recordings.folders import ALARM, CONTINUOUS, FILES, finished, n_bytes_of, unit_of
 from service.runtime.files import Sink, zipped
-from service.store.waveform_port import WaveformKind
+from service.store.waveforms import WaveformKind
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,119}")
 

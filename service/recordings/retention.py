@@ -24,7 +24,7 @@ from service.recordings.folders import (
 from service.recordings.index import Index, RetryList, inspected, reinspected
 from service.runtime.disk import S_PER_DAY, Measure, SpaceLimits
 from service.store.port import StoreError
-from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
+from service.store.waveforms import WaveformFile, WaveformKind, WaveformState
 
 TRUSTED_NS = DAY_NS
 """Length of recordings after which the clock that they were made by is trusted."""

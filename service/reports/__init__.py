@@ -1,1 +1,1 @@
-"""Evidence of alarms: what was known when one was raised, kept, shown and printed."""
+"""Evidence of alarms: collected while measuring, kept in bundles, and shown as reports."""

@@ -1,8 +1,8 @@
-"""`EvidenceArchive`: what there is of the occurrences of an alarm, honestly."""
+"""Archive of evidence: the bundles of an alarm read back, as a document or as a ZIP file."""
 
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from itertools import islice
@@ -13,24 +13,33 @@ from pydantic import ValidationError
 from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import ANNOUNCED, AlarmEvent
 from service.recordings.around_alarms import is_captured
-from service.reports.capture_link import CapturePart, linked
+from service.reports.collector import EvidenceFolders
 from service.reports.document import Evidence
-from service.reports.folders import DOCUMENT, Place, kept_since_ns, parsed, places, removed
-from service.reports.keeper import EvidenceFolders
+from service.reports.folders import (
+    DOCUMENT,
+    CapturePart,
+    Place,
+    kept_since_ns,
+    linked,
+    parsed,
+    places,
+    removed,
+)
 from service.runtime.times import compact
 from service.settings.configuration import canonical
-from service.store.film_port import FilmStore
-from service.store.port import AlarmQuery, Store
+from service.store.films import FilmStore
+from service.store.port import AlarmQuery
+from service.store.store import Store
 
 PAGE = 1000
-"""Events that are read at once."""
+"""Number of events per query."""
 
 Occurrences = frozenset[tuple[str, int]]
 """By alarm and number."""
 
 
 class EvidenceState(StrEnum):
-    """What there is of an occurrence."""
+    """State of the evidence of an occurrence."""
 
     COMPLETE = "complete"
     WAITING = "waiting"
@@ -40,7 +49,7 @@ class EvidenceState(StrEnum):
 
 
 class SamplesState(StrEnum):
-    """What there is of the samples around it."""
+    """State of the samples around an occurrence."""
 
     COMPLETE = "complete"
     BEING_MADE = "being_made"
@@ -50,17 +59,17 @@ class SamplesState(StrEnum):
 
 
 class DamagedEvidenceError(Exception):
-    """A bundle is not what was written; the message says which and why."""
+    """A bundle was changed or damaged; the message says which and how."""
 
 
 @dataclass(frozen=True)
 class Occurrence:
-    """An occurrence of an alarm with what there is of it.
+    """Occurrence of an alarm with the state of its evidence.
 
     Parameters
     ----------
     place
-        Where its bundle is; None unless it is complete.
+        Place of its bundle; None unless complete.
     """
 
     event: AlarmEvent
@@ -69,23 +78,23 @@ class Occurrence:
 
 
 class EvidenceArchive:
-    """Reads what `EvidenceCollector` has written; every method belongs into a thread."""
+    """Archive of bundles; its methods block and must be called in a thread."""
 
     def __init__(self, folders: EvidenceFolders, store: Store) -> None:
         self.folders, self._store = folders, store
 
     @property
     def films(self) -> FilmStore:
-        """Readings of films, as they are stored now."""
+        """Stored readings of films."""
         return self._store.films
 
     def occurrences(self, alarm: str, pending: Occurrences, most: int) -> list[Occurrence]:
-        """The newest occurrences of an alarm, newest first.
+        """Return the newest occurrences of an alarm, newest first.
 
         Parameters
         ----------
         pending
-            What is still to be written, asked for before this.
+            Occurrences whose bundles are still to be written, read before this call.
 
         Raises
         ------
@@ -97,7 +106,7 @@ class EvidenceArchive:
         return self._with_bundles(alarm, found, pending)
 
     def occurrence(self, alarm: str, number: int, pending: Occurrences) -> Occurrence | None:
-        """One of them; None if there never was such a one.
+        """Return one occurrence; None if it does not exist.
 
         Raises
         ------
@@ -106,25 +115,25 @@ class EvidenceArchive:
         """
         for event in self.events(alarm):
             if event.occurrence < number:
-                break  # the events of an occurrence come after all of those before
+                break  # events are in the order of occurrences
             if event.occurrence == number and event.change in ANNOUNCED:
                 return self._with_bundles(alarm, [event], pending)[0]
         return None
 
     def events(self, alarm: str) -> Iterator[AlarmEvent]:
-        """All events of an alarm, newest first, read as far as they are wanted."""
+        """Yield all events of an alarm, newest first, reading them on demand."""
         before = AlarmQuery().before
         while page := self._store.alarm_events(AlarmQuery(before, PAGE, alarm=alarm)):
             yield from (stored.event for stored in page)
             before = page[-1].id
 
     def document(self, place: Place) -> Evidence:
-        """The document of a bundle.
+        """Return the document of a bundle.
 
         Raises
         ------
         DamagedEvidenceError
-            If it is not what was written.
+            If it was changed or damaged.
         """
         try:
             text = (place.folder / DOCUMENT).read_bytes()
@@ -137,12 +146,12 @@ class EvidenceArchive:
         return found
 
     def samples(self, found: Occurrence, capturing: Occurrences) -> SamplesState:
-        """What there is of the samples around an occurrence.
+        """Return the state of the samples around an occurrence.
 
         Parameters
         ----------
         capturing
-            What is still being recorded, asked for before this.
+            Occurrences that are still being recorded, read before this call.
         """
         name = (found.event.identity.id, found.event.occurrence)
         capture = None if found.place is None else linked(found.place.folder)
@@ -159,7 +168,7 @@ class EvidenceArchive:
         return SamplesState.LOST if was_kept else SamplesState.NONE
 
     def configuration(self, version: str) -> Path | None:
-        """The file of a configuration; None if it is not there."""
+        """Return the file of a configuration; None if it does not exist."""
         path = self.folders.configurations / f"{version}.json"
         return path if path.is_file() else None
 
@@ -194,7 +203,7 @@ class EvidenceArchive:
 
 
 def capture_folder(place: Place, capture: CapturePart) -> Path | None:
-    """Where the samples are; None if they are no longer there."""
+    """Return the folder of the samples; None if they no longer exist."""
     if capture.folder is None or capture.manifest is None:
         return None
     folder = place.folder / capture.folder
@@ -202,10 +211,53 @@ def capture_folder(place: Place, capture: CapturePart) -> Path | None:
 
 
 def _of_event(event: AlarmEvent, found: Sequence[Place]) -> Place | None:
-    """The bundle of an event: that of its time, should there be several."""
+    """Return the bundle of an event: that with its time, if there are several."""
     moment = compact(event.time_ns)
     return max(found, key=lambda each: (each.moment == moment, each.moment), default=None)
 
 
 def _without_hash(content: dict[str, object]) -> dict[str, object]:
     return {key: value for key, value in content.items() if key != "sha256"}
+
+
+README = """Evidence of an alarm, made by padwatch.
+
+report.html             one page to read or print
+evidence.json           the document; docs/how-to/evidence.md of padwatch describes its keys
+spectra.parquet         cross-spectra of all bearings of the unit
+orbits.parquet          the newest turns of the shaft
+trend.parquet           readings of the film before the alarm
+configuration.json      settings of the plant, without secrets; not for a key of some units
+capture.json            which recording holds the samples around the alarm
+samples/                that recording: padwatch recording info|verify|export reads it
+"""
+
+
+def bundle_files(
+    archive: EvidenceArchive, found: Occurrence, page: str, has_configuration: bool
+) -> Mapping[str, Path | bytes]:
+    """Return the files of a bundle by their names in a ZIP file.
+
+    Parameters
+    ----------
+    has_configuration
+        Whether to include the settings of the whole plant.
+
+    Raises
+    ------
+    DamagedEvidenceError, LookupError
+        If it cannot be read, or does not exist.
+    """
+    if found.place is None:
+        raise LookupError("the bundle does not exist")
+    files: dict[str, Path | bytes] = {"README.txt": README.encode(), "report.html": page.encode()}
+    files |= {path.name: path for path in sorted(found.place.folder.iterdir())}
+    if has_configuration:
+        configuration = archive.configuration(archive.document(found.place).configuration)
+        if configuration is not None:
+            files["configuration.json"] = configuration
+    capture = linked(found.place.folder)
+    samples = None if capture is None else capture_folder(found.place, capture)
+    if samples is not None:
+        files |= {f"samples/{path.name}": path for path in sorted(samples.iterdir())}
+    return files

@@ -1,4 +1,4 @@
-"""Figures of the page."""
+"""Figures of a report."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -7,28 +7,28 @@ from html import escape
 
 from core.quality import Reason
 from core.units import NS_PER_S
+from service.reports.case import Case
 from service.reports.parts import BearingPart, CellPart, ComparisonPart
 from service.reports.plots import Plot, Scale, TimeScale, Values, around
-from service.reports.report.case import Case
 from service.reports.tables import Columns
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A plot with the sentence that says what it shows."""
+    """Plot with a caption."""
 
     plot: Plot
     sentence: str
 
     @property
     def html(self) -> str:
-        """Both together, as wide as the plot is beside others, so that all writing is alike."""
+        """HTML of both, with a proportional width, so that font sizes are equal in all figures."""
         caption = f"<figcaption>{escape(self.sentence)}</figcaption>"
         return f'<figure style="flex:{self.plot.width:g}">{self.plot.svg()}{caption}</figure>'
 
 
 def spectra_figure(case: Case) -> Figure | None:
-    """Spectra of shaft and bearing."""
+    """Return the spectra of shaft and bearing."""
     bearing, axis = case.bearing, case.direction
     rows = _rows(case.spectra, case.evidence.bearing)
     if bearing is None or len(rows) < 3:
@@ -57,7 +57,7 @@ def spectra_figure(case: Case) -> Figure | None:
 
 
 def _decades(amplitudes: Sequence[float]) -> Scale | None:
-    """Whole decades that hold all amplitudes, five at most; None if there is no motion."""
+    """Return a scale of at most five decades for all amplitudes; None without motion."""
     seen = [value for value in amplitudes if value and value > 0.0]
     if not seen:
         return None
@@ -77,7 +77,7 @@ def _mark_orders(plot: Plot, bearing: BearingPart) -> None:
 
 
 def orbit_figure(case: Case) -> Figure | None:
-    """The newest turns of the shaft."""
+    """Return the newest revolutions of the shaft."""
     rows = _rows(case.orbits, case.evidence.bearing)
     if len(rows) < 2:
         return None
@@ -103,19 +103,19 @@ DAY_S = 86_400.0
 
 
 def finite_of(values: Values) -> list[float | None]:
-    """The same without what is not a number."""
+    """Replace NaN by None."""
     return [v if v is not None and math.isfinite(v) else None for v in values]
 
 
 EccentricityStiffness = tuple[list[float | None], list[float | None]]
-"""Two columns."""
+"""Columns of eccentricity and stiffness."""
 
 LOOKS = {"none": "unknown", "borrowed": "borrowed", "own": "known"}
-"""Of cells, by their support."""
+"""Styles of cells by support."""
 
 
 def condition_figure(case: Case) -> Figure | None:
-    """Stiffness against eccentricity: members of the cell, the last day, what is expected."""
+    """Return stiffness by eccentricity: of the cell, of the last day, and as expected."""
     found = case.comparison
     if found is None:
         return None
@@ -141,7 +141,7 @@ def condition_figure(case: Case) -> Figure | None:
 
 
 def map_figure(case: Case) -> Figure | None:
-    """Which conditions the baseline knows, and how stiff the film was in each."""
+    """Return the conditions of the baseline, and the stiffness in each."""
     found = case.comparison
     if found is None or not found.map or found.bounds is None:
         return None
@@ -181,7 +181,7 @@ def _draw_films(
 
 
 def _bounds(found: ComparisonPart, cell: CellPart) -> list[tuple[float, float]]:
-    """Limits of a cell, all of which are as wide as that of the alarm."""
+    """Return the limits of a cell; all cells have the width of that of the alarm."""
     widths = [high - low for low, high in (found.bounds or ())[:2]]
     return [(i * w, (i + 1) * w) for i, w in zip(cell.cell, widths, strict=False)]
 
@@ -199,7 +199,7 @@ def _own_point(plot: Plot, found: ComparisonPart) -> None:
 
 
 def _recent(case: Case) -> EccentricityStiffness:
-    """Eccentricity and stiffness of the settled readings of the last day before the alarm."""
+    """Return eccentricity and stiffness of settled readings on the last day before the alarm."""
     table = case.before
     since_ns = case.evidence.alarm.time_ns - DAY_S * NS_PER_S
     times, settled = table.get("time_ns", ()), table.get("is_settled", ())
@@ -212,14 +212,14 @@ def _recent(case: Case) -> EccentricityStiffness:
 
 
 HOLE_S = 6 * 3600.0
-"""Expected stiffness is not drawn across longer holes."""
+"""Gap across which expected stiffness is not drawn."""
 
 SHORTEST_S, MARGIN = 3600.0, 0.04
-"""Before the alarm at least, and after it as a share of what is before."""
+"""Minimum time before the alarm, and margin after it as a fraction of the time before."""
 
 
 def trend_figure(case: Case) -> Figure | None:
-    """Stiffness before and after, with what is expected and the limit."""
+    """Return stiffness before and after the alarm, with the expected stiffness and the limit."""
     found = _trend(case)
     room = None if found is None else around(_heights(case, found))
     if found is None or room is None:
@@ -273,7 +273,7 @@ class _Trend:
 
     @property
     def after(self) -> list[bool]:
-        """Whether each reading is settled, and later than the alarm."""
+        """Whether each reading is settled and later than the alarm."""
         rows = zip(self.is_settled, self.time, strict=True)
         return [settled and time > self.alarm_s for settled, time in rows]
 
@@ -314,7 +314,7 @@ def _joined(before: Columns, after: Columns) -> Columns:
 
 
 def _expected(k: Values, deviation: Values) -> list[float | None]:
-    """What each reading was compared with."""
+    """Return the stiffness that each reading was compared with."""
     return [
         None if value is None or by is None else value * math.exp(-by)
         for value, by in zip(k, deviation, strict=True)
@@ -330,7 +330,7 @@ def _where(values: Values, wanted: list[bool]) -> list[float | None]:
 
 
 def figures(case: Case) -> Iterator[str]:
-    """All that there is something to show of, in rows."""
+    """Yield the rows of figures that have data."""
     for row in (
         (trend_figure,),
         (condition_figure, map_figure),

@@ -1,11 +1,19 @@
-"""Folders of bundles: their names, and what a crash has left."""
+"""Folders of bundles, and the links from bundles to the samples around their alarms."""
 
+import json
 import re
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
+from pydantic import ValidationError
+
+from acquisition.recordings.manifest import MANIFEST
 from core.alarms.alarm import AlarmEvent
+from service.recordings.folders import ALARM
+from service.reports.document import FilePart, file_part
+from service.reports.parts import EvidencePart
 from service.runtime.files import write_whole
 from service.runtime.times import compact
 
@@ -26,7 +34,7 @@ UNIT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
 @dataclass(frozen=True)
 class Place:
-    """Which bundle a folder holds."""
+    """Folder of a bundle."""
 
     folder: Path
     unit: str
@@ -42,21 +50,21 @@ class Place:
 
 
 def place_of(root: Path, event: AlarmEvent) -> Place:
-    """Where the bundle of an event belongs."""
+    """Return the place of the bundle of an event."""
     own, moment = event.identity, compact(event.time_ns)
     name = f"{moment}-{own.subject}-{own.kind}-{event.occurrence}"
     return Place(root / own.unit / name, own.unit, own.subject, own.kind, event.occurrence, moment)
 
 
 def places(root: Path, unit: str | None = None) -> list[Place]:
-    """All finished bundles, or those of one unit, oldest first."""
+    """Return the places of all complete bundles, or of those of one unit, oldest first."""
     units = [root / unit] if unit else sorted(path for path in root.glob("*") if path.is_dir())
     found = (_place(path) for each in units if each.is_dir() for path in each.iterdir())
     return sorted((each for each in found if each), key=lambda each: (each.moment, each.folder))
 
 
 def note_beginning(root: Path, now_ns: int) -> None:
-    """Note since when evidence is kept, so that what was before is not taken for lost."""
+    """Record the time from which evidence is kept; earlier evidence is not lost."""
     path = root / KEPT_SINCE
     if not path.exists():
         root.mkdir(parents=True, exist_ok=True)
@@ -64,13 +72,13 @@ def note_beginning(root: Path, now_ns: int) -> None:
 
 
 def kept_since_ns(root: Path) -> int | None:
-    """Since when evidence is kept; None if it never was."""
+    """Return the time from which evidence is kept; None if it never was."""
     path = root / KEPT_SINCE
     return int(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
 def clear_leftovers(root: Path) -> list[Path]:
-    """Remove what was being written when the service was killed."""
+    """Remove unfinished folders that a crash left, and return them."""
     left = [path for path in root.glob(f"*/*{INCOMPLETE}") if path.is_dir()]
     for path in left:
         shutil.rmtree(path)
@@ -78,13 +86,13 @@ def clear_leftovers(root: Path) -> list[Path]:
 
 
 def removed(root: Path, unit: str) -> list[str]:
-    """Names of bundles that were removed to make room."""
+    """Return the names of bundles that were removed to free space."""
     path = root / unit / REMOVED
     return path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
 
 
 def parsed(name: str) -> tuple[str, str, int] | None:
-    """Subject, kind and occurrence in the name of a folder."""
+    """Return subject, kind and occurrence in the name of a folder."""
     match = NAME.fullmatch(name)
     return None if match is None else (match[2], match[3], int(match[4]))
 
@@ -95,3 +103,102 @@ def _place(path: Path) -> Place | None:
         return None
     subject, kind, occurrence = found
     return Place(path, path.parent.name, subject, kind, occurrence, path.name.partition("-")[0])
+
+
+class CapturePart(EvidencePart):
+    """Samples around an alarm."""
+
+    state: Literal["complete", "lost"]
+    """Whether the samples exist."""
+
+    folder: str | None
+    """Recording with the samples, relative to the folder of the bundle."""
+
+    manifest: FilePart | None
+    """Manifest of the recording, which has the hashes of the samples."""
+
+    reason: str | None
+    """Reason why the samples are lost."""
+
+
+def link(folder: Path, capture: Path) -> None:
+    """Write to a bundle which recording holds its samples.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses.
+    """
+    relative = Path("../../..") / capture.parent.name / capture.name
+    manifest = file_part(capture / MANIFEST)
+    _write_link(
+        folder,
+        CapturePart(state="complete", folder=str(relative), manifest=manifest, reason=None),
+    )
+
+
+def note_lost(folder: Path, reason: str) -> None:
+    """Write to a bundle that its samples are lost.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses.
+    """
+    _write_link(folder, CapturePart(state="lost", folder=None, manifest=None, reason=reason))
+
+
+def linked(folder: Path) -> CapturePart | None:
+    """Return the link of a bundle to its samples; None if there is none yet."""
+    try:
+        return CapturePart.model_validate_json((folder / CAPTURE).read_bytes())
+    except (FileNotFoundError, ValidationError):
+        return None
+
+
+def captures_in_use(root: Path) -> frozenset[str]:
+    """Return the names of the recordings that bundles refer to."""
+    parts = (linked(each.folder) for each in places(root))
+    return frozenset(Path(part.folder).name for part in parts if part and part.folder)
+
+
+def link_all(root: Path, captures: Path) -> int:
+    """Write links that a crash left out; return their number.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses.
+    """
+    bare = [each for each in places(root) if not (each.folder / CAPTURE).exists()]
+    if not bare:
+        return 0
+    found, n = _captures(captures), 0
+    for each in bare:
+        capture = found.get((each.alarm, each.occurrence))
+        if capture is not None:
+            link(each.folder, capture)
+            n += 1
+    return n
+
+
+def _captures(folder: Path) -> dict[tuple[str, int], Path]:
+    """Return complete recordings by the occurrences of alarms for which they were made."""
+    found = {}
+    for path in sorted(folder.glob(f"*/{ALARM}")):
+        if (path.parent / MANIFEST).is_file():
+            for name in _alarms(path):
+                found[name] = path.parent
+    return found
+
+
+def _alarms(path: Path) -> list[tuple[str, int]]:
+    try:
+        events = json.loads(path.read_bytes())["alarms"]
+        return [(str(event["alarm"]), int(event["occurrence"])) for event in events]
+    except (ValueError, KeyError, TypeError):
+        return []  # not written by padwatch
+
+
+def _write_link(folder: Path, part: CapturePart) -> None:
+    write_whole(folder / CAPTURE, part.model_dump_json(indent=1).encode() + b"\n")

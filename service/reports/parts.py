@@ -1,4 +1,4 @@
-"""Parts of the document of a bundle: bearings and what they are compared with."""
+"""Parts of the document of a bundle: bearings, and what their films are compared with."""
 
 import math
 from typing import Annotated, Literal
@@ -11,11 +11,11 @@ Moment = Annotated[str, Field(examples=["2026-11-21T09:03:12.400Z"])]
 """UTC, RFC 3339."""
 
 Numbers = list[float | None]
-"""A column; null where there is no number."""
+"""Column of numbers; null where there is none."""
 
 
 class EvidencePart(BaseModel):
-    """Frozen, no unknown keys, no NaN or infinity; a field's docstring is its documentation."""
+    """Base of all parts: frozen, without unknown keys, NaN or infinity."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
@@ -23,12 +23,12 @@ class EvidencePart(BaseModel):
 
 
 def finite(number: float | None) -> float | None:
-    """Nothing, where JSON has no number for it."""
+    """Return a finite number; None otherwise, since JSON has no NaN or infinity."""
     return None if number is None or not math.isfinite(number) else float(number)
 
 
 def rounded(number: float | None) -> float | None:
-    """The same to seven digits: more than any result has, and half the space."""
+    """Return a number rounded to seven digits, beyond the accuracy of any result."""
     found = finite(number)
     return None if found is None else float(f"{found:.7g}")
 
@@ -40,23 +40,23 @@ LevelWord = Literal["alert", "danger"]
 QualityWord = Literal["good", "uncertain", "bad"]
 
 AXES: tuple[Direction, Direction] = ("x", "y")
-"""In the order of all that comes in pairs."""
+"""Order of all pairs."""
 
 
 class ReadingPart(EvidencePart):
-    """One quantity of the catalogue."""
+    """Reading of a quantity of the catalogue."""
 
     value: float | None
-    """Null if it could not be known."""
+    """Value; null if unknown."""
 
     unit: Annotated[str, Field(examples=["N/m"])]
     """Unit and detector."""
 
     level: QualityWord
-    """How far it may be believed."""
+    """Level of quality."""
 
     reason: Annotated[str, Field(examples=["ok"])]
-    """Why not simply good."""
+    """Reason for the level."""
 
     u_random: float | None
     """Random standard uncertainty, in the unit of the value."""
@@ -65,26 +65,26 @@ class ReadingPart(EvidencePart):
     """Systematic standard uncertainty."""
 
     interval_95: tuple[float, float] | None
-    """Holds the truth with 95 %."""
+    """95 % confidence interval."""
 
 
 class EstimatorPart(EvidencePart):
-    """A film's stiffness by one estimator."""
+    """Stiffness of a film by one estimator."""
 
     estimator: Annotated[str, Field(examples=["dynamic"])]
-    """Which one."""
+    """Name of the estimator."""
 
     direction: Direction
     """Direction."""
 
     stiffness: ReadingPart
-    """What it says."""
+    """Estimated stiffness."""
 
     coherence: float | None
-    """Squared coherence that it stands on; null without waveforms."""
+    """Squared coherence behind the estimate; null without waveforms."""
 
     is_preferred: bool
-    """Whether `stiffness` was taken from it."""
+    """Whether `stiffness` of the bearing is taken from it."""
 
     is_watched: bool
     """Whether changes of the film are judged by it."""
@@ -94,98 +94,98 @@ class BudgetLinePart(EvidencePart):
     """One contribution to the uncertainty of a result."""
 
     name: Annotated[str, Field(examples=["bracket stiffness"])]
-    """What contributes."""
+    """Name of the contribution."""
 
     kind: Literal["random", "systematic"]
-    """Whether it differs from one result to the next, or stays."""
+    """Whether the contribution varies between results or is constant."""
 
     distribution: Literal["normal", "uniform"]
-    """What is known about it besides its width."""
+    """Distribution of the contribution."""
 
     width: float
-    """Standard uncertainty if normal, half-width if uniform, in the unit of what contributes."""
+    """Standard uncertainty if normal, half-width if uniform, in the unit of the contribution."""
 
     sensitivity: float
-    """Change of the result per unit of what contributes."""
+    """Change of the result per unit of the contribution."""
 
     contribution: float
-    """Standard uncertainty of the result by this alone."""
+    """Standard uncertainty of the result by this contribution alone."""
 
 
 class WindowPart(EvidencePart):
-    """Which samples the results stand on."""
+    """Samples behind the results."""
 
     epoch: int
-    """Of the device's count."""
+    """Epoch of the device's sample counter."""
 
     first_index: int
     """Index of the first sample."""
 
     stop_index: int
-    """Index after the last."""
+    """Index after the last sample."""
 
     n_segments: int
-    """Segments that were averaged."""
+    """Number of averaged segments."""
 
     n_segments_wanted: int
-    """Segments of a full average."""
+    """Number of segments of a full average."""
 
     coverage: float
-    """Share of the possible segments that were usable."""
+    """Fraction of the possible segments that was usable."""
 
     duration_s: float
-    """From first to last sample."""
+    """Time from the first to the last sample."""
 
 
 class ConditionPart(EvidencePart):
-    """Under which condition the bearing ran."""
+    """Operating condition of the bearing."""
 
     state: Annotated[str, Field(examples=["full_load"])]
     """Operating state of the unit."""
 
     is_settled: bool
-    """Whether it had lasted for the settling time, after the warm-up."""
+    """Whether the state had lasted for the settling time, after the warm-up."""
 
     cell: list[int] | None
-    """Bins of eccentricity, oil temperature and, where it counts, attitude; null if not known."""
+    """Bins of eccentricity, oil temperature and, if used, attitude; null if unknown."""
 
     bounds: list[tuple[float, float]] | None
-    """Limits of the cell along each of them."""
+    """Limits of the cell along each of these axes."""
 
 
 class CausePart(EvidencePart):
-    """What a change is put down to."""
+    """Cause to which a change is attributed."""
 
     cause: Annotated[str, Field(examples=["film"])]
-    """film, oil, bracket_or_transducer or unknown."""
+    """Cause: film, oil, bracket_or_transducer or unknown."""
 
     reason: Annotated[str, Field(examples=["shaft motion does not tell"])]
-    """From what."""
+    """Reason for the attribution."""
 
     film_share: float | None
-    """Part of the change that is the film's if the rest is an accelerometer's."""
+    """Fraction of the change due to the film if the rest is due to an accelerometer."""
 
     film_share_std: float | None
     """Its standard uncertainty."""
 
     shaft_change: float | None
-    """By how much the shaft moves more than it would have, in ln."""
+    """Motion of the shaft relative to the expected motion, in ln."""
 
     bearing_change: float | None
-    """The same of the bearing."""
+    """Motion of the bearing relative to the expected motion, in ln."""
 
 
 class FindingPart(EvidencePart):
-    """What was said of a film in one direction."""
+    """Finding about a film in one direction."""
 
     direction: Direction
     """Direction."""
 
     verdict: Annotated[str, Field(examples=["alert"])]
-    """normal, alert, danger, or why nothing could be said."""
+    """Verdict: normal, alert, danger, or the reason why there is none."""
 
     level: LevelWord | None
-    """Level that was held."""
+    """Alarm level of the film."""
 
     change: float | None
     """Most significant mean deviation from the baseline, in ln."""
@@ -194,29 +194,29 @@ class FindingPart(EvidencePart):
     """Its standard uncertainty."""
 
     time_scale_h: float | None
-    """Running hours over which it was averaged."""
+    """Running hours of the average."""
 
     deviation: float | None
-    """Of the newest reading alone, in ln; null unless it was compared."""
+    """Deviation of the newest reading, in ln; null unless it was compared."""
 
     deviation_std: float | None
-    """What that may stray by."""
+    """Standard uncertainty of that deviation."""
 
     baseline_version: int | None
-    """What it was compared with."""
+    """Version of the baseline."""
 
     attribution: CausePart | None
-    """What a change is put down to, while a level is held."""
+    """Cause of the change, while there is an alarm level."""
 
 
 class FilmReadingPart(EvidencePart):
-    """The reading of the films that was judged last."""
+    """Last judged reading of the films."""
 
     time: Moment
-    """When."""
+    """Time of the reading."""
 
     estimator: Annotated[str, Field(examples=["dynamic"])]
-    """By which estimator."""
+    """Estimator of the stiffness."""
 
     state: Annotated[str, Field(examples=["full_load"])]
     """Operating state."""
@@ -225,95 +225,95 @@ class FilmReadingPart(EvidencePart):
     """Whether the unit had settled in it."""
 
     findings: list[FindingPart]
-    """What was said of it, in x and in y."""
+    """Findings in x and in y."""
 
 
 class BearingPart(EvidencePart):
-    """One bearing at the moment of the alarm."""
+    """State of one bearing at the time of the alarm."""
 
     bearing: Annotated[str, Field(examples=["UJB"])]
-    """Which one."""
+    """Identifier."""
 
     time: Moment
     """End of the samples."""
 
     window: WindowPart
-    """Which samples."""
+    """Samples behind the results."""
 
     evidence: Annotated[str, Field(examples=["waveforms"])]
     """Evidence class: waveforms, amplitude_and_phase or amplitude_only."""
 
     speed_source: Annotated[str, Field(examples=["slow_channel"])]
-    """How the running speed was known."""
+    """Source of the running speed."""
 
     condition: ConditionPart | None
-    """Under which condition; null where operation is not watched."""
+    """Operating condition; null if operation is not monitored."""
 
     readings: dict[str, ReadingPart]
-    """By name from the catalogue."""
+    """Readings by name in the catalogue."""
 
     estimators: list[EstimatorPart]
-    """All estimators side by side."""
+    """Estimates of all estimators."""
 
     budgets: dict[str, list[BudgetLinePart]]
-    """Where uncertainties come from, by quantity."""
+    """Uncertainty budgets by quantity."""
 
     film: FilmReadingPart | None
-    """What was said of its films; null where they are not watched, or not yet."""
+    """Findings about its films; null if they are not monitored, or not judged yet."""
 
 
 class BaselinePart(EvidencePart):
-    """Which baseline."""
+    """Baseline of a bearing."""
 
     version: int
-    """Counts the baselines of the bearing."""
+    """Number of the baseline of the bearing."""
 
     author: Annotated[str, Field(examples=["padwatch"])]
-    """Who had it learned."""
+    """Person or program that had it learned."""
 
     created: Moment
-    """When."""
+    """Time of creation."""
 
     event: str
-    """What happened to the machine that made it necessary; may be empty."""
+    """Event on the machine that required it; may be empty."""
 
     learned_from: Moment
-    """First reading it knows."""
+    """Time of the first learned reading."""
 
     learned_until: Moment
-    """Last reading it knows."""
+    """Time of the last learned reading."""
 
     scatter: float
-    """Of single readings about what is expected, over all cells, in ln."""
+    """Scatter of single readings about the expected stiffness, over all cells, in ln."""
 
 
 class CellPart(EvidencePart):
-    """One cell of the baseline."""
+    """Cell of the baseline."""
 
     cell: list[int]
-    """Bins of eccentricity, oil temperature and, where it counts, attitude."""
+    """Bins of eccentricity, oil temperature and, if used, attitude."""
 
     n_readings: int
-    """Readings in it."""
+    """Number of readings."""
 
     n_days: int
-    """Days with readings."""
+    """Number of days with readings."""
 
     location_n_per_m: float
-    """Median of its readings."""
+    """Median stiffness."""
 
     scatter: float
-    """Of its readings, in ln."""
+    """Scatter of the readings, in ln."""
 
     surface_std: float
-    """Standard uncertainty of what is expected, in ln."""
+    """Standard uncertainty of the expected stiffness, in ln."""
 
     support: Literal["none", "borrowed", "own"]
     """Whether readings in it can be judged."""
 
 
 class TimeScalePart(EvidencePart):
-    """The mean deviation over one time scale."""
+    """Mean deviation over one time scale."""
 
     time_scale_h: float
     """Running hours."""
@@ -322,17 +322,17 @@ class TimeScalePart(EvidencePart):
     """Mean deviation, in ln."""
 
     std: float
-    """What a healthy film's would stray by."""
+    """Standard uncertainty of the mean deviation of a healthy film."""
 
     sure_from: float
-    """Standard uncertainties from which on it is sure."""
+    """Number of standard uncertainties from which the change is significant."""
 
 
 class MembersPart(EvidencePart):
-    """Readings of the cell that the baseline stands on, by column."""
+    """Readings of the cell behind the baseline, by column."""
 
     n_in_all: int
-    """How many there are; those that follow are spread evenly over them."""
+    """Number of readings; those listed are spread evenly over them."""
 
     time: Numbers
     """Seconds since 1970 UTC."""
@@ -351,17 +351,17 @@ class MembersPart(EvidencePart):
 
 
 class ExpectedPart(EvidencePart):
-    """What is expected along the eccentricity at the oil temperature of the reading, by column."""
+    """Expected stiffness by eccentricity at the oil temperature of the reading, by column."""
 
     eccentricity_ratio: Numbers
     """Eccentricity ratio."""
 
     stiffness_n_per_m: Numbers
-    """Expected stiffness; null where nothing is known."""
+    """Expected stiffness; null if unknown."""
 
 
 class ComparisonPart(EvidencePart):
-    """A film in one direction, and what it was compared with."""
+    """Film in one direction, and the baseline that it is compared with."""
 
     bearing: Annotated[str, Field(examples=["UJB"])]
     """Bearing."""
@@ -370,46 +370,46 @@ class ComparisonPart(EvidencePart):
     """Direction."""
 
     estimator: Annotated[str, Field(examples=["dynamic"])]
-    """Whose stiffness."""
+    """Estimator of the stiffness."""
 
     time: Moment
-    """Of the reading."""
+    """Time of the reading."""
 
     stiffness_n_per_m: float | None
-    """What was measured."""
+    """Measured stiffness."""
 
     u_random: float | None
     """Random standard uncertainty of its logarithm."""
 
     eccentricity_ratio: float | None
-    """Under which eccentricity ratio."""
+    """Eccentricity ratio of the reading."""
 
     oil_temperature_c: float | None
-    """Under which oil temperature, °C."""
+    """Oil temperature of the reading, °C."""
 
     attitude_deg: float | None
-    """Attitude angle."""
+    """Attitude angle of the reading."""
 
     expected_n_per_m: float | None
-    """What the baseline expects there; null if it knows nothing of it."""
+    """Stiffness expected by the baseline; null if it has none for this condition."""
 
     baseline: BaselinePart | None
-    """Null if there was none."""
+    """Baseline; null if there was none."""
 
     cell: CellPart | None
-    """Null if the baseline has not seen it."""
+    """Cell of the reading; null if the baseline has no readings in it."""
 
     bounds: list[tuple[float, float]] | None
-    """Limits of the cell in eccentricity, oil temperature and, where it counts, attitude."""
+    """Limits of the cell in eccentricity, oil temperature and, if used, attitude."""
 
     time_scales: list[TimeScalePart]
     """Mean deviations over all time scales."""
 
     members: MembersPart | None
-    """Null if they could not be read, or there is no cell."""
+    """Readings of the cell; null if they are unreadable, or there is no cell."""
 
     expected: ExpectedPart | None
-    """Null without a baseline."""
+    """Expected stiffness; null without a baseline."""
 
     map: list[CellPart]
     """All cells of the baseline."""

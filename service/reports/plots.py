@@ -1,4 +1,4 @@
-"""Plots as SVG: scales, axes, lines."""
+"""Plots as SVG: scales, axes and marks."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from html import escape
 
 Tick = tuple[float, str]
-"""A value and what is written beside it."""
+"""Value and label."""
 
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 
@@ -16,12 +16,12 @@ TIME_STEPS_H = (0.25, 0.5, 1, 2, 3, 6, 12, 24, 48, 96, 168, 336, 720, 2160, 8760
 
 @dataclass(frozen=True)
 class Scale:
-    """An axis from `low` to `high`; logarithmic if it says so.
+    """Linear or logarithmic axis from `low` to `high`.
 
     Parameters
     ----------
     divisor
-        What is written is the value over this: 1e9 for N/m in GN/m.
+        Divisor of the labels: 1e9 for N/m shown as GN/m.
     """
 
     low: float
@@ -30,14 +30,14 @@ class Scale:
     divisor: float = 1.0
 
     def at(self, value: float) -> float:
-        """Place of a value, 0 to 1 inside."""
+        """Return the position of a value, 0 to 1 within the axis."""
         if self.is_log:
             value = max(value, 1e-300)
             return math.log(value / self.low) / math.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self, most: int = 6) -> Sequence[Tick]:
-        """Round values."""
+        """Return ticks at round values."""
         return self._decades() if self.is_log else self._linear(most)
 
     def _linear(self, most: int) -> list[Tick]:
@@ -55,17 +55,17 @@ class Scale:
 
 @dataclass(frozen=True)
 class TimeScale:
-    """An axis of time, seconds since 1970 UTC."""
+    """Axis of time, seconds since 1970 UTC."""
 
     low: float
     high: float
 
     def at(self, value: float) -> float:
-        """Place of a value, 0 to 1 inside."""
+        """Return the position of a value, 0 to 1 within the axis."""
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self, most: int = 8) -> Sequence[Tick]:
-        """Round hours and days."""
+        """Return ticks at round hours and days."""
         span_h = (self.high - self.low) / 3600.0
         step_s = 3600.0 * next((s for s in TIME_STEPS_H if span_h / s <= most), TIME_STEPS_H[-1])
         first = math.ceil(self.low / step_s)
@@ -75,7 +75,7 @@ class TimeScale:
 
 
 def around(values: Iterable[float | None], margin: float = 0.06) -> tuple[float, float] | None:
-    """Lowest and highest of values with some room; None if there are none."""
+    """Return the range of values with a margin; None if there are none."""
     found = [value for value in values if value is not None and math.isfinite(value)]
     if not found:
         return None
@@ -87,26 +87,26 @@ def around(values: Iterable[float | None], margin: float = 0.06) -> tuple[float,
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 8.0, 6.0, 30.0
 
 TIME_ROOM, NUMBER_ROOM = 62.0, 40.0
-"""That a tick takes along x."""
+"""Space of a tick along x."""
 
 Values = Sequence[float | None]
-"""None where there is no number."""
+"""Numbers; None where there is none."""
 
 
 @dataclass
 class Plot:
-    """A plot under construction.
+    """Plot under construction.
 
     Parameters
     ----------
     width, height
-        Of everything, in units of which the writing is 9 high.
+        Size in units in which the font size is 9.
     x_label, y_label
-        What the axes show, with their units.
+        Labels of the axes, with units.
     title
-        Read out in the place of the picture.
+        Text alternative of the picture.
     name
-        Of this plot alone on its page.
+        Unique name on the page.
     """
 
     width: float
@@ -120,7 +120,7 @@ class Plot:
     _marks: list[str] = field(default_factory=list)
 
     def line(self, xs: Values, ys: Values, look: str, longest_step: float = math.inf) -> None:
-        """A line; it breaks where there is no number, or a step along x is too long."""
+        """Add a line, interrupted by missing numbers and by long steps along x."""
         path, last = [], None
         for x, y in zip(xs, ys, strict=True):
             if x is None or y is None:
@@ -133,7 +133,7 @@ class Plot:
             self._marks.append(f'<path class="{look}" d="{"".join(path)}"/>')
 
     def band(self, xs: Values, lows: Values, highs: Values, look: str, longest_step: float) -> None:
-        """An area between two lines, in pieces where they break."""
+        """Add an area between two lines, interrupted like them."""
         piece: list[tuple[float, float, float]] = []
         for x, low, high in zip(xs, lows, highs, strict=True):
             is_known = x is not None and low is not None and high is not None
@@ -147,7 +147,7 @@ class Plot:
     def points(
         self, xs: Values, ys: Values, look: str, radius: float = 1.6, errors: Values | None = None
     ) -> None:
-        """Points, with error bars of this half-length along y."""
+        """Add points, with error bars of a half-length along y."""
         for i, (x, y) in enumerate(zip(xs, ys, strict=True)):
             if x is None or y is None:
                 continue
@@ -160,7 +160,7 @@ class Plot:
             )
 
     def dots(self, xs: Values, ys: Values, look: str) -> None:
-        """Many points as one path."""
+        """Add many points as one path."""
         found = (
             f"M{self._x(x)} {self._y(y)}h0"
             for x, y in zip(xs, ys, strict=True)
@@ -171,7 +171,7 @@ class Plot:
     def cell(
         self, x: tuple[float, float], y: tuple[float, float], look: str, opacity: float = 1.0
     ) -> None:
-        """A rectangle between two values along each axis."""
+        """Add a rectangle between two values along each axis."""
         left, right, top, bottom = self._x(x[0]), self._x(x[1]), self._y(y[1]), self._y(y[0])
         self._marks.append(
             f'<path class="{look}" fill-opacity="{opacity:.2f}"'
@@ -179,7 +179,7 @@ class Plot:
         )
 
     def upright(self, x: float, look: str, words: str = "", row: int = 0) -> None:
-        """A line from top to bottom, with words beside it, in rows from its top."""
+        """Add a vertical line with a label in a row from the top."""
         place, y = self._x(x), TOP + 8 + 9 * row
         self._marks.append(f'<path class="{look}" d="M{place} {TOP:g}V{self.height - BOTTOM:g}"/>')
         self._marks.append(
@@ -187,11 +187,11 @@ class Plot:
         )
 
     def level(self, y: float, look: str) -> None:
-        """A line from left to right."""
+        """Add a horizontal line."""
         self._marks.append(f'<path class="{look}" d="M{LEFT:g} {self._y(y)}H{self._right:g}"/>')
 
     def svg(self) -> str:
-        """The whole plot."""
+        """Return the plot as SVG."""
         size = f"0 0 {self.width:g} {self.height:g}"
         clip = f"inside-{self.name}"
         area = (

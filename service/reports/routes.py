@@ -1,4 +1,4 @@
-"""Evidence of alarms over HTTP."""
+"""Routes to the evidence of alarms."""
 
 import asyncio
 import re
@@ -27,12 +27,12 @@ from service.reports.archive import (
     EvidenceState,
     Occurrence,
     SamplesState,
+    bundle_files,
 )
-from service.reports.bundle import bundle_files
+from service.reports.case import read_case
+from service.reports.collector import EvidenceCollector
 from service.reports.document import Evidence
-from service.reports.keeper import EvidenceCollector
-from service.reports.report.case import read_case
-from service.reports.report.page import POLICY, report_page
+from service.reports.page import POLICY, report_page
 from service.reports.tables import TableError
 from service.runtime.files import zipped
 from service.runtime.times import rfc3339
@@ -41,57 +41,57 @@ from service.store.access.identities import Permission
 
 
 class OccurrenceModel(ApiModel):
-    """One occurrence of an alarm with what there is of it."""
+    """Occurrence of an alarm with the state of its evidence."""
 
     occurrence: int
-    """Counts how often the alarm was raised or rose in level."""
+    """Number of times that the alarm was raised or rose in level."""
 
     change: Annotated[str, Field(examples=["raised"])]
-    """raised or escalated."""
+    """Change of the alarm: raised or escalated."""
 
     level: Literal["alert", "danger"] | None
-    """Level that it had since."""
+    """Level after the event."""
 
     time: Time
-    """When."""
+    """Time of the event."""
 
     state: Literal["complete", "waiting", "lost", "removed", "not_kept"]
-    """Whether there is evidence: complete, waiting for the disk, lost (by a crash, or a disk that
-    refused for long), removed to make room, or never kept."""
+    """State of the evidence: complete, waiting for the disk, lost (by a crash, or a disk that
+    refused for long), removed to free space, or never kept."""
 
     samples: Literal["complete", "being_made", "lost", "removed", "none"]
-    """Whether the samples around the alarm are there: complete, being recorded, lost, removed to
-    make room, or none for this alarm."""
+    """State of the samples around the alarm: complete, being recorded, lost, removed to free space,
+    or none for this alarm."""
 
     evidence: Annotated[
         str | None, Field(examples=["/api/v1/alarms/U1:UJB:stiffness_x/evidence/3"])
     ]
-    """Path of the document; null unless complete. Add /report or /bundle.zip to it."""
+    """Path of the document; null unless complete. Append /report or /bundle.zip."""
 
 
 class OccurrencesModel(ApiModel):
     """Occurrences of an alarm."""
 
     alarm: Annotated[str, Field(examples=["U1:UJB:stiffness_x"])]
-    """Which alarm."""
+    """Identifier of the alarm."""
 
     origin: Literal["live", "replay"]
-    """Whether a machine is watched, or a recording played."""
+    """Origin of the data: a live machine, or a replayed recording."""
 
     occurrences: list[OccurrenceModel]
-    """Newest first."""
+    """Occurrences, newest first."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """An occurrence with what there is of its samples."""
+    """Occurrence with the state of its samples."""
 
     occurrence: Occurrence
     samples: SamplesState
 
 
 class EvidenceService:
-    """Lists evidence, prints reports, hands out bundles."""
+    """Lists evidence, and creates reports and bundles."""
 
     def __init__(
         self,
@@ -106,7 +106,7 @@ class EvidenceService:
         self._trend_days = trend_days
 
     async def occurrences(self, alarm: str, most: int) -> list[Found]:
-        """The newest occurrences of an alarm, newest first."""
+        """Return the newest occurrences of an alarm, newest first."""
         pending, capturing = self.keeper.pending, self.keeper.capturing
 
         def look() -> list[Found]:
@@ -116,35 +116,35 @@ class EvidenceService:
         return await self._downloads.worked(look)
 
     async def occurrence(self, alarm: str, number: int) -> Occurrence | None:
-        """One of them; None if there never was such a one."""
+        """Return one occurrence; None if it does not exist."""
         pending = self.keeper.pending
         return await self._downloads.worked(lambda: self.archive.occurrence(alarm, number, pending))
 
     async def report(self, found: Occurrence) -> str:
-        """The page of an occurrence whose bundle is complete.
+        """Return the report of an occurrence whose bundle is complete.
 
         Raises
         ------
         DamagedEvidenceError, LookupError
-            If the bundle cannot be read, or is not there.
+            If the bundle cannot be read, or does not exist.
         """
         capturing = self.keeper.capturing
         return await self._downloads.worked(lambda: self._report(found, capturing))
 
     async def bundle(self, found: Occurrence, has_configuration: bool) -> AsyncIterator[bytes]:
-        """A bundle as a ZIP file, piece by piece.
+        """Return a bundle as a ZIP file, in pieces.
 
         Parameters
         ----------
         has_configuration
-            Whether the settings of the whole plant are in it.
+            Whether to include the settings of the whole plant.
 
         Raises
         ------
         DamagedEvidenceError, LookupError, OSError
-            If the bundle cannot be read, or is not there.
+            If the bundle cannot be read, or does not exist.
         TooManyDownloadsError
-            If too many are on their way.
+            If too many downloads are in progress.
         """
         self._downloads.require_room()
         page = await self.report(found)
@@ -160,7 +160,7 @@ class EvidenceService:
 
 
 def is_there(found: Occurrence) -> bool:
-    """Whether there is a bundle."""
+    """Return whether there is a bundle."""
     return found.state is EvidenceState.COMPLETE
 
 
@@ -171,20 +171,17 @@ Number = Annotated[
 ]
 
 LIST_PROBLEMS = problem_responses(422, 503, own={404: "Unknown alarm"})
-
 PROBLEMS = problem_responses(
     422,
     own={
         404: "Unknown alarm or occurrence, or no evidence of it: the detail gives the reason",
-        409: "Not on the disk yet",
-        500: "Damaged on the disk",
         503: "The store cannot be read, or too many concurrent downloads",
     },
 )
 
 WHY_NOT = {
     EvidenceState.LOST: "was lost: the service ended, or the disk refused, before it was written",
-    EvidenceState.REMOVED: "was removed to make room for newer evidence",
+    EvidenceState.REMOVED: "was removed to free space for newer evidence",
     EvidenceState.NOT_KEPT: "was never kept",
 }
 
@@ -194,7 +191,7 @@ log = structlog.get_logger()
 
 
 def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter:
-    """Routes that show evidence, if any is kept; they change nothing."""
+    """Return the routes to evidence, if any is kept; they change nothing."""
     router = APIRouter(
         prefix="/api/v1/alarms/{alarm}/evidence",
         tags=["alarms"],
@@ -208,7 +205,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
             int, Query(ge=1, le=1000, description="Most occurrences in the answer.")
         ] = 100,
     ) -> OccurrencesModel:
-        """The newest occurrences of an alarm, and what evidence there is of each."""
+        """Return the newest occurrences of an alarm, and the state of their evidence."""
         found = await _there(desk).occurrences(_known(context, alarm), limit)
         return OccurrencesModel(
             alarm=alarm,
@@ -218,12 +215,12 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
 
     @router.get("/{occurrence}", summary="All that was known", responses=PROBLEMS)
     async def document(alarm: AlarmId, occurrence: Number) -> Evidence:
-        """Everything that was known when the alarm was raised, as it was written down then."""
+        """Return the state of the unit when the alarm was raised, as recorded then."""
         held = _there(desk)
         found = await _complete(context, held, alarm, occurrence)
         place = found.place
-        if place is None:  # complete ones have a place
-            raise ProblemError(404, "No evidence", "there is no bundle")
+        if place is None:  # never: complete evidence has a place
+            raise ProblemError(404, "No evidence", "the bundle does not exist")
         try:
             return await asyncio.to_thread(held.archive.document, place)
         except DamagedEvidenceError as error:
@@ -236,7 +233,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         responses=PROBLEMS,
     )
     async def report(alarm: AlarmId, occurrence: Number) -> Response:
-        """HTML made for one sheet of A4, without any script, to read or to print."""
+        """Return HTML for one sheet of A4, without scripts, to read or to print."""
         held = _there(desk)
         found = await _complete(context, held, alarm, occurrence)
         try:
@@ -252,9 +249,9 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         responses={**PROBLEMS, 200: _zip_content()},
     )
     async def bundle(request: Request, alarm: AlarmId, occurrence: Number) -> StreamingResponse:
-        """Document, tables, report, and the samples once they are complete.
+        """Return document, tables, report, and the samples once they are complete.
 
-        The plant's configuration is in it, too, but not for a key of some units.
+        The bundle includes the plant's configuration, except for a key that is limited to units.
         """
         held = _there(desk)
         found = await _complete(context, held, alarm, occurrence)
@@ -273,12 +270,12 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
 
 def _there(desk: EvidenceService | None) -> EvidenceService:
     if desk is None:
-        raise ProblemError(404, "No evidence", "no evidence is kept here")
+        raise ProblemError(404, "No evidence", "this service keeps no evidence")
     return desk
 
 
 def _known(context: Context, alarm: str) -> str:
-    """Refuse what cannot be an alarm; alarms of an older plant file still have their evidence."""
+    """Refuse an invalid alarm; alarms of an older plant file keep their evidence."""
     match = ID.fullmatch(alarm)
     if match is None or match[3] not in ALARM_KINDS:
         try:
@@ -291,7 +288,7 @@ def _known(context: Context, alarm: str) -> str:
 async def _complete(
     context: Context, desk: EvidenceService, alarm: str, occurrence: int
 ) -> Occurrence:
-    """An occurrence whose evidence is there; otherwise say why it is not."""
+    """Return an occurrence with complete evidence; otherwise raise the problem."""
     found = await desk.occurrence(_known(context, alarm), occurrence)
     if found is None:
         detail = f"alarm {alarm} has no occurrence {occurrence}"

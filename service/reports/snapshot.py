@@ -1,4 +1,4 @@
-"""`Snapshot`: what was known when an alarm was raised, held by reference until it is written."""
+"""Snapshot of a unit when an alarm is raised, held by reference until it is written."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from service.settings.units import UnitSettings
 
 @dataclass(frozen=True)
 class BearingSnapshot:
-    """What was known of one bearing; None where there was nothing."""
+    """State of one bearing; None for missing parts."""
 
     assessment: Assessment | None
     film: FilmNews | None
@@ -24,20 +24,20 @@ class BearingSnapshot:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """What was known at one moment; values that never change, none of them copied.
+    """State of a unit at one time; immutable values that are not copied.
 
     Parameters
     ----------
     taken_ns
         Host time.
     status
-        How samples of the unit arrived; None for the service itself.
+        State of the samples of the unit; None for alarms about the service itself.
     bearings
-        All of the unit, that of the alarm first.
+        All bearings of the unit, that of the alarm first.
     bearing
-        That of the alarm, if it is about one.
+        Bearing of the alarm, if any.
     rules
-        How films are watched; None if they are not.
+        Rules of film monitoring; None if it is off.
     samples_expected
         Whether samples around the alarm are going to be kept.
     """
@@ -52,12 +52,12 @@ class Snapshot:
 
     @property
     def name(self) -> str:
-        """The occurrence, for messages."""
+        """Alarm and occurrence, for messages."""
         return f"{self.event.identity.id} occurrence {self.event.occurrence}"
 
 
 class SnapshotTaker:
-    """Takes snapshots on the event loop; works in no time, since it only takes references."""
+    """Takes snapshots on the event loop, without delay since it only takes references."""
 
     def __init__(
         self, units: Mapping[str, UnitSettings], live: LiveView, films: FilmMonitor
@@ -65,11 +65,11 @@ class SnapshotTaker:
         self._units, self._live, self._films = units, live, films
 
     def take(self, event: AlarmEvent, now_ns: int, samples_expected: bool) -> Snapshot:
-        """Note what is known of an alarm's unit now."""
+        """Return a snapshot of an alarm's unit."""
         id_, unit = event.identity.unit, self._units.get(event.identity.unit)
         bearing = None if unit is None else bearing_of(unit, event.identity.subject)
         ids = [] if unit is None else [each.id for each in unit.bearing]
-        ids.sort(key=lambda each: each != bearing)  # the others stay in their order
+        ids.sort(key=lambda each: each != bearing)  # stable: the others keep their order
         return Snapshot(
             event=event,
             taken_ns=now_ns,
@@ -89,7 +89,7 @@ class SnapshotTaker:
 
 
 def bearing_of(unit: UnitSettings, subject: str) -> str | None:
-    """The bearing that an alarm's subject is, or one of whose channels it is."""
+    """Return the bearing that a subject is, or to which the channel belongs."""
     for bearing in unit.bearing:
         channels = {bearing.shaft_x, bearing.shaft_y, bearing.bearing_x, bearing.bearing_y}
         if subject == bearing.id or subject in channels:

@@ -1,4 +1,4 @@
-"""The tables of a bundle as Parquet: spectra, orbits, readings around the alarm."""
+"""Tables of a bundle as Parquet: spectra, orbits, and readings around the alarm."""
 
 from collections.abc import Iterable
 from io import BytesIO
@@ -14,12 +14,12 @@ from core.change.decision import Verdict
 from core.monitor.assessment import Assessment
 from core.spectra.cross_spectrum import CrossSpectrum
 from service.reports.parts import AXES
-from service.store.film_port import FilmHistory
+from service.store.film_readings import FilmHistory
 
 SPECTRA, ORBITS, TREND = "spectra.parquet", "orbits.parquet", "trend.parquet"
 
 CHANNELS = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
-"""In the order of a cross-spectrum."""
+"""Order of the channels of a cross-spectrum."""
 
 PAIRS = [(i, j) for i in range(len(CHANNELS)) for j in range(i + 1, len(CHANNELS))]
 
@@ -28,7 +28,7 @@ WORDS = np.array([verdict.name.lower() for verdict in Verdict])
 AnyArray = npt.NDArray[Any]
 
 Columns = dict[str, list[Any]]
-"""A table by column, as Python has it."""
+"""Table as lists by column."""
 
 
 class TableError(Exception):
@@ -36,13 +36,13 @@ class TableError(Exception):
 
 
 def spectra_table(found: Iterable[Assessment]) -> bytes:
-    """Cross-spectra of bearings; everything that padwatch knows of frequencies is made of them."""
+    """Return the cross-spectra of bearings, the basis of all results in the frequency domain."""
     tables = [_spectrum(each.bearing, each.spectrum) for each in found]
     return _written(pa.concat_tables(tables))
 
 
 def orbits_table(found: Iterable[Assessment]) -> bytes | None:
-    """The newest turns of the shaft in each bearing; None where no samples were kept of them."""
+    """Return the newest revolutions of the shaft in each bearing; None without samples."""
     tables = []
     for each in found:
         orbit = each.orbit
@@ -60,7 +60,7 @@ def orbits_table(found: Iterable[Assessment]) -> bytes | None:
 
 
 def trend_table(found: FilmHistory) -> bytes:
-    """Readings of a film, oldest first."""
+    """Return readings of a film, oldest first."""
     return _written(_trend(found))
 
 
@@ -98,13 +98,13 @@ def _trend(found: FilmHistory) -> "pa.Table":
 
 
 def trend_columns(found: FilmHistory) -> Columns:
-    """The same readings as Python has them."""
+    """Return readings of a film as lists by column."""
     columns: Columns = _trend(found).to_pydict()
     return columns
 
 
 def read_table(path: Path) -> Columns:
-    """A table of a bundle.
+    """Return a table of a bundle.
 
     Raises
     ------
@@ -142,7 +142,7 @@ def _spectrum(bearing: str, found: CrossSpectrum) -> "pa.Table":
 
 
 def _column(values: AnyArray) -> "pa.Array":
-    return pa.array(np.ascontiguousarray(values), from_pandas=True)  # not a number is null
+    return pa.array(np.ascontiguousarray(values), from_pandas=True)  # NaN becomes null
 
 
 def _written(table: "pa.Table") -> bytes:

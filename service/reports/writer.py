@@ -1,4 +1,4 @@
-"""`EvidenceWriter`: from a snapshot to a bundle on the disk; lives in the thread that writes."""
+"""Writer of bundles, which runs in the thread of the collector."""
 
 import shutil
 from contextlib import suppress
@@ -6,38 +6,37 @@ from pathlib import Path
 
 from core.monitor.assessment import Assessment
 from core.units import DAY_NS
-from service.reports.compared import cell_of, comparisons
-from service.reports.composed import composed, not_known, sealed
-from service.reports.document import file_part
+from service.reports.contents import cell_of, comparisons, members_of
+from service.reports.document import Maker, composed, file_part, not_known, sealed
 from service.reports.folders import DOCUMENT, INCOMPLETE, Place, place_of
-from service.reports.maker import Maker
-from service.reports.members import members_of
 from service.reports.parts import ComparisonPart
-from service.reports.room import EvidenceLimits
+from service.reports.retention import EvidenceLimits
 from service.reports.snapshot import Snapshot
 from service.reports.tables import ORBITS, SPECTRA, TREND, orbits_table, spectra_table, trend_table
 from service.runtime.files import sync_folder, write_synced
-from service.store.film_port import FilmQuery, FilmStore
+from service.store.film_readings import FilmQuery
+from service.store.films import FilmStore
 
 
 class EvidenceWriter:
-    """Writes bundles, each complete with its name or not there at all."""
+    """Writes bundles atomically: each is complete under its name, or does not exist."""
 
     def __init__(self, root: Path, maker: Maker, store: FilmStore, limits: EvidenceLimits) -> None:
         self._root, self._maker, self._store, self._limits = root, maker, store, limits
 
     def write(self, snapshot: Snapshot, *, with_history: bool = True) -> Place:
-        """Write a bundle; one that is there already stays.
+        """Write a bundle and return its place; an existing bundle stays.
 
         Parameters
         ----------
         with_history
-            Whether readings are taken from the store; without, the document says so.
+            Whether to include readings from the store; otherwise the document says that they are
+            missing.
 
         Raises
         ------
         OSError
-            If the disk refuses; then nothing of it is left.
+            If the disk refuses; nothing is left then.
         StoreError
             If the store cannot be read.
         """

@@ -1,6 +1,7 @@
 """Files that are written whole and synced to the disk, and ZIP files made while they are sent."""
 
 import os
+import tempfile
 import zipfile
 from collections.abc import Generator, Iterator, Mapping
 from contextlib import ExitStack
@@ -32,6 +33,19 @@ def write_whole(path: Path, content: bytes) -> None:
     """Write a file under a temporary name, sync it and rename it: it exists whole or not at all."""
     aside = path.with_name(path.name + ASIDE)
     try:
+        write_synced(aside, content)
+        aside.replace(path)
+    finally:
+        aside.unlink(missing_ok=True)
+    sync_folder(path.parent)
+
+
+def write_private(path: Path, content: bytes) -> None:
+    """Write a file like `write_whole`, readable by its owner only; several processes may do so."""
+    descriptor, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
+    aside = Path(name)
+    try:
+        os.close(descriptor)
         write_synced(aside, content)
         aside.replace(path)
     finally:

@@ -1,1 +1,1 @@
-"""Durable trends: one interface, one back end so far (SQLite)."""
+"""Database of the plant: results, alarms, films, accounts, audit trail, retention and backup."""

@@ -1,6 +1,7 @@
-"""Alarms: what each is now, and every event there ever was, numbered without a hole."""
+"""Alarms: the current state of each, and all its events, numbered without gaps."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from dataclasses import asdict
 from typing import Any
 
 from core.alarms.alarm import (
@@ -16,41 +17,33 @@ from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
 from service.settings.alarm_kinds import ALARM_KINDS
-from service.store.access.audit_entries import ActedNews, AuditAction
-from service.store.audit_deeds import alarm_deeds
-from service.store.database import Connection
+from service.store.access.audit_entries import ActedNews, AuditAction, Source
+from service.store.audit import AuditChain
+from service.store.database import Connection, insert, upsert
 from service.store.outbox import Address, insert_messages, no_recipients
 from service.store.port import AlarmQuery, StoredEvent, StoreError
 from service.store.sharing import DONE, answer_command
 from service.store.trends import BETWEEN_BOUNDS, IN_STATES, at_least, at_most, condition_arguments
 
-POINT_COLUMNS = "operating_state, eccentricity_ratio, attitude_deg, oil_temperature_c"
-
+POINT_COLUMNS = ("operating_state", "eccentricity_ratio", "attitude_deg", "oil_temperature_c")
 ALARM_COLUMNS = (
-    "id, unit, subject, kind, level, occurrence, is_acknowledged, raised_ns, n_events, is_known,"
-    " condition_level, value, limit_value, reason, suppressed_by, is_latched,"
-    " shelf_actor, shelf_reason, shelf_since_ns, shelf_until_ns,"
-    f" outage_actor, outage_reason, outage_since_ns, {POINT_COLUMNS}"
+    *("id", "unit", "subject", "kind", "level", "occurrence", "is_acknowledged", "raised_ns"),
+    *("n_events", "is_known", "condition_level", "value", "limit_value", "reason"),
+    *("suppressed_by", "is_latched", "shelf_actor", "shelf_reason", "shelf_since_ns"),
+    *("shelf_until_ns", "outage_actor", "outage_reason", "outage_since_ns", *POINT_COLUMNS),
 )
-ALARM_COLUMN = ALARM_COLUMNS.split(", ")
-UPSERT = (
-    f"INSERT INTO alarm ({ALARM_COLUMNS}) VALUES ({', '.join('?' * len(ALARM_COLUMN))})"  # noqa: S608
-    f" ON CONFLICT (id) DO UPDATE SET {', '.join(f'{c} = excluded.{c}' for c in ALARM_COLUMN)}"
-    " WHERE alarm.n_events <= excluded.n_events"
-)
-"""What is written twice, as after an interrupted write, never overwrites what came later."""
+UPSERT = upsert("alarm", ALARM_COLUMNS, ("id",)) + " WHERE alarm.n_events <= excluded.n_events"
+"""Writing an earlier state again, as after an interrupted write, does not replace a later one."""
 
 EVENT_COLUMNS = (
-    "alarm, number, unit, subject, kind, change, level, state_before, state_after, time_ns,"
-    f" occurrence, value, limit_value, actor, reason, {POINT_COLUMNS}"
+    *("alarm", "number", "unit", "subject", "kind", "change", "level", "state_before"),
+    *("state_after", "time_ns", "occurrence", "value", "limit_value", "actor", "reason"),
+    *POINT_COLUMNS,
 )
-EVENT_COLUMN = EVENT_COLUMNS.split(", ")
-INSERT_EVENT = (
-    f"INSERT INTO alarm_event ({EVENT_COLUMNS}) VALUES ({', '.join('?' * len(EVENT_COLUMN))})"  # noqa: S608
-    " ON CONFLICT (alarm, number) DO NOTHING"
-)
+INSERT_EVENT = insert("alarm_event", EVENT_COLUMNS) + " ON CONFLICT (alarm, number) DO NOTHING"
+SELECT_ALARMS = f"SELECT {', '.join(ALARM_COLUMNS)} FROM alarm ORDER BY id"  # noqa: S608
 SELECT_EVENTS = f"""
-    SELECT id, {EVENT_COLUMNS} FROM alarm_event
+    SELECT id, {", ".join(EVENT_COLUMNS)} FROM alarm_event
     WHERE id < :before
     AND (CAST(:alarm AS TEXT) IS NULL OR alarm = :alarm)
     AND (CAST(:unit AS TEXT) IS NULL OR unit = :unit)
@@ -67,34 +60,59 @@ SELECT_EVENTS = f"""
 def insert_alarms(
     writer: Connection,
     news: Iterable[AlarmNews],
-    tell: Callable[[Connection, Iterable[AuditAction]], None],
+    audit: AuditChain,
     address: Address = no_recipients,
 ) -> None:
-    """Add events, queue what tells of them, and bring the alarms to what they are after them."""
-    for told in news:
-        for event in told.events:
+    """Add events with their messages and audit entries, and update the alarms."""
+    for each in news:
+        for event in each.events:
             if writer.execute(INSERT_EVENT, _event_row(event)).rowcount == 1:
-                insert_messages(writer, event, address(told.alarm, event))
-                tell(writer, alarm_deeds(event, told))
-        writer.execute(UPSERT, _alarm_row(told.alarm))
-        if isinstance(told, ActedNews) and told.command is not None:
-            # with what it did, so that whoever finds it unanswered knows that nothing was done
-            answer_command(writer, told.command, DONE, told.events[-1].time_ns)
+                insert_messages(writer, event, address(each.alarm, event))
+                audit.add(writer, _actions(event, each))
+        writer.execute(UPSERT, _alarm_row(each.alarm))
+        if isinstance(each, ActedNews) and each.command is not None:
+            # in the same transaction: an unanswered command has changed nothing
+            answer_command(writer, each.command, DONE, each.events[-1].time_ns)
 
 
 def select_alarms(reader: Connection) -> list[Alarm]:
-    """Every alarm that ever had an event, as it was after its newest."""
-    return [_alarm(row) for row in reader.execute(f"SELECT {ALARM_COLUMNS} FROM alarm ORDER BY id")]  # noqa: S608
+    """Return every alarm that ever had an event, in its current state."""
+    return [_alarm(row) for row in reader.execute(SELECT_ALARMS)]
 
 
 def select_events(reader: Connection, query: AlarmQuery) -> list[StoredEvent]:
-    """Events, newest first."""
+    """Return events, newest first."""
     rows = reader.execute(SELECT_EVENTS, _arguments(query))
     return [StoredEvent(int(row[0]), _event(row[1:])) for row in rows]
 
 
+def _actions(event: AlarmEvent, news: AlarmNews) -> list[AuditAction]:
+    """Return the audit entry of an event that a person caused; none for other events."""
+    if not event.actor:
+        return []
+    alarm = news.alarm
+    holds = {"shelf": alarm.shelf, "outage": alarm.outage}
+    after = {
+        "state": event.state_after.value,
+        "level": None if event.level is None else event.level.name.lower(),
+        "occurrence": event.occurrence,
+        **{name: asdict(hold) for name, hold in holds.items() if hold is not None},
+    }
+    action = AuditAction(
+        time_ns=event.time_ns,
+        actor=event.actor,
+        action=f"alarm.{event.change.value}",
+        object=event.identity.id,
+        before={"state": event.state_before.value},
+        after=after,
+        reason=event.reason,
+        source=Source.API,  # the only way to act on alarms
+        peer=news.peer if isinstance(news, ActedNews) else None,
+    )
+    return [action]
+
+
 def _arguments(query: AlarmQuery) -> dict[str, object]:
-    """What a query asks for, as parameters of the statement."""
     names = ("before", "limit", "alarm", "unit", "kind", "start_ns", "end_ns")
     asked = {name: getattr(query, name) for name in names}
     return (
@@ -140,12 +158,12 @@ def _point_row(point: OperatingPoint | None) -> tuple[float | None, ...]:
 
 
 def _point(found: dict[str, Any]) -> OperatingPoint | None:
-    state, *numbers = (found[name] for name in POINT_COLUMNS.split(", "))
+    state, *numbers = (found[name] for name in POINT_COLUMNS)
     return None if state is None else OperatingPoint(OperatingState(state), *numbers)
 
 
 def _alarm(row: tuple[Any, ...]) -> Alarm:
-    found = dict(zip(ALARM_COLUMN, row, strict=True))
+    found = dict(zip(ALARM_COLUMNS, row, strict=True))
     try:
         return Alarm(
             identity=_identity(found),
@@ -173,7 +191,7 @@ def _alarm(row: tuple[Any, ...]) -> Alarm:
 
 
 def _event(row: tuple[Any, ...]) -> AlarmEvent:
-    found = dict(zip(EVENT_COLUMN, row, strict=True))
+    found = dict(zip(EVENT_COLUMNS, row, strict=True))
     try:
         return AlarmEvent(
             identity=_identity(found),

@@ -1,97 +1,198 @@
-"""The audit trail."""
+"""Audit trail in the database: a chain of entries, written with the changes that they record."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import asdict, astuple, dataclass, fields, replace
 from pathlib import Path
+from threading import Lock
 
-from service.store.access.audit_entries import AuditEntry, AuditAction
+from service.store.access.audit_entries import FIRST, AuditAction, AuditEntry, chained
 from service.store.access.audit_verification import (
+    HEAD_DIFFERED,
     AuditHead,
     HeadError,
     Verdict,
     place_of,
     read_head,
     walk,
+    write_head,
 )
-from service.store.audit_chain import COLUMNS, AuditChain, entry_of, newest_of
-from service.store.audit_port import AuditQuery
-from service.store.database import Connect, Connection, Reading
+from service.store.database import Connect, Connection, Database, Reading, Tables, insert
+from service.store.port import StoreError
 
+COLUMNS = tuple(field.name for field in fields(AuditEntry))
+ENTRIES = f"SELECT {', '.join(COLUMNS)} FROM audit"  # noqa: S608
+INSERT = insert("audit", COLUMNS)
+SELECT_NEWEST = "SELECT number, hash FROM audit ORDER BY number DESC LIMIT 1"
+SELECT_HASH = "SELECT hash FROM audit WHERE number = ?"
 SELECT = f"""
-    SELECT {COLUMNS} FROM audit
-    WHERE number < :before
+    {ENTRIES} WHERE number < :before
     AND (CAST(:actor AS TEXT) IS NULL OR actor = :actor)
     AND (CAST(:action AS TEXT) IS NULL OR action = :action)
     AND (CAST(:object AS TEXT) IS NULL OR object = :object)
     AND time_ns >= :start_ns AND time_ns < :end_ns
     ORDER BY number DESC LIMIT :limit
-"""  # noqa: S608
-SELECT_NEXT = f"SELECT {COLUMNS} FROM audit WHERE number > ? ORDER BY number LIMIT ?"  # noqa: S608
-AT_ONCE = 1000
+"""
+SELECT_NEXT = f"{ENTRIES} WHERE number > ? ORDER BY number LIMIT ?"
+PAGE = 1000
 
 
-class SqlAudit:
-    """The audit trail of one database.
+@dataclass(frozen=True)
+class AuditQuery:
+    """Query for entries, newest first; None matches everything.
 
     Parameters
     ----------
-    writing
-        Opens a transaction that is durable when left.
-    reading
-        Opens a connection that only reads.
+    before
+        Only entries with lower numbers.
+    limit
+        Maximum number of entries.
+    start_ns, end_ns
+        Half-open time range.
     """
 
-    def __init__(self, writing: Connect, reading: Reading, chain: AuditChain) -> None:
-        self._writing, self._reading, self._chain = writing, reading, chain
+    before: int = 2**63 - 1
+    limit: int = 100
+    actor: str | None = None
+    action: str | None = None
+    object: str | None = None
+    start_ns: int = -(2**63)
+    end_ns: int = 2**63 - 1
+
+
+class AuditChain:
+    """End of a database's chain; all writing transactions are opened through it.
+
+    Parameters
+    ----------
+    head
+        File that names the newest entry.
+    database
+        Database with the trail.
+    """
+
+    def __init__(self, head: Path, database: Database) -> None:
+        self._head, self._database = head, database
+        self._lock = Lock()
+        self._is_due = False
+        self.head_error: str | None = None
+
+    @contextmanager
+    def writing(self) -> Iterator[Connection]:
+        """Open a transaction, which is durable when left; then write the head."""
+        with self._lock:
+            self._is_due = False
+            with self._database.writing() as writer:
+                yield writer
+            if self._is_due or self.head_error is not None:
+                self._update_head()
+
+    def add(self, writer: Connection, actions: Iterable[AuditAction]) -> None:
+        """Add entries within a transaction; the first one compares the head with the chain."""
+        for action in actions:
+            newest = newest_of(writer)
+            if not self._is_due and self.head_error is None:
+                difference = self._difference(writer, newest)
+                if difference is not None:
+                    newest = _insert(writer, _head_differed(action, newest, difference), newest)
+            self._is_due = True
+            _insert(writer, action, newest)
+
+    def _difference(self, writer: Connection, newest: AuditHead) -> str | None:
+        """Return how the head contradicts the chain; a head that lags behind does not."""
+        try:
+            head = read_head(self._head)
+        except HeadError as error:
+            is_new = not self._head.exists() and not self._database.ever_had(writer, "audit")
+            return None if is_new else f"the head {error}"
+        found = writer.execute(SELECT_HASH, (head.number,)).fetchone()
+        hash_ = found[0] if found else FIRST if head.number == 0 else None
+        if hash_ == head.hash:
+            return None
+        if head.number > newest.number:
+            return f"the head names entry {head.number}, the trail ended at {newest.number}"
+        return f"entry {head.number} is not the one that the head names"
+
+    def _update_head(self) -> None:
+        """Write the head in a transaction, so that it never goes back.
+
+        If that fails, the entries stay on the disk and the head lags behind until it succeeds.
+        """
+        self.head_error = None
+        try:
+            with self._database.writing() as writer:
+                try:
+                    write_head(self._head, newest_of(writer))
+                except OSError as error:
+                    self.head_error = f"{self._head}: {error}"
+        except StoreError as error:
+            self.head_error = f"{self._head}: {error}"
+
+
+class AuditedTables(Tables):
+    """Tables whose changes are recorded in the audit trail.
+
+    Parameters
+    ----------
+    chain
+        Audit trail, which also opens writing transactions.
+    """
+
+    def __init__(self, chain: AuditChain, reading: Reading) -> None:
+        super().__init__(chain.writing, reading)
+        self._audit = chain
+
+
+class AuditStore(AuditedTables):
+    """Audit trail. Changes of the store are recorded in their own transactions."""
 
     @property
     def head_error(self) -> str | None:
-        """Why the head could not be written last; None if it could."""
-        return self._chain.head_error
+        """Error of the last attempt to write the head file; None if it succeeded."""
+        return self._audit.head_error
 
-    def record(self, deeds: Sequence[AuditAction]) -> None:
-        """Write deeds in a transaction of their own.
+    def record(self, actions: Sequence[AuditAction]) -> None:
+        """Write entries about actions that change nothing in the store; durable on return.
 
         Raises
         ------
         StoreError
-            If they were not written; the message is the database's.
+            If they were not written.
         """
         with self._writing() as writer:
-            self._chain.add(writer, deeds)
+            self._audit.add(writer, actions)
 
     def entries(self, query: AuditQuery) -> list[AuditEntry]:
-        """Read entries, newest first."""
+        """Return entries, newest first."""
         with self._reading("replace") as reader:
-            return [entry_of(row) for row in reader.execute(SELECT, vars(query))]
+            return [AuditEntry(*row) for row in reader.execute(SELECT, vars(query))]
 
 
 class Trail:
-    """The audit trail of a database that may be in use, for those who read no more than that.
+    """Read-only audit trail of a database that may be in use.
 
     Parameters
     ----------
     reading
-        Opens a look at the database, in which text tells every byte from every other.
+        Open a read-only transaction that keeps every byte of text distinguishable.
     head
         File that names the newest entry.
     is_shared
-        Whether other hosts write to it as well, each with a head of its own.
+        Whether other hosts, each with its own head, write to the trail as well.
     """
 
     def __init__(self, reading: Connect, head: Path, *, is_shared: bool = False) -> None:
         self._reading, self._head, self._is_shared = reading, head, is_shared
 
     def verify(self) -> Verdict:
-        """Walk all of it, without changing anything.
+        """Verify the whole trail without changing it.
 
         Raises
         ------
         StoreError
             If there is none, or it cannot be read.
         """
-        head = self._read_head()  # first: it may lag, but not lead
+        head = self._read_head()  # read first: it may lag behind the trail, but not lead
         with self._reading() as reader:
             last = newest_of(reader).number
             verdict = walk(
@@ -101,12 +202,12 @@ class Trail:
                 is_shared=self._is_shared,
             )
         if verdict.n_behind and self._read_head() == AuditHead(verdict.n_entries, verdict.hash):
-            return replace(verdict, n_behind=0)  # somebody wrote in between
+            return replace(verdict, n_behind=0)  # entries were written in between
         return verdict
 
     @contextmanager
     def entries(self) -> Iterator[Iterator[AuditEntry]]:
-        """All of its entries, oldest first.
+        """Open all entries, oldest first.
 
         Raises
         ------
@@ -124,10 +225,74 @@ class Trail:
 
 
 def _all(reader: Connection) -> Iterator[AuditEntry]:
-    """Every entry, some at a time, so that no trail needs more memory than another."""
+    """Yield every entry, reading pages of bounded size."""
     after = -(2**63)
-    while rows := reader.execute(SELECT_NEXT, (after, AT_ONCE)).fetchall():
-        yield from map(entry_of, rows)
-        if rows[-1][0] <= after:  # a damaged index leads in a circle
+    while rows := reader.execute(SELECT_NEXT, (after, PAGE)).fetchall():
+        yield from (AuditEntry(*row) for row in rows)
+        if rows[-1][0] <= after:  # a damaged index may form a loop
             return
         after = rows[-1][0]
+
+
+def newest_of(reader: Connection) -> AuditHead:
+    """Return number and hash of the newest entry."""
+    found = reader.execute(SELECT_NEWEST).fetchone()
+    return AuditHead() if found is None else AuditHead(*found)
+
+
+def begin_head(path: Path) -> None:
+    """Write the head of an empty trail unless there is one.
+
+    Raises
+    ------
+    OSError
+        If it cannot be written.
+    """
+    if not path.exists():
+        write_head(path, AuditHead())
+
+
+def _insert(writer: Connection, action: AuditAction, newest: AuditHead) -> AuditHead:
+    entry = chained(action, newest.number + 1, newest.hash)
+    writer.execute(INSERT, astuple(entry))
+    return AuditHead(entry.number, entry.hash)
+
+
+def _head_differed(action: AuditAction, newest: AuditHead, why: str) -> AuditAction:
+    return AuditAction(
+        time_ns=action.time_ns,
+        actor="padwatch",
+        action=HEAD_DIFFERED,
+        object="audit",
+        after=asdict(newest),
+        reason=why,
+    )
+
+
+AUDIT_TABLES = """
+    CREATE TABLE audit (
+        number INTEGER PRIMARY KEY AUTOINCREMENT,
+        time_ns INTEGER NOT NULL,
+        actor TEXT NOT NULL,
+        source TEXT NOT NULL CHECK (source IN ('api', 'command_line', 'padwatch')),
+        peer TEXT,
+        action TEXT NOT NULL,
+        object TEXT NOT NULL,
+        before TEXT,
+        after TEXT,
+        reason TEXT NOT NULL,
+        previous_hash TEXT NOT NULL,
+        hash TEXT NOT NULL
+    ) STRICT;
+    CREATE INDEX audit_of_actor ON audit (actor, number);
+    CREATE INDEX audit_of_action ON audit (action, number);
+    CREATE INDEX audit_of_object ON audit (object, number);
+    CREATE TRIGGER audit_follows BEFORE INSERT ON audit
+    WHEN NEW.number IS NOT (SELECT coalesce(max(number), 0) + 1 FROM audit)
+    BEGIN SELECT RAISE(ABORT, 'entries of the audit trail follow one another'); END;
+    CREATE TRIGGER audit_kept_as_told BEFORE UPDATE ON audit
+    BEGIN SELECT RAISE(ABORT, 'entries of the audit trail are kept as they were written'); END;
+    CREATE TRIGGER audit_kept BEFORE DELETE ON audit
+    BEGIN SELECT RAISE(ABORT, 'entries of the audit trail are kept'); END;
+"""
+"""Migration that creates the table."""

@@ -1,4 +1,4 @@
-"""Copies of the database: made while the service runs, verified, and put back."""
+"""Backups of a SQLite database: made while the service runs, verified, and restored."""
 
 import fcntl
 import os
@@ -16,33 +16,30 @@ from core.units import s_from_ns
 from service.runtime.files import create_private, put_in_place, sync_folder
 from service.settings.storage import Origin
 from service.store.access.identities import KeyState
-from service.store.access.port import AccessStore
-from service.store.highwater.adopting import adopt_restored
+from service.store.access.tables import AccessStore
+from service.store.highwater.commits import adopt_restored
 from service.store.schema import MIGRATIONS
+from service.store.sqlite.checking import structure_findings
 from service.store.sqlite.migrating import APPLICATION_IDS
 
 MAX_FINDINGS = 5
-"""Of damage, in a message."""
-
-EVERY_FINDING = 2**31 - 1
-
-NULL_FINDING = "NULL value in "
+"""Maximum number of defects in a message."""
 
 
 class BackupError(Exception):
-    """A copy cannot be made, is not whole, or cannot be put back; the message says why."""
+    """A copy cannot be made, is damaged, or cannot be restored; the message says why."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """What a database holds.
+    """Content of a database.
 
     Parameters
     ----------
     schema
-        Number of the newest migration it has seen.
+        Number of its schema.
     n_rows
-        Of each table.
+        Number of rows by table.
     """
 
     schema: int
@@ -50,7 +47,7 @@ class Content:
 
 
 def content_of(connection: sqlite3.Connection) -> Content:
-    """Count what a database holds, as of the connection's transaction."""
+    """Return the content of a database, as of the connection's transaction."""
     names = connection.execute(
         "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT GLOB 'sqlite_*'"
     ).fetchall()
@@ -62,17 +59,17 @@ def content_of(connection: sqlite3.Connection) -> Content:
 
 
 def checked(path: Path) -> Content:
-    """Read a copy from end to end.
+    """Verify a copy completely and return its content.
 
     Raises
     ------
     BackupError
-        If it is damaged, not a live plant's database of padwatch, or of a newer schema.
+        If it is damaged, not the database of a live plant, or of a newer schema.
     """
     if not path.is_file():
         raise BackupError(f"{path}: there is no such file")
     try:
-        # nobody writes to a copy: no journal of it is looked for or left behind
+        # immutable: no journal is read or created
         uri = f"{path.absolute().as_uri()}?mode=ro&immutable=1"
         with closing(sqlite3.connect(uri, uri=True)) as connection:
             _require_ours(connection, path)
@@ -84,37 +81,22 @@ def checked(path: Path) -> Content:
 
 def _require_ours(connection: sqlite3.Connection, path: Path) -> None:
     if _number(connection, "application_id") != APPLICATION_IDS[Origin.LIVE]:
-        raise BackupError(f"{path} is not a database of a live plant by padwatch")
+        raise BackupError(f"{path} is not the padwatch database of a live plant")
     schema = _number(connection, "user_version")
     if schema > len(MIGRATIONS):
         raise BackupError(
-            f"{path} has schema {schema}, this padwatch knows up to {len(MIGRATIONS)};"
+            f"{path} has schema {schema}, this padwatch supports up to {len(MIGRATIONS)};"
             " use the padwatch that wrote it, or a newer one"
         )
 
 
 def _require_whole(connection: sqlite3.Connection, path: Path) -> None:
-    damage = list(islice(_damage(connection), MAX_FINDINGS))
+    damage = list(islice(structure_findings(connection), MAX_FINDINGS))
     if damage:
         raise BackupError(f"{path} is damaged: " + "; ".join(damage))
     loose = connection.execute("PRAGMA foreign_key_check").fetchone()
     if loose is not None:
-        raise BackupError(f"{path} is damaged: rows of {loose[0]} belong to nothing")
-
-
-def _damage(connection: sqlite3.Connection) -> Iterator[str]:
-    """What is wrong; SQLite before 3.41 finds nulls that are none in tables WITHOUT ROWID."""
-    said_null = set()
-    for (finding,) in connection.execute(f"PRAGMA integrity_check({EVERY_FINDING})"):
-        if finding.startswith(NULL_FINDING):
-            said_null.add(finding)
-        elif finding != "ok":
-            yield finding
-    for finding in sorted(said_null):
-        table, _, column = finding.removeprefix(NULL_FINDING).partition(".")
-        looked = f'SELECT 1 FROM "{table}" WHERE typeof("{column}") = \'null\' LIMIT 1'  # noqa: S608
-        if connection.execute(looked).fetchone() is not None:
-            yield finding
+        raise BackupError(f"{path} is damaged: rows of {loose[0]} refer to missing rows")
 
 
 def _number(connection: sqlite3.Connection, pragma: str) -> int:
@@ -123,12 +105,12 @@ def _number(connection: sqlite3.Connection, pragma: str) -> int:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Keep other backups out of a folder.
+    """Exclude other backups from a folder.
 
     Raises
     ------
     BackupError
-        If another one is at work there.
+        If another backup is being written there.
     """
     descriptor = os.open(folder, os.O_RDONLY)
     try:
@@ -147,12 +129,12 @@ NAME = re.compile(r"padwatch-\d{8}T\d{6}Z\.sqlite3")
 
 @dataclass(frozen=True)
 class Backup:
-    """A copy that has been verified.
+    """Verified copy.
 
     Parameters
     ----------
     removed
-        Older copies that have made room for it.
+        Older copies that were removed.
     """
 
     path: Path
@@ -164,19 +146,19 @@ class Backup:
 def back_up(database: Path, folder: Path, now_ns: int, n_kept: int) -> Backup:
     """Copy a database by SQLite's online backup, verify the copy, and remove the oldest ones.
 
-    Nothing old is removed before the new copy is whole and on the disk.
+    Older copies are removed only after the new one is verified and on the disk.
 
     Parameters
     ----------
     folder
-        Of the copies; created if need be.
+        Folder of the copies; created if missing.
     n_kept
-        Copies that there are afterwards, at least 1.
+        Number of copies to keep, at least 1.
 
     Raises
     ------
     BackupError
-        If there is no verified copy; then the folder is as it was.
+        If there is no verified copy; the folder is then unchanged.
     """
     if not database.is_file():
         raise BackupError(f"{database}: there is no such database")
@@ -207,7 +189,7 @@ def _back_up(database: Path, folder: Path, now_ns: int, n_kept: int) -> Backup:
 
 
 def _copy(database: Path, aside: Path) -> Content:
-    """Copy what one moment's database holds; return what that is."""
+    """Copy one state of a database; return its content."""
     uri = f"{database.absolute().as_uri()}?mode=ro"
     with (
         closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as source,
@@ -221,7 +203,7 @@ def _copy(database: Path, aside: Path) -> Content:
 
 
 def _make_room(newest: Path, n_kept: int) -> tuple[Path, ...]:
-    """Remove the oldest copies, never the one that has just been made."""
+    """Remove the oldest copies, but never the newest."""
     others = (path for path in newest.parent.iterdir() if NAME.fullmatch(path.name))
     older = sorted((path for path in others if path != newest), reverse=True)
     for path in older[n_kept - 1 :]:
@@ -235,17 +217,17 @@ def _name(now_ns: int) -> str:
 
 
 LOGS = ("-wal", "-shm")
-"""What SQLite keeps beside a database that is open, or was when its process died."""
+"""Suffixes of the files that SQLite keeps beside an open database, or leaves after a crash."""
 
 
 @dataclass(frozen=True)
 class Restored:
-    """What has been put in place.
+    """Result of restoring a copy.
 
     Parameters
     ----------
     before
-        Where the database that was there is now; None if there was none.
+        New path of the previous database; None if there was none.
     """
 
     database: Path
@@ -254,12 +236,12 @@ class Restored:
 
 
 def restore(copy: Path, database: Path, now_ns: int) -> Restored:
-    """Put a copy in a database's place, in one step; what was there is kept beside it.
+    """Replace a database by a copy in one step; the previous database is kept beside it.
 
     Raises
     ------
     BackupError
-        If the copy is not whole or of a newer schema, or the database is in use; then nothing has
+        If the copy is damaged or of a newer schema, or the database is in use; then nothing has
         changed.
     """
     content = checked(copy)
@@ -290,7 +272,7 @@ def _replace(copy: Path, database: Path, now_ns: int) -> Path | None:
 
 
 def _keep(database: Path, now_ns: int) -> Path | None:
-    """Give what is there a second name; logs go with it, or they would be taken for the copy's."""
+    """Give the existing database a second name, and move its logs, which do not fit the copy."""
     if not database.exists():
         return None
     moment = datetime.fromtimestamp(s_from_ns(now_ns), UTC)
@@ -306,7 +288,7 @@ def _keep(database: Path, now_ns: int) -> Path | None:
 
 @contextmanager
 def _unused(database: Path) -> Iterator[None]:
-    """Hold a database so that nobody else has it open; one too damaged to be held is let be."""
+    """Lock a database against use; one that is too damaged to be locked is ignored."""
     if not database.exists():
         yield
         return
@@ -315,7 +297,7 @@ def _unused(database: Path) -> Iterator[None]:
             connection.execute("PRAGMA locking_mode = EXCLUSIVE")
             connection.execute("BEGIN EXCLUSIVE")
             connection.execute("COMMIT")
-            connection.execute("PRAGMA journal_mode = DELETE")  # all that the log holds is in now
+            connection.execute("PRAGMA journal_mode = DELETE")  # moves the log into the database
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
                 raise BackupError(
@@ -323,20 +305,20 @@ def _unused(database: Path) -> Iterator[None]:
                 ) from error
             raise
         except sqlite3.DatabaseError:
-            pass  # damaged: this is why a copy is put in its place
+            pass  # damaged: the reason for restoring a copy
         yield
 
 
 @dataclass(frozen=True)
 class AccessBefore:
-    """Who and what could come in by the database that a copy takes the place of.
+    """Access to the database that a copy replaces.
 
     Parameters
     ----------
     accounts
         Names of its accounts.
     revoked
-        Ids of the keys that were revoked in it.
+        Identifiers of its revoked keys.
     """
 
     accounts: frozenset[str]
@@ -345,16 +327,16 @@ class AccessBefore:
 
 @dataclass(frozen=True)
 class AccessAfter:
-    """Who and what can come in by the copy.
+    """Access to the copy.
 
     Parameters
     ----------
     accounts, keys
-        Names of accounts, and names of valid keys with their ids.
+        Names of accounts; names and identifiers of valid keys.
     returned
-        Accounts that the database before did not have: perhaps they were removed.
+        Accounts that the previous database did not have, perhaps because they were removed.
     revoked
-        Ids of keys that were revoked before and have been revoked again.
+        Identifiers of keys that were revoked again.
     """
 
     accounts: tuple[str, ...]
@@ -364,7 +346,7 @@ class AccessAfter:
 
 
 def access_before(database: Path) -> AccessBefore | None:
-    """Read it; None if there is no database, or none that can be read."""
+    """Return the access to a database; None if there is none, or it is unreadable."""
     uri = f"{database.absolute().as_uri()}?mode=ro"
     try:
         with closing(sqlite3.connect(uri, uri=True)) as reader:

@@ -1,157 +1,90 @@
-"""Baselines, and the steps that put versions in force."""
+"""Baselines of bearings, the steps taken with them, and responses of shafts."""
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, fields
+from enum import StrEnum
 
 from core.baseline.baseline import BearingBaseline
 from core.change.shaft_response import ShaftResponse
 from core.machine.unit import Estimator
-from service.store.database import Connection
+from service.store.access.audit_entries import AuditAction, acting
+from service.store.audit import AuditedTables
+from service.store.database import Connection, insert, upsert
 from service.store.documents import baseline_from_json, response_from_json, to_json
-from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
 from service.store.port import StoreError
 
-ENTRY_COLUMNS = (
-    "unit, bearing, estimator, version, created_ns, author,"
-    " learned_from_ns, learned_until_ns, event"
-)
-INSERT_BASELINE = (
-    f"INSERT INTO baseline ({ENTRY_COLUMNS}, document)"  # noqa: S608
-    " VALUES (?,?,?,?,?,?,?,?,?,?)"
-)
-STEP_COLUMNS = "unit, bearing, version, step, time_ns, from_ns, actor, reason"
-INSERT_STEP = f"INSERT INTO baseline_step ({STEP_COLUMNS}) VALUES (?,?,?,?,?,?,?,?)"  # noqa: S608
-SET_RESPONSE = """
-    INSERT INTO shaft_response VALUES (?, ?, ?)
-    ON CONFLICT (unit) DO UPDATE SET
-    created_ns = excluded.created_ns, document = excluded.document
-"""
+PADWATCH = "padwatch"
 
 
-def insert_baseline(writer: Connection, baseline: BearingBaseline) -> None:
-    """Add a baseline to those of its bearing."""
-    origin = baseline.origin
-    writer.execute(
-        INSERT_BASELINE,
-        (
-            *(origin.unit, origin.bearing, origin.estimator, origin.version, origin.created_ns),
-            *(origin.author, baseline.learned_from_ns, baseline.learned_until_ns, origin.event),
-            to_json(baseline),
-        ),
-    )
+class BaselineStep(StrEnum):
+    """Step taken with the baselines of a bearing.
 
-
-def is_kept(reader: Connection, baseline: BearingBaseline) -> bool:
-    """Whether just this baseline is written already."""
-    origin = baseline.origin
-    return select_document(reader, origin.unit, origin.bearing, origin.version) == to_json(baseline)
-
-
-def are_kept(reader: Connection, steps: Iterable[StoredStep]) -> bool:
-    """Whether all of this is written already: nobody does the same twice at the same moment."""
-    return all(step in select_steps(reader, step.unit, step.bearing) for step in steps)
-
-
-def insert_steps(writer: Connection, steps: Iterable[StoredStep]) -> None:
-    """Add what was done to baselines."""
-    writer.executemany(
-        INSERT_STEP,
-        [
-            (s.unit, s.bearing, s.version, s.step.value, s.time_ns, s.from_ns, s.actor, s.reason)
-            for s in steps
-        ],
-    )
-
-
-def select_baselines(reader: Connection, unit: str, bearing: str) -> list[BaselineEntry]:
-    """Every baseline of a bearing, newest first."""
-    rows = reader.execute(
-        f"SELECT {ENTRY_COLUMNS} FROM baseline"  # noqa: S608
-        " WHERE unit = ? AND bearing = ? ORDER BY version DESC",
-        (unit, bearing),
-    )
-    return [
-        BaselineEntry(unit, bearing, Estimator(estimator), *rest)
-        for unit, bearing, estimator, *rest in rows
-    ]
-
-
-def select_baseline(
-    reader: Connection, unit: str, bearing: str, version: int
-) -> BearingBaseline | None:
-    """One baseline whole.
-
-    Raises
-    ------
-    StoreError
-        If what is stored is no baseline.
+    The newest `ACCEPTED` or `WITHDRAWN` determines the version in force, the newest `FROZEN` or
+    `THAWED` whether learning continues. `RENEWED` sets the time from which readings are learned.
     """
-    found = select_document(reader, unit, bearing, version)
-    try:
-        return None if found is None else baseline_from_json(found)
-    except ValueError as error:
-        name = f"baseline {version} of unit {unit} bearing {bearing}"
-        raise StoreError(f"{name}: {error}") from error
+
+    LEARNED = "learned"
+    ACCEPTED = "accepted"
+    REJECTED = "rejected"
+    WITHDRAWN = "withdrawn"
+    FROZEN = "frozen"
+    THAWED = "thawed"
+    RENEWED = "renewed"
 
 
-def select_document(reader: Connection, unit: str, bearing: str, version: int) -> str | None:
-    """One baseline as it is stored."""
-    found = reader.execute(
-        "SELECT document FROM baseline WHERE unit = ? AND bearing = ? AND version = ?",
-        (unit, bearing, version),
-    ).fetchone()
-    return None if found is None else str(found[0])
+@dataclass(frozen=True)
+class StoredStep:
+    """One step in the history of a bearing's baselines.
 
-
-def select_steps(reader: Connection, unit: str, bearing: str) -> list[StoredStep]:
-    """What was done to the baselines of a bearing, oldest first."""
-    rows = reader.execute(
-        f"SELECT {STEP_COLUMNS} FROM baseline_step"  # noqa: S608
-        " WHERE unit = ? AND bearing = ? ORDER BY id",
-        (unit, bearing),
-    )
-    return [
-        StoredStep(unit, bearing, version, BaselineStep(step), time_ns, actor, reason, from_ns)
-        for unit, bearing, version, step, time_ns, from_ns, actor, reason in rows
-    ]
-
-
-def set_response(writer: Connection, unit: str, response: ShaftResponse, now_ns: int) -> None:
-    """Put a unit's response in the place of the one before."""
-    writer.execute(SET_RESPONSE, (unit, now_ns, to_json(response)))
-
-
-def select_responses(reader: Connection) -> dict[str, ShaftResponse]:
-    """How shafts answer, by unit.
-
-    Raises
-    ------
-    StoreError
-        If what is stored is no response.
+    Parameters
+    ----------
+    version
+        Version of the baseline; None for `RENEWED`.
+    from_ns
+        Time from which readings are learned, for `RENEWED`.
     """
-    rows = reader.execute("SELECT unit, document FROM shaft_response").fetchall()
-    try:
-        return {unit: response_from_json(document) for unit, document in rows}
-    except ValueError as error:
-        raise StoreError(f"the response of a shaft: {error}") from error
+
+    unit: str
+    bearing: str
+    version: int | None
+    step: BaselineStep
+    time_ns: int
+    actor: str
+    reason: str
+    from_ns: int | None = None
+
+
+@dataclass(frozen=True)
+class BaselineEntry:
+    """Stored baseline without its content."""
+
+    unit: str
+    bearing: str
+    estimator: Estimator
+    version: int
+    created_ns: int
+    author: str
+    learned_from_ns: int
+    learned_until_ns: int
+    event: str
 
 
 @dataclass(frozen=True)
 class Versions:
-    """Where the baselines of a bearing stand.
+    """State of the baselines of a bearing.
 
     Parameters
     ----------
     in_force
-        What its readings are compared with; None if there is none.
+        Version that readings are compared with; None if there is none.
     rejected
-        What must not be put in force.
+        Versions that must not be put in force.
     is_frozen
-        Whether nothing more is learned until an engineer says so.
+        Whether learning is suspended until an engineer resumes it.
     renewed_ns
-        From when on readings count for learning; None for all.
+        Time from which readings are learned; None for all.
     first_accepted
-        The first that was put in force since then.
+        First version that was put in force since then.
     """
 
     in_force: int | None = None
@@ -162,7 +95,7 @@ class Versions:
 
 
 def versions_after(steps: Iterable[StoredStep]) -> Versions:
-    """Where the baselines of a bearing stand after everything that was done, oldest first."""
+    """Return the state of a bearing's baselines after all its steps, oldest first."""
     in_force: int | None = None
     first: int | None = None
     rejected: set[int] = set()
@@ -184,3 +117,138 @@ def versions_after(steps: Iterable[StoredStep]) -> Versions:
             case BaselineStep.LEARNED:
                 pass
     return Versions(in_force, frozenset(rejected), is_frozen, renewed_ns, first)
+
+
+ENTRY_COLUMNS = [field.name for field in fields(BaselineEntry)]
+STEP_COLUMNS = [field.name for field in fields(StoredStep)]
+OF_BEARING = "WHERE unit = ? AND bearing = ?"
+INSERT_BASELINE = insert("baseline", [*ENTRY_COLUMNS, "document"])
+INSERT_STEP = insert("baseline_step", STEP_COLUMNS)
+SELECT_STEPS = f"SELECT {', '.join(STEP_COLUMNS)} FROM baseline_step {OF_BEARING} ORDER BY id"  # noqa: S608
+SELECT_BASELINES = (
+    f"SELECT {', '.join(ENTRY_COLUMNS)} FROM baseline {OF_BEARING} ORDER BY version DESC"  # noqa: S608
+)
+SELECT_DOCUMENT = f"SELECT document FROM baseline {OF_BEARING} AND version = ?"  # noqa: S608
+SET_RESPONSE = upsert("shaft_response", ("unit", "created_ns", "document"), ("unit",))
+
+
+class BaselineTables(AuditedTables):
+    """Baselines, their steps, and shaft responses; a change is on the disk on return."""
+
+    def add_baseline(self, baseline: BearingBaseline, steps: Sequence[StoredStep]) -> None:
+        """Write a learned baseline with its first steps; writing them again has no effect."""
+        origin, document = baseline.origin, to_json(baseline)
+        key = (origin.unit, origin.bearing, origin.version)
+        learned = (baseline.learned_from_ns, baseline.learned_until_ns)
+        created = (origin.estimator, origin.version, origin.created_ns, origin.author)
+        row = (origin.unit, origin.bearing, *created, *learned, origin.event, document)
+        with self._writing() as writer:
+            is_stored = writer.execute(SELECT_DOCUMENT, key).fetchone() == (document,)
+            if not (is_stored and _are_stored(writer, steps)):
+                writer.execute(INSERT_BASELINE, row)
+                self._add_steps(writer, steps)
+
+    def baselines(self, unit: str, bearing: str) -> list[BaselineEntry]:
+        """Return all baselines of a bearing, newest first."""
+        with self._reading() as reader:
+            return [
+                BaselineEntry(unit, bearing, Estimator(estimator), *rest)
+                for _, _, estimator, *rest in reader.execute(SELECT_BASELINES, (unit, bearing))
+            ]
+
+    def baseline(self, unit: str, bearing: str, version: int) -> BearingBaseline | None:
+        """Return one baseline with its content.
+
+        Raises
+        ------
+        StoreError
+            If its document is invalid.
+        """
+        with self._reading() as reader:
+            found = reader.execute(SELECT_DOCUMENT, (unit, bearing, version)).fetchone()
+        try:
+            return None if found is None else baseline_from_json(found[0])
+        except ValueError as error:
+            name = f"baseline {version} of unit {unit} bearing {bearing}"
+            raise StoreError(f"{name}: {error}") from error
+
+    def add_steps(self, steps: Sequence[StoredStep]) -> None:
+        """Write steps; writing them again has no effect."""
+        with self._writing() as writer:
+            if not _are_stored(writer, steps):
+                self._add_steps(writer, steps)
+
+    def steps(self, unit: str, bearing: str) -> list[StoredStep]:
+        """Return the steps taken with the baselines of a bearing, oldest first."""
+        with self._reading() as reader:
+            return _select_steps(reader, unit, bearing)
+
+    def set_response(self, unit: str, response: ShaftResponse, now_ns: int) -> None:
+        """Write the response of a unit's shaft to its films, replacing the previous one."""
+        with self._writing() as writer:
+            writer.execute(SET_RESPONSE, (unit, now_ns, to_json(response)))
+
+    def responses(self) -> dict[str, ShaftResponse]:
+        """Return the responses of shafts by unit.
+
+        Raises
+        ------
+        StoreError
+            If a document is invalid.
+        """
+        with self._reading() as reader:
+            rows = reader.execute("SELECT unit, document FROM shaft_response").fetchall()
+        try:
+            return {unit: response_from_json(document) for unit, document in rows}
+        except ValueError as error:
+            raise StoreError(f"the response of a shaft: {error}") from error
+
+    def _add_steps(self, writer: Connection, steps: Sequence[StoredStep]) -> None:
+        self._audit.add(writer, _actions(writer, steps))
+        rows = [tuple(getattr(step, name) for name in STEP_COLUMNS) for step in steps]
+        writer.executemany(INSERT_STEP, rows)
+
+
+def _are_stored(reader: Connection, steps: Iterable[StoredStep]) -> bool:
+    return all(step in _select_steps(reader, step.unit, step.bearing) for step in steps)
+
+
+def _select_steps(reader: Connection, unit: str, bearing: str) -> list[StoredStep]:
+    rows = reader.execute(SELECT_STEPS, (unit, bearing))
+    return [
+        StoredStep(unit, bearing, version, BaselineStep(step), *rest)
+        for _, _, version, step, *rest in rows
+    ]
+
+
+def _actions(writer: Connection, steps: Sequence[StoredStep]) -> list[AuditAction]:
+    """Return audit entries about steps before they are written; automatic learning has none."""
+    actions = []
+    for place in dict.fromkeys((step.unit, step.bearing) for step in steps):
+        done = _select_steps(writer, *place)
+        for step in steps:
+            if (step.unit, step.bearing) == place:
+                before = versions_after(done)
+                done.append(step)
+                if step.step is not BaselineStep.LEARNED or step.actor != PADWATCH:
+                    actions.append(_action(step, before, versions_after(done)))
+    return actions
+
+
+def _action(step: StoredStep, before: Versions, after: Versions) -> AuditAction:
+    parts = (step.unit, step.bearing, step.version)
+    return AuditAction(
+        time_ns=step.time_ns,
+        actor=step.actor,
+        action=f"baseline.{step.step.value}",
+        object=":".join(str(part) for part in parts if part is not None),
+        before=_document(before),
+        after=_document(after),
+        reason=step.reason,
+        source=acting().source,
+        peer=acting().peer,
+    )
+
+
+def _document(versions: Versions) -> dict[str, object]:
+    return asdict(versions) | {"rejected": sorted(versions.rejected)}

@@ -1,5 +1,6 @@
 """Buckets of readings over time: count, mean, extremes, worst quality."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,10 @@ IntArray = npt.NDArray[np.int64]
 LevelArray = npt.NDArray[np.uint8]
 
 
+STATISTICS = ("count", "mean", "minimum", "maximum", "level")
+ROWS = ("time_ns", *STATISTICS)
+
+
 @dataclass(frozen=True)
 class Summaries:
     """Summaries of readings, a row for each time and a column for each quantity.
@@ -21,11 +26,12 @@ class Summaries:
     Parameters
     ----------
     names
-        Of the columns.
+        Names of the columns.
     time_ns : (n,)
-        When the readings were taken, or from when on.
+        Times of the readings, or starts of their spans.
     count, mean, minimum, maximum, level : (n, n_names)
-        Usable readings, and the worst quality of all; where none was usable the numbers are NaN.
+        Number and statistics of usable readings, NaN if there are none; worst quality of all
+        readings.
     """
 
     names: tuple[str, ...]
@@ -40,64 +46,34 @@ class Summaries:
     def of(
         cls, names: tuple[str, ...], time_ns: IntArray, value: FloatArray, level: LevelArray
     ) -> "Summaries":
-        """Every reading its own summary; values NaN where there is none."""
+        """Return single readings as summaries; values are NaN where there is none."""
         count = np.isfinite(value).astype(np.int64)
         return cls(names, time_ns, count, value, value, value, level)
 
     @classmethod
-    def together(cls, parts: list["Summaries"]) -> "Summaries":
-        """All of some, at least one, in order of time."""
-        time_ns = np.concatenate([part.time_ns for part in parts])
-        order = np.argsort(time_ns, kind="stable")
-        return cls(
-            parts[0].names,
-            time_ns[order],
-            np.concatenate([part.count for part in parts])[order],
-            np.concatenate([part.mean for part in parts])[order],
-            np.concatenate([part.minimum for part in parts])[order],
-            np.concatenate([part.maximum for part in parts])[order],
-            np.concatenate([part.level for part in parts])[order],
-        )
+    def joined(cls, parts: Sequence["Summaries"]) -> "Summaries":
+        """Concatenate the rows of summaries with the same columns, at least one."""
+        rows = {name: np.concatenate([getattr(part, name) for part in parts]) for name in ROWS}
+        return cls(parts[0].names, **rows)
 
-    def followed_by(self, other: "Summaries") -> "Summaries":
-        """All rows of this one, then those of another with the same columns."""
-        return Summaries(
-            self.names,
-            np.concatenate([self.time_ns, other.time_ns]),
-            np.concatenate([self.count, other.count]),
-            np.concatenate([self.mean, other.mean]),
-            np.concatenate([self.minimum, other.minimum]),
-            np.concatenate([self.maximum, other.maximum]),
-            np.concatenate([self.level, other.level]),
-        )
+    @classmethod
+    def together(cls, parts: Sequence["Summaries"]) -> "Summaries":
+        """Concatenate summaries, at least one, in order of time."""
+        found = cls.joined(parts)
+        return found.at(np.argsort(found.time_ns, kind="stable"))
 
     def at(self, rows: IntArray | npt.NDArray[np.bool_]) -> "Summaries":
-        """Some rows, in the order given."""
-        return Summaries(
-            self.names,
-            self.time_ns[rows],
-            self.count[rows],
-            self.mean[rows],
-            self.minimum[rows],
-            self.maximum[rows],
-            self.level[rows],
-        )
+        """Select rows, in the given order."""
+        return Summaries(self.names, **{name: getattr(self, name)[rows] for name in ROWS})
 
     def only(self, names: tuple[str, ...]) -> "Summaries":
-        """Some columns, in the order given."""
+        """Select columns, in the given order."""
         columns = [self.names.index(name) for name in names]
-        return Summaries(
-            names,
-            self.time_ns,
-            self.count[:, columns],
-            self.mean[:, columns],
-            self.minimum[:, columns],
-            self.maximum[:, columns],
-            self.level[:, columns],
-        )
+        chosen = {name: getattr(self, name)[:, columns] for name in STATISTICS}
+        return Summaries(names, self.time_ns, **chosen)
 
     def in_spans(self, width_ns: int) -> "Summaries":
-        """One summary for each aligned span of this width that has any, of rows in order."""
+        """Aggregate rows, which are in order, into aligned spans of a width."""
         if self.time_ns.size == 0:
             return self
         number = self.time_ns // width_ns
@@ -105,14 +81,14 @@ class Summaries:
         return self.summed(starts, number[starts] * width_ns)
 
     def summed(self, starts: IntArray, time_ns: IntArray) -> "Summaries":
-        """One summary for each run of rows.
+        """Aggregate runs of rows.
 
         Parameters
         ----------
         starts : (m,)
             First row of each run.
         time_ns : (m,)
-            What is to stand for their times.
+            Times of the results.
         """
         count = np.add.reduceat(self.count, starts, axis=0)
         weighed = np.where(self.count > 0, self.mean * np.maximum(self.count, 1), 0.0)
@@ -120,7 +96,7 @@ class Summaries:
         mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
         lowest = np.fmin.reduceat(self.minimum, starts, axis=0)
         highest = np.fmax.reduceat(self.maximum, starts, axis=0)
-        mean = np.clip(mean, lowest, highest)  # rounding may carry a mean past equal values
+        mean = np.clip(mean, lowest, highest)  # rounding may move a mean beyond equal extremes
         level = np.maximum.reduceat(self.level, starts, axis=0)
         return Summaries(self.names, time_ns, count, mean, lowest, highest, level)
 
@@ -146,21 +122,21 @@ NICE_WIDTHS_S = (
 )
 NICE_WIDTHS_NS = tuple(width * 1_000_000_000 for width in NICE_WIDTHS_S)
 LEVEL_OF: dict[int, Level | None] = {-1: None} | {int(level): level for level in Level}
-"""What a number stands for; looked up, since thousands are made into words at a time."""
+"""Level of a number; a table, since thousands are converted at a time."""
 
 MAX_DAYS = (2**63 - 1) // DAY_NS
-"""Wider than that does not fit the nanoseconds; two of them hold all time since 1970."""
+"""Maximum width that fits in nanoseconds; two of them cover all time since 1970."""
 
 
 def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int = 1) -> int:
-    """Narrowest width, round to people, at which a range takes at most ``max_points`` buckets.
+    """Return the narrowest round width at which a range has at most ``max_points`` buckets.
 
     Parameters
     ----------
     finest_ns
-        What there is of the range is in buckets of this width; it divides a day.
+        Width of the available roll-ups; it divides a day.
     """
-    # aligned buckets may cut one more piece off the range than its length holds
+    # an aligned range may touch one more bucket than its length holds
     needed = -(-(end_ns - start_ns) // max(max_points - 1, 1))
     for width in NICE_WIDTHS_NS:
         if width >= needed and width % finest_ns == 0:
@@ -169,7 +145,7 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int 
 
 
 def single_points(readings: Summaries, hole_ns: int) -> Trend:
-    """Every reading alone; a point without a value marks each hole, so that no line spans it."""
+    """Return single readings; a point without a value marks each hole, to break the line."""
     holes = np.flatnonzero(np.diff(readings.time_ns) > hole_ns) + 1
     time_ns = np.insert(readings.time_ns, holes, readings.time_ns[holes - 1] + hole_ns // 2)
     series = {}
@@ -182,7 +158,7 @@ def single_points(readings: Summaries, hole_ns: int) -> Trend:
 
 
 def page(readings: Summaries, max_points: int, hole_ns: int) -> Trend:
-    """The first readings, each alone, and from when on the next page goes on."""
+    """Return the first readings, and the time at which the next page begins."""
     if readings.time_ns.size <= max_points:
         return single_points(readings, hole_ns)
     shown = single_points(readings.at(np.arange(max_points)), hole_ns)
@@ -190,7 +166,7 @@ def page(readings: Summaries, max_points: int, hole_ns: int) -> Trend:
 
 
 def bucketed(readings: Summaries, width_ns: int) -> Trend:
-    """Gather summaries into aligned buckets; those between without readings are empty."""
+    """Aggregate summaries into aligned buckets; those without readings are empty."""
     if readings.time_ns.size == 0:
         nothing = {name: TrendSeries([], [], [], [], []) for name in readings.names}
         return Trend(width_ns, [], nothing)

@@ -1,52 +1,52 @@
-"""The database under the store, as its SQL sees it: SQLite and PostgreSQL are behind this.
+"""Interface of SQLite and PostgreSQL to the SQL of the store.
 
-SQL is written once. What both understand, and what is to be kept to:
+SQL is written once. Rules for statements that run on both databases:
 
-- parameters are ``?`` in a tuple, or ``:name`` in a mapping; truths are stored as 0 and 1, so
-  compare them (``is_active = 1``);
+- parameters are ``?`` with a tuple, or ``:name`` with a mapping; booleans are stored as 0 and 1, so
+  compare them with numbers (``is_active = 1``);
 - a parameter that is compared with NULL names its type: ``CAST(:unit AS TEXT) IS NULL``,
   ``CAST(:low AS DOUBLE PRECISION) IS NULL``;
 - ``ON CONFLICT``, never ``INSERT OR REPLACE``; the old value is ``table.column`` in it;
 - no ``rowid``, ``typeof``, ``instr``, ``GLOB``, ``min`` or ``max`` of two values, ``LIMIT -1``;
-- rows that are computed with and written again are read from ``whole_`` and the table's name: in a
-  transaction that writes, too, that shows only what is as it was written;
-- a number that the database gave comes back by ``RETURNING`` or by a question of its own.
+- rows from which other rows are computed are read through the view ``whole_`` and the table's name,
+  which omits damaged rows also in a writing transaction;
+- a number assigned by the database is read by ``RETURNING`` or by a separate query.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, Literal, Protocol
 
 Parameters = tuple[Any, ...] | Mapping[str, Any]
 
 Unreadable = Literal["strict", "replace", "surrogateescape"]
-"""What becomes of stored text that is no UTF-8, in the words of `bytes.decode`."""
+"""Treatment of stored text that is not UTF-8, as the error handlers of `bytes.decode`."""
 
 
 class Rows(Protocol):
-    """What a statement has found."""
+    """Result of a statement."""
 
     @property
     def rowcount(self) -> int:
-        """Rows that it wrote."""
+        """Number of rows written."""
         ...
 
     def fetchone(self) -> Any:
-        """The next row; None after the last."""
+        """Return the next row; None after the last."""
         ...
 
     def fetchall(self) -> list[Any]:
-        """All rows that are left."""
+        """Return all remaining rows."""
         ...
 
     def __iter__(self) -> Iterator[Any]: ...
 
 
 class Connection(Protocol):
-    """A connection within a transaction; used by one thread at a time."""
+    """Connection within a transaction; used by one thread at a time."""
 
     def execute(self, statement: str, parameters: Parameters = ..., /) -> Rows:
-        """Run a statement. All that it found may be held in memory: ask for bounded amounts."""
+        """Run a statement. All rows may be held in memory, so queries must be bounded."""
         ...
 
     def executemany(self, statement: str, parameters: Iterable[Parameters], /) -> Rows:
@@ -55,11 +55,11 @@ class Connection(Protocol):
 
 
 Connect = Callable[[], AbstractContextManager[Connection]]
-"""Opens a transaction: what was written is durable when it is left without an error."""
+"""Open a writing transaction, which is durable once it is left without an error."""
 
 
 class Reading(Protocol):
-    """Opens a look at one state of a database."""
+    """Open a read-only transaction, which sees one state of a database."""
 
     def __call__(self, unreadable: Unreadable = "strict", /) -> AbstractContextManager[Connection]:
         """Open it."""
@@ -67,16 +67,16 @@ class Reading(Protocol):
 
 
 class Hold(Protocol):
-    """A name that nobody else holds, for as long as `is_held` says so."""
+    """Name held exclusively as long as `is_held` is true."""
 
     @property
     def is_held(self) -> bool:
-        """Look whether it still is; once lost it stays lost."""
+        """Check whether the name is still held; a lost name stays lost."""
         ...
 
 
 class Database(Protocol):
-    """One database. Its errors come out as `StoreError`, with what to do about them."""
+    """One database. All its errors are raised as `StoreError`, with advice."""
 
     @property
     def kind(self) -> str:
@@ -84,35 +84,60 @@ class Database(Protocol):
         ...
 
     def writing(self) -> AbstractContextManager[Connection]:
-        """Open a transaction, alone: nobody else writes until it ends, in no other process either.
+        """Open the only writing transaction of all processes.
 
-        Whatever is read in it is therefore so until it ends. An error within undoes all of it.
-        One at its end, `StoreError`, may leave open whether it was written: what is written again
-        has to count once.
+        Data read within it stays unchanged until it ends. An error within it undoes all of it. A
+        `StoreError` at its end may leave open whether it was committed, so writing the same data
+        again must have no effect.
         """
         ...
 
     def reading(self, unreadable: Unreadable = "strict") -> AbstractContextManager[Connection]:
-        """Open a look at one state of the database, whatever is written meanwhile."""
+        """Open a read-only transaction, which sees one state of the database."""
         ...
 
     def ever_had(self, connection: Connection, table: str) -> bool:
-        """Whether a table that numbers its rows ever had one, be it deleted since."""
+        """Return whether a table that numbers its rows ever had one, even if deleted since."""
         ...
 
     def hold(self, name: str) -> AbstractContextManager[Hold]:
-        """Take a name for oneself, among all processes that use this database.
+        """Hold a name exclusively among all processes that use this database.
 
-        The holder asks `Hold.is_held` before each thing that only one may do: where the connection
-        to the database is lost, somebody else may take the name.
+        The holder checks `Hold.is_held` before every action that only one process may take: if the
+        connection to the database is lost, another process may take the name.
 
         Raises
         ------
         StoreError
-            If somebody else holds it, who is named as far as that is known.
+            If another process holds it; the message names that process if it is known.
         """
         ...
 
     def close(self) -> None:
-        """Release everything; closing twice is fine."""
+        """Release all connections; closing twice has no effect."""
         ...
+
+
+class Tables:
+    """Tables of one subject in a database.
+
+    Parameters
+    ----------
+    writing, reading
+        Open a writing and a read-only transaction.
+    """
+
+    def __init__(self, writing: Connect, reading: Reading) -> None:
+        self._writing, self._reading = writing, reading
+
+
+def insert(table: str, columns: Sequence[str]) -> str:
+    """Return the statement that inserts a row."""
+    marks = ", ".join("?" * len(columns))
+    return f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({marks})"  # noqa: S608
+
+
+def upsert(table: str, columns: Sequence[str], key: Sequence[str]) -> str:
+    """Return the statement that inserts a row, or replaces the row with the same key."""
+    changes = ", ".join(f"{name} = excluded.{name}" for name in columns if name not in key)
+    return f"{insert(table, columns)} ON CONFLICT ({', '.join(key)}) DO UPDATE SET {changes}"

@@ -1,4 +1,4 @@
-"""Baselines, shaft responses and decisions as JSON documents, checked when they are read."""
+"""Baselines, shaft responses and decisions as JSON documents, validated when they are read."""
 
 import json
 from dataclasses import asdict
@@ -17,7 +17,7 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 class _Document(BaseModel):
-    """Envelope of a document; its configuration applies to the dataclasses in `content` too."""
+    """Envelope of a document; its configuration also applies to the dataclasses in `content`."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
@@ -40,7 +40,7 @@ class _DecisionDocument(_Document):
 
 
 def to_json(value: BearingBaseline | ShaftResponse | Decision) -> str:
-    """Document of a value; the matching reader returns an equal value.
+    """Return the document of a value.
 
     Raises
     ------
@@ -53,7 +53,7 @@ def to_json(value: BearingBaseline | ShaftResponse | Decision) -> str:
 
 
 def baseline_from_json(text: str) -> BearingBaseline:
-    """Read a baseline.
+    """Return the baseline of a document.
 
     Raises
     ------
@@ -65,12 +65,12 @@ def baseline_from_json(text: str) -> BearingBaseline:
 
 
 def response_from_json(text: str) -> ShaftResponse:
-    """Read a shaft response; raises as `baseline_from_json` does."""
+    """Return the response of a document; raises like `baseline_from_json`."""
     return _read(_ResponseDocument, text).content
 
 
 def decision_from_json(text: str) -> Decision:
-    """Read a decision; raises as `baseline_from_json` does."""
+    """Return the decision of a document; raises like `baseline_from_json`."""
     return _read(_DecisionDocument, text).content
 
 
@@ -82,7 +82,7 @@ def _read(model: type[_Model], text: str) -> _Model:
         where = ".".join(str(part) for part in first["loc"]) or "document"
         words = first["msg"].removeprefix("Value error, ")
         raise ValueError(f"{where}: {words} (found {first['input']!r:.50})") from error
-    json.loads(text, object_pairs_hook=_refuse_repeated_keys)  # pydantic takes the last of them
+    json.loads(text, object_pairs_hook=_refuse_repeated_keys)  # pydantic accepts the last value
     return found
 
 

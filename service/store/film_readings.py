@@ -1,29 +1,108 @@
-"""Film readings: one row for each reading, one column for each number."""
+"""Film readings: one row per reading, one column per number."""
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from core.baseline.history import DIRECTIONS, StiffnessHistory
+from core.arrays import FloatArray
+from core.baseline.history import DIRECTIONS, CodeArray, StiffnessHistory
+from core.change.decision import Decision
 from core.change.film_judge import FilmFinding, FilmNews
 from core.change.film_reading import FilmValue
+from core.condition.operating_state import OperatingState
 from core.machine.unit import Estimator
-from service.store.database import Connection
+from service.store.database import Connection, insert, upsert
 from service.store.documents import decision_from_json, to_json
-from service.store.film_port import FilmHistory, FilmQuery, Provenance, StoredDecision
-from service.store.moments import free_moment
-from service.store.port import StoreError
-from service.store.series import series_of
-from service.store.trends import BETWEEN_BOUNDS, IN_STATES, condition_arguments
+from service.store.port import StoreError, ValueRange
+from service.store.series import series_of, unique_time_ns
+from service.store.trends import BETWEEN_BOUNDS, IN_STATES, condition_arguments, storable
+
+
+class Provenance(StrEnum):
+    """Origin of readings: samples of a machine, or a simulation without samples."""
+
+    MEASURED = "measured"
+    SIMULATED = "simulated"
+
+
+@dataclass(frozen=True)
+class FilmQuery:
+    """Query for readings of a film, oldest first.
+
+    Parameters
+    ----------
+    start_ns, end_ns
+        Half-open time range.
+    states
+        Operating states; empty for all.
+    newest
+        Maximum number of readings, the newest being returned; None for all.
+    """
+
+    unit: str
+    bearing: str
+    estimator: Estimator
+    start_ns: int = 0
+    end_ns: int = 2**63 - 1
+    states: tuple[OperatingState, ...] = ()
+    eccentricity_ratio: ValueRange = field(default_factory=ValueRange)
+    oil_temperature_c: ValueRange = field(default_factory=ValueRange)
+    newest: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FilmHistory:
+    """Readings of one film with the findings made when they were judged.
+
+    Parameters
+    ----------
+    state, is_settled, is_simulated : (n,)
+    verdict, level : (2, n)
+        Members of `Verdict`, and of `AlarmLevel` or 0.
+    change, change_std, deviation, deviation_std : (2, n)
+        In ln; NaN if unknown.
+    baseline_version : (n,)
+        0 for none.
+    """
+
+    history: StiffnessHistory
+    state: CodeArray
+    is_settled: npt.NDArray[np.bool_]
+    is_simulated: npt.NDArray[np.bool_]
+    verdict: CodeArray
+    level: CodeArray
+    change: FloatArray
+    change_std: FloatArray
+    deviation: FloatArray
+    deviation_std: FloatArray
+    baseline_version: npt.NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.history)
+
+
+@dataclass(frozen=True)
+class StoredDecision:
+    """State of the decision about one direction, with its estimator and baseline."""
+
+    direction: str
+    estimator: Estimator
+    baseline_version: int | None
+    decision: Decision
+
 
 CONDITION_COLUMNS = (
     *("speed_rpm", "power_mw", "eccentricity_ratio", "u_eccentricity"),
     *("attitude_deg", "oil_temperature_c"),
 )
-VALUE_COLUMNS = ("ln_k", "u_random", "shaft_um_pk", "bearing_um_pk", "evidence", "reason")
+MEASURED_COLUMNS = ("ln_k", "u_random", "shaft_um_pk", "bearing_um_pk")
+CHANGE_COLUMNS = ("change", "change_std", "deviation", "deviation_std")
+VALUE_COLUMNS = (*MEASURED_COLUMNS, "evidence", "reason")
 FINDING_COLUMNS = (
     *("verdict", "level", "change", "change_std", "time_scale_h"),
     *("deviation", "deviation_std", "cause", "cause_reason"),
@@ -34,38 +113,21 @@ COLUMNS = (
     *(f"{name}_{d}" for d in DIRECTIONS for name in (*VALUE_COLUMNS, *FINDING_COLUMNS)),
     "baseline_version",
 )
-INSERT = (
-    f"INSERT INTO film_reading ({', '.join(COLUMNS)})"  # noqa: S608
-    f" VALUES ({', '.join('?' * len(COLUMNS))})"
-    " ON CONFLICT (series, estimator, time_ns) DO NOTHING"
-)
+INSERT = insert("film_reading", COLUMNS) + " ON CONFLICT (series, estimator, time_ns) DO NOTHING"
 MEASURED_THEN = f"""
     SELECT {", ".join(CONDITION_COLUMNS)} FROM film_reading
     WHERE series = ? AND estimator = ? AND time_ns = ?
 """  # noqa: S608
-REMEMBER = """
-    INSERT INTO film_decision VALUES (?, ?, ?, ?, ?)
-    ON CONFLICT (series, direction) DO UPDATE SET
-    estimator = excluded.estimator, baseline_version = excluded.baseline_version,
-    document = excluded.document
-"""
+SET_DECISION = upsert(
+    "film_decision",
+    ("series", "direction", "estimator", "baseline_version", "document"),
+    ("series", "direction"),
+)
 READ_NUMBERS = (
     *("time_ns", "operating_state", "is_settled", *CONDITION_COLUMNS, "baseline_version"),
     *(
         f"{name}_{d}"
-        for name in (
-            "ln_k",
-            "u_random",
-            "shaft_um_pk",
-            "bearing_um_pk",
-            "evidence",
-            "verdict",
-            "level",
-            "change",
-            "change_std",
-            "deviation",
-            "deviation_std",
-        )
+        for name in (*MEASURED_COLUMNS, "evidence", "verdict", "level", *CHANGE_COLUMNS)
         for d in DIRECTIONS
     ),
 )
@@ -86,17 +148,16 @@ def insert_film_news(
     news: Iterable[FilmNews],
     provenance: Provenance = Provenance.MEASURED,
 ) -> None:
-    """Add readings, and note where their decisions stand."""
-    for told in news:
-        reading = told.reading
+    """Add readings, and replace the decisions of their films."""
+    for each in news:
+        reading = each.reading
         series = series_of(writer, reading.unit, reading.bearing)
-        writer.execute(INSERT, _row(writer, series, told, provenance))
+        writer.execute(INSERT, _row(writer, series, each, provenance))
         for direction, finding, decision in zip(
-            DIRECTIONS, told.findings, told.decisions, strict=True
+            DIRECTIONS, each.findings, each.decisions, strict=True
         ):
-            document = to_json(decision)
-            version = finding.baseline_version
-            writer.execute(REMEMBER, (series, direction, reading.estimator, version, document))
+            version, document = finding.baseline_version, to_json(decision)
+            writer.execute(SET_DECISION, (series, direction, reading.estimator, version, document))
 
 
 def _row(
@@ -106,7 +167,7 @@ def _row(
     key = (series, reading.estimator.value)
     measured = tuple(_or_null(getattr(reading, name)) for name in CONDITION_COLUMNS)
     return (
-        *(*key, free_moment(writer, MEASURED_THEN, key, reading.time_ns, measured)),
+        *(*key, unique_time_ns(writer, MEASURED_THEN, key, reading.time_ns, measured)),
         provenance.value,
         *(int(reading.condition.state), int(reading.condition.is_settled)),
         *measured,
@@ -120,8 +181,8 @@ def _row(
 
 
 def _value_cells(value: FilmValue) -> tuple[object, ...]:
-    numbers = (value.ln_k, value.u_random, value.shaft_um_pk, value.bearing_um_pk)
-    return (*(_or_null(number) for number in numbers), int(value.outcome), value.reason.value)
+    numbers = (_or_null(getattr(value, name)) for name in MEASURED_COLUMNS)
+    return (*numbers, int(value.outcome), value.reason.value)
 
 
 def _finding_cells(finding: FilmFinding) -> tuple[object, ...]:
@@ -138,12 +199,12 @@ def _or_null(value: float) -> float | None:
 
 
 def select_decisions(reader: Connection, unit: str, bearing: str) -> list[StoredDecision]:
-    """Where the decisions of a bearing stood last.
+    """Return the last state of the decisions about a bearing.
 
     Raises
     ------
     StoreError
-        If one of them cannot be read.
+        If a document is invalid.
     """
     rows = reader.execute(
         "SELECT direction, estimator, baseline_version, document FROM film_decision"
@@ -153,12 +214,7 @@ def select_decisions(reader: Connection, unit: str, bearing: str) -> list[Stored
     )
     try:
         return [
-            StoredDecision(
-                direction,
-                Estimator(estimator),
-                version,
-                decision_from_json(document),
-            )
+            StoredDecision(direction, Estimator(estimator), version, decision_from_json(document))
             for direction, estimator, version, document in rows
         ]
     except ValueError as error:
@@ -166,11 +222,11 @@ def select_decisions(reader: Connection, unit: str, bearing: str) -> list[Stored
 
 
 def select_film_history(reader: Connection, query: FilmQuery) -> FilmHistory:
-    """Readings of one film, oldest first."""
+    """Return readings of one film, oldest first."""
     rows = reader.execute(SELECT, _arguments(query)).fetchall()[::-1]
     numbers = np.array([row[:-1] for row in rows], dtype=np.float64)
     column = dict(zip(READ_NUMBERS, numbers.reshape(-1, len(READ_NUMBERS)).T, strict=True))
-    time_ns = np.array([row[0] for row in rows], dtype=np.int64)  # not through a float
+    time_ns = np.array([row[0] for row in rows], dtype=np.int64)  # floats are not exact
     return _history(time_ns, column, np.array([row[-1] == Provenance.SIMULATED for row in rows]))
 
 
@@ -179,8 +235,8 @@ def _arguments(query: FilmQuery) -> dict[str, Any]:
         "unit": query.unit,
         "bearing": query.bearing,
         "estimator": query.estimator.value,
-        "start_ns": max(0, min(query.start_ns, 2**63 - 1)),
-        "end_ns": max(0, min(query.end_ns, 2**63 - 1)),
+        "start_ns": storable(query.start_ns),
+        "end_ns": storable(query.end_ns),
         **condition_arguments(query.states, query.eccentricity_ratio, query.oil_temperature_c),
         "newest": 2**63 - 1 if query.newest is None else query.newest,
     }
@@ -201,10 +257,7 @@ def _history(
         history=StiffnessHistory(
             time_ns=time_ns,
             **{name: column[name] for name in CONDITION_COLUMNS},
-            ln_k=pair("ln_k"),
-            u_random=pair("u_random"),
-            shaft_um_pk=pair("shaft_um_pk"),
-            bearing_um_pk=pair("bearing_um_pk"),
+            **{name: pair(name) for name in MEASURED_COLUMNS},
             outcome=codes(pair("evidence")),
         ),
         state=codes(column["operating_state"]),
@@ -212,9 +265,6 @@ def _history(
         is_simulated=is_simulated.astype(np.bool_),
         verdict=codes(pair("verdict")),
         level=codes(pair("level")),
-        change=pair("change"),
-        change_std=pair("change_std"),
-        deviation=pair("deviation"),
-        deviation_std=pair("deviation_std"),
+        **{name: pair(name) for name in CHANGE_COLUMNS},
         baseline_version=np.nan_to_num(column["baseline_version"]).astype(np.int64),
     )

@@ -1,59 +1,55 @@
-"""Film readings, decisions and baselines in the database."""
+"""Films in the database: readings, decisions, baselines and a simulated past."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from core.arrays import FloatArray
-from core.baseline.baseline import BearingBaseline
+from core.baseline.history import DIRECTIONS, ReadingOutcome
 from core.change.film_judge import FilmNews
-from core.change.shaft_response import ShaftResponse
 from core.machine.unit import Estimator
-from service.store.audit_chain import AuditChain
-from service.store.audit_deeds import step_deeds
-from service.store.baselines import (
-    are_kept,
-    insert_baseline,
-    insert_steps,
-    is_kept,
-    select_baseline,
-    select_baselines,
-    select_responses,
-    select_steps,
-    set_response,
-)
-from service.store.database import Connect, Connection
-from service.store.film_port import (
-    BaselineEntry,
+from core.quality import GOOD, Reason, bad
+from core.spectra.speed import SpeedSource
+from service.store.baselines import BaselineTables
+from service.store.film_readings import (
+    CHANGE_COLUMNS,
+    COLUMNS,
+    CONDITION_COLUMNS,
+    INSERT,
+    MEASURED_COLUMNS,
     FilmHistory,
     FilmQuery,
     Provenance,
     StoredDecision,
-    StoredStep,
+    insert_film_news,
+    select_decisions,
+    select_film_history,
 )
-from service.store.film_readings import insert_film_news, select_decisions, select_film_history
-from service.store.series import Layout, remember_layout, series_of
-from service.store.simulated_past import insert_past, select_past_end
+from service.store.series import LEVEL_SHIFT, Layout, remember_layout, series_of
+
+INSERT_RESULT = """
+    INSERT INTO assessment VALUES (?,?,0,0,0,0,1.0,?,?,?,?,?,?,?,?,?,?)
+    ON CONFLICT (series, time_ns) DO NOTHING
+"""
+MARK_PAST = """
+    INSERT INTO simulated_past VALUES (:series, :start_ns, :end_ns)
+    ON CONFLICT (series) DO UPDATE SET
+    start_ns = CASE WHEN excluded.start_ns < simulated_past.start_ns
+        THEN excluded.start_ns ELSE simulated_past.start_ns END,
+    end_ns = CASE WHEN excluded.end_ns > simulated_past.end_ns
+        THEN excluded.end_ns ELSE simulated_past.end_ns END
+"""
+REASONS = {
+    ReadingOutcome.MEASURED: Reason.OK.value,
+    ReadingOutcome.INSUFFICIENT_EXCITATION: Reason.INSUFFICIENT_EXCITATION.value,
+    ReadingOutcome.BAD_QUALITY: Reason.NOT_MEASURED.value,
+}
 
 
-class SqlFilms:
-    """The film tables of one database.
-
-    Parameters
-    ----------
-    writing
-        Opens a transaction that is durable when left.
-    reading
-        Opens a connection that only reads.
-    audit
-        Takes what is done to baselines.
-    """
-
-    def __init__(
-        self,
-        writing: Connect,
-        reading: Connect,
-        audit: AuditChain,
-    ) -> None:
-        self._writing, self._reading, self._audit = writing, reading, audit
+class FilmStore(BaselineTables):
+    """Readings, decisions and baselines of films; a change is on the disk on return."""
 
     def add_simulated(self, readings: Iterable[FilmNews]) -> None:
         """Write readings of a simulation, marked as such."""
@@ -68,24 +64,40 @@ class SqlFilms:
         films: FilmHistory,
         values: Mapping[str, FloatArray],
     ) -> None:
-        """Write a bearing's simulated past: readings of its film, and results for its trends."""
+        """Write a bearing's simulated past: readings of its film, and results for its trends.
+
+        Parameters
+        ----------
+        values
+            Trends by column of the store's layout; (n,) each, NaN where there is no number.
+        """
+        time_ns = films.history.time_ns
         with self._writing() as writer:
             layout = remember_layout(writer, Layout.of(tuple(values)))
             series = series_of(writer, unit, bearing)
-            insert_past(writer, series, layout, estimator, films, values)
+            writer.executemany(INSERT, _film_rows(series, estimator, films))
+            rows = _result_rows(series, layout, estimator, films, values)
+            writer.executemany(INSERT_RESULT, rows)
+            span = {"series": series, "start_ns": int(time_ns[0]), "end_ns": int(time_ns[-1])}
+            writer.execute(MARK_PAST, span)
 
     def past_end_ns(self, unit: str, bearing: str) -> int | None:
-        """Until when a bearing's past is simulated; None if none of it is."""
+        """Return the end of a bearing's simulated past; None if it has none."""
         with self._reading() as reader:
-            return select_past_end(reader, unit, bearing)
+            row = reader.execute(
+                "SELECT end_ns FROM simulated_past JOIN series ON series.id = simulated_past.series"
+                " WHERE unit = ? AND bearing = ?",
+                (unit, bearing),
+            ).fetchone()
+        return None if row is None else int(row[0])
 
     def history(self, query: FilmQuery) -> FilmHistory:
-        """Read readings of one film, oldest first."""
+        """Return readings of one film, oldest first."""
         with self._reading() as reader:
             return select_film_history(reader, query)
 
     def first_ns(self, unit: str, bearing: str, estimator: Estimator) -> int | None:
-        """Time of the first reading of a film."""
+        """Return the time of the first reading of a film; None if it has none."""
         with self._reading() as reader:
             found = reader.execute(
                 "SELECT min(time_ns) FROM film_reading WHERE estimator = ? AND series ="
@@ -95,56 +107,81 @@ class SqlFilms:
         return None if found[0] is None else int(found[0])
 
     def decisions(self, unit: str, bearing: str) -> list[StoredDecision]:
-        """Where the decisions of a bearing stood last."""
+        """Return the last state of the decisions about a bearing."""
         with self._reading() as reader:
             return select_decisions(reader, unit, bearing)
 
-    def add_baseline(self, baseline: BearingBaseline, steps: Sequence[StoredStep]) -> None:
-        """Write a learned baseline with what is done with it at once; called again, it is nothing.
 
-        That is for a call whose end nobody could tell.
-        """
-        with self._writing() as writer:
-            if is_kept(writer, baseline) and are_kept(writer, steps):
-                return
-            insert_baseline(writer, baseline)
-            self._add_steps(writer, steps)
+def _film_rows(series: int, estimator: Estimator, films: FilmHistory) -> list[tuple[object, ...]]:
+    n = len(films)
+    columns: dict[str, list[object]] = {
+        "series": [series] * n,
+        "estimator": [estimator.value] * n,
+        "time_ns": films.history.time_ns.tolist(),
+        "provenance": [Provenance.SIMULATED.value] * n,
+        "operating_state": films.state.tolist(),
+        "is_settled": films.is_settled.astype(int).tolist(),
+        "baseline_version": _nullable(films.baseline_version, films.baseline_version > 0),
+    }
+    for name in CONDITION_COLUMNS:
+        columns[name] = _numbers(getattr(films.history, name))
+    for row, d in enumerate(DIRECTIONS):
+        outcome = films.history.outcome[row]
+        for name in MEASURED_COLUMNS:
+            columns[f"{name}_{d}"] = _numbers(getattr(films.history, name)[row])
+        for name in CHANGE_COLUMNS:
+            columns[f"{name}_{d}"] = _numbers(getattr(films, name)[row])
+        columns[f"evidence_{d}"] = outcome.tolist()
+        columns[f"verdict_{d}"] = films.verdict[row].tolist()
+        columns[f"level_{d}"] = _nullable(films.level[row], films.level[row] > 0)
+        columns[f"reason_{d}"] = [REASONS[code] for code in outcome.tolist()]
+    nothing: list[object] = [None] * n
+    return list(zip(*(columns.get(name, nothing) for name in COLUMNS), strict=True))
 
-    def baselines(self, unit: str, bearing: str) -> list[BaselineEntry]:
-        """Every baseline that was ever learned of a bearing, newest first."""
-        with self._reading() as reader:
-            return select_baselines(reader, unit, bearing)
 
-    def baseline(self, unit: str, bearing: str, version: int) -> BearingBaseline | None:
-        """Read one baseline whole."""
-        with self._reading() as reader:
-            return select_baseline(reader, unit, bearing, version)
+def _result_rows(
+    series: int,
+    layout: int,
+    estimator: Estimator,
+    films: FilmHistory,
+    values: Mapping[str, FloatArray],
+) -> list[tuple[object, ...]]:
+    numbers = np.stack(list(values.values()), axis=1).astype("<f8")
+    reasons = [reason.value for reason in Reason]
+    good, missing = (
+        quality.level << LEVEL_SHIFT | reasons.index(quality.reason.value)
+        for quality in (GOOD, bad(Reason.NOT_MEASURED))
+    )
+    qualities = np.where(np.isfinite(numbers), good, missing).astype(np.uint8)
+    history = films.history
+    columns = (
+        history.time_ns.tolist(),
+        _numbers(history.eccentricity_ratio),
+        _numbers(history.oil_temperature_c),
+        films.state.tolist(),
+        films.is_settled.astype(int).tolist(),
+    )
+    source, name = SpeedSource.SLOW_CHANNEL.value, estimator.value
+    return [
+        (
+            *(series, time_ns, source, e, oil, layout),
+            *(row.tobytes(), quality.tobytes(), name, name, *condition),
+        )
+        for time_ns, e, oil, *condition, row, quality in zip(
+            *columns, numbers, qualities, strict=True
+        )
+    ]
 
-    def add_steps(self, steps: Sequence[StoredStep]) -> None:
-        """Write what was done to baselines; called again, it is nothing."""
-        with self._writing() as writer:
-            if are_kept(writer, steps):
-                return
-            self._add_steps(writer, steps)
 
-    def _add_steps(self, writer: Connection, steps: Sequence[StoredStep]) -> None:
-        self._audit.add(writer, step_deeds(writer, steps))
-        insert_steps(writer, steps)
+def _numbers(column: npt.NDArray[Any]) -> list[object]:
+    return _nullable(column, np.isfinite(column))
 
-    def steps(self, unit: str, bearing: str) -> list[StoredStep]:
-        """What was done to the baselines of a bearing, oldest first."""
-        with self._reading() as reader:
-            return select_steps(reader, unit, bearing)
 
-    def set_response(self, unit: str, response: ShaftResponse, now_ns: int) -> None:
-        """Write how a unit's shaft answers to its films."""
-        with self._writing() as writer:
-            set_response(writer, unit, response, now_ns)
-
-    def responses(self) -> dict[str, ShaftResponse]:
-        """How shafts answer, by unit."""
-        with self._reading() as reader:
-            return select_responses(reader)
+def _nullable(column: npt.NDArray[Any], is_known: npt.NDArray[np.bool_]) -> list[object]:
+    return [
+        value if known else None
+        for value, known in zip(column.tolist(), is_known.tolist(), strict=True)
+    ]
 
 
 DIRECTION_COLUMNS = """
@@ -164,7 +201,7 @@ DIRECTION_COLUMNS = """
     cause_{d} TEXT,
     cause_reason_{d} TEXT,
 """
-"""Of a reading in one direction, as this schema has them; never edited once released."""
+"""Columns of a reading in one direction in this version of the schema."""
 
 FILM_TABLES = f"""
     ALTER TABLE assessment ADD COLUMN operating_state INTEGER;
@@ -236,8 +273,8 @@ FILM_TABLES = f"""
     CREATE TRIGGER baseline_kept BEFORE DELETE ON baseline
     BEGIN SELECT RAISE(ABORT, 'baselines are kept'); END;
     CREATE TRIGGER baseline_step_kept_as_told BEFORE UPDATE ON baseline_step
-    BEGIN SELECT RAISE(ABORT, 'what was done to baselines is kept as it was told'); END;
+    BEGIN SELECT RAISE(ABORT, 'steps of baselines are kept as they were written'); END;
     CREATE TRIGGER baseline_step_kept BEFORE DELETE ON baseline_step
-    BEGIN SELECT RAISE(ABORT, 'what was done to baselines is kept'); END;
+    BEGIN SELECT RAISE(ABORT, 'steps of baselines are kept'); END;
 """
-"""Statements of the migration that brings them."""
+"""Migration that creates the tables."""

@@ -1,4 +1,4 @@
-"""One process for each database, on a file system that can lock."""
+"""Conditions of a data folder: local file system, permissions, and one service per database."""
 
 import fcntl
 import os
@@ -24,11 +24,11 @@ OVER_A_NETWORK = frozenset(
         *("fuse.s3fs", "fuse.sshfs", "fuse.vmhgfs-fuse"),
     )
 )
-"""Their locks and shared memory are not those of one machine: two may write at once, and a
-commit that was answered may still be on its way."""
+"""Network file systems: their locks and shared memory do not exclude other machines, and an
+acknowledged write may not be on a disk."""
 
-_MEMORY = "is memory: all results are gone when the machine restarts"
-_CONTAINER = "belongs to a container: results are gone when that is made anew; mount a volume"
+_MEMORY = "is in memory: all results are lost when the machine restarts"
+_CONTAINER = "belongs to a container: results are lost when it is replaced; mount a volume"
 _NO_JOURNAL = "has no journal: a power cut may take the whole folder with it"
 FORGETFUL = {
     "tmpfs": _MEMORY,
@@ -37,24 +37,24 @@ FORGETFUL = {
     "aufs": _CONTAINER,
     "vfat": _NO_JOURNAL,
     "exfat": _NO_JOURNAL,
-    "virtiofs": "belongs to another machine's disk: whether that keeps what it acknowledges, its"
-    " settings say",
+    "virtiofs": "is on another machine: it depends on that machine's settings whether acknowledged"
+    " writes are kept",
 }
-FUSE = "is served by a program: whether that keeps what it acknowledges is not known"
+FUSE = "is served by a program that may not keep acknowledged writes"
 
 
 @dataclass(frozen=True)
 class FileSystem:
-    """What a folder is on.
+    """File system of a folder.
 
     Parameters
     ----------
     kind
-        As the kernel calls it; empty where that is not known.
+        Name used by the kernel; empty if unknown.
     is_remote
-        Whether results must not be kept there.
+        Whether results must not be stored there.
     warning
-        What may happen to results there; empty if they are safe.
+        Possible loss of results there; empty if they are safe.
     """
 
     kind: str
@@ -70,22 +70,23 @@ def _mounts() -> str:
 
 
 def file_system_of(folder: Path, mounts: Callable[[], str] = _mounts) -> FileSystem:
-    """The file system that a folder is on, or will be once it is made.
+    """Return the file system of a folder, which need not exist yet.
 
     Parameters
     ----------
     mounts
-        Gives the lines of the kernel's table of mounts.
+        Returns the kernel's table of mounts.
     """
     place, found = folder.resolve(), ""
     depth = -1
+    # of equal mount points the later one hides the earlier one
     for line in mounts().splitlines():
         before, _, after = line.partition(" - ")
         fields, kinds = before.split(" "), after.split(" ")
         if len(fields) < 5 or not kinds[0]:
             continue
         point = Path(_unescaped(fields[4]))
-        if place.is_relative_to(point) and len(point.parts) >= depth:  # a later one lies over it
+        if place.is_relative_to(point) and len(point.parts) >= depth:
             depth, found = len(point.parts), kinds[0]
     return _judged(found)
 
@@ -105,27 +106,27 @@ def _unescaped(text: str) -> str:
 
 
 BESIDE = ("-wal", "-shm", ".lock")
-"""Ends of the names of files that are kept beside the database."""
+"""Suffixes of the files beside the database."""
 
 
 def why_unusable(path: Path) -> str | None:
-    """Why a database cannot be kept there; None if nothing is known against it.
+    """Return why a database cannot be stored at a path; None if no obstacle is found.
 
-    A folder that is not there is made. An empty file is a new database: whether there was another
-    one, the high-water mark beside it says.
+    A missing folder is created. An empty file is a new database; the high-water mark beside it
+    shows whether it replaces another one.
     """
     folder = path.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)
         is_directory, is_other = path.is_dir(), path.exists() and not path.is_file()
     except (FileExistsError, NotADirectoryError):
-        return f"{folder} cannot be a folder, for a file is in its place: move it away"
+        return f"{folder} cannot be created because a file is in its place: move it away"
     except PermissionError:
-        return f"{_user()} may not look into or make the folder {folder}: {_give(folder)}"
+        return f"{_user()} may not read or create the folder {folder}: {_give(folder)}"
     if is_directory:
-        return f"{path} is a folder: move it away, the database is to be a file of that name"
+        return f"{path} is a folder: move it away, the database is a file of that name"
     if is_other:
-        return f"{path} is no plain file: move it away"
+        return f"{path} is not a regular file: move it away"
     return _why_protected(path)
 
 
@@ -134,7 +135,7 @@ def _why_protected(path: Path) -> str | None:
     if os.statvfs(folder).f_flag & os.ST_RDONLY:
         return f"{folder} is on a file system that is mounted read-only: mount it for writing"
     if not _may(folder, os.W_OK | os.X_OK):
-        return f"{_user()} may not make files in {folder}: {_give(folder)}"
+        return f"{_user()} may not create files in {folder}: {_give(folder)}"
     for file in (path, *(path.with_name(path.name + end) for end in BESIDE)):
         if file.exists() and not _may(file, os.R_OK | os.W_OK):
             return f"{_user()} may not read and write {file}: {_give(file)}"
@@ -146,7 +147,7 @@ def _may(path: Path, what: int) -> bool:
 
 
 def _give(path: Path) -> str:
-    return f"give it to that user (chown) and let it be written to (chmod u+rwX {path})"
+    return f"change its owner to that user (chown) and permit writing (chmod u+rwX {path})"
 
 
 def _user() -> str:
@@ -164,31 +165,33 @@ _PID_BYTES = 20
 
 
 class AlreadyRunningError(StoreError):
-    """Another service works with the database; the message says which process it is."""
+    """Another service uses the database; the message names its process."""
 
 
 def lock_path(database: Path) -> Path:
-    """The file whose lock a service holds while it works with a database."""
+    """Return the path of the file that a service locks while it uses a database."""
     return database.with_name(database.name + SUFFIX)
 
 
 @contextmanager
-def exclusive_use(database: Path, look: Callable[[Path], FileSystem] = file_system_of) -> Iterator[None]:
-    """Be the only service that works with a database.
+def exclusive_use(
+    database: Path, look: Callable[[Path], FileSystem] = file_system_of
+) -> Iterator[None]:
+    """Exclude other services from a database.
 
-    The lock ends with the process, however that ends; the file stays and means nothing by itself.
+    The lock ends with the process; the file stays and has no meaning of its own.
 
     Parameters
     ----------
     look
-        Says what a folder is on.
+        Returns the file system of a folder.
 
     Raises
     ------
     AlreadyRunningError
-        If another process is.
+        If another process uses the database.
     StoreError
-        If the folder cannot be written to, or is on a network file system.
+        If the folder is not writable, or is on a network file system.
     """
     path = lock_path(database)
     _require_local(database.parent, look(database.parent))
@@ -205,24 +208,31 @@ def exclusive_use(database: Path, look: Callable[[Path], FileSystem] = file_syst
 
 
 def _require_local(folder: Path, found: FileSystem) -> None:
-    """Refuse a folder whose locks and syncs are those of another machine."""
+    """Refuse a folder on a network file system; warn of one that may lose results."""
     if found.is_remote:
         raise StoreError(
             f"{folder} is on a network file system ({found.kind}), where two services may write at"
-            " once and what is acknowledged may be lost: choose a data folder on a local disk"
+            " once and acknowledged writes may be lost: choose a data folder on a local disk"
         )
     if found.warning:
-        log.warning("the data folder may forget", folder=str(folder), why=found.warning)
+        log.warning("the data folder may lose results", folder=str(folder), why=found.warning)
 
 
 def _take(descriptor: int, database: Path) -> None:
+    if (holder := take_lock(descriptor)) is not None:
+        raise AlreadyRunningError(
+            f"another padwatch (process {holder}) uses {database}:"
+            " stop it, or choose another data folder"
+        )
+
+
+def take_lock(descriptor: int) -> str | None:
+    """Lock a file and write the process number to it; return that of another holder, if any."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         holder = os.pread(descriptor, _PID_BYTES, 0).decode("ascii", "replace").strip()
-        raise AlreadyRunningError(
-            f"another padwatch (process {holder or 'unknown'}) works with {database}:"
-            " stop it, or choose another data folder"
-        ) from None
+        return holder or "unknown"
     os.ftruncate(descriptor, 0)
     os.pwrite(descriptor, f"{os.getpid()}\n".encode(), 0)
+    return None

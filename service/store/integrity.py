@@ -1,86 +1,79 @@
-"""A store in a file, and how it knows that it is the newest."""
+"""Integrity of a database: whether it is the newest copy, and which of its rows are damaged."""
 
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
 
 from service.store.access.audit_entries import AuditAction
-from service.store.audit_chain import AuditChain
-from service.store.database import Connection
-from service.store.highwater.commits import CommitMarks
-from service.store.highwater.comparison import MarkFinding
+from service.store.audit import AuditChain
+from service.store.highwater.commits import CommitMarks, MarkFinding
 from service.store.seals import DamageLog, Place
 
 
-class Marked:
-    """A store with a high-water mark beside it.
+class Integrity:
+    """Integrity of a database. That of a server checks itself and has no findings here.
 
     Parameters
     ----------
-    marks
-        Of its database.
-    writing
-        Opens a transaction.
     chain
-        Is told.
+        Audit trail.
+    marks
+        High-water mark beside a database file.
     damage
-        Of its rows.
+        Damaged rows found since the start.
     check_some
-        Looks at some more of them; whether that was once around.
+        Check some further rows; return True when all rows have been checked once.
     require_file
-        Raises `StoreError` if the database's file was removed or replaced since it was opened.
+        Raise `StoreError` if the database file was removed or replaced since it was opened.
     """
 
     def __init__(
         self,
-        marks: CommitMarks,
-        writing: Callable[[], AbstractContextManager[Connection]],
         chain: AuditChain,
-        damage: DamageLog,
-        check_some: Callable[[], bool],
-        require_file: Callable[[], None],
+        marks: CommitMarks | None = None,
+        damage: DamageLog | None = None,
+        check_some: Callable[[], bool] = lambda: True,
+        require_file: Callable[[], None] = lambda: None,
     ) -> None:
-        self.require_file = require_file
-        self._marks, self._writing, self._chain = marks, writing, chain
-        self._damage, self.check_some = damage, check_some
+        self._chain, self._marks, self._damage = chain, marks, damage or DamageLog()
+        self.check_some, self.require_file = check_some, require_file
 
     @property
     def found(self) -> Sequence[MarkFinding]:
-        """What was wrong with the database when it was opened, until it is adopted."""
-        return self._marks.found
+        """Differences from the high-water mark at opening, until `adopt` accepts them."""
+        return () if self._marks is None else self._marks.found
 
     @property
     def mark_error(self) -> str | None:
-        """Why the high-water mark could not be written last; None if it could."""
-        return self._marks.error
+        """Error of the last attempt to write the high-water mark; None if it succeeded."""
+        return None if self._marks is None else self._marks.error
 
     @property
     def n_damaged(self) -> int:
-        """Rows that were found damaged since the start, and are left out of what is read."""
+        """Number of damaged rows found since the start, which queries leave out."""
         return self._damage.n_damaged
 
     @property
     def damaged(self) -> Sequence[Place]:
-        """Where they are, as far as places are remembered."""
+        """Damaged rows found since the start, as far as they are listed."""
         return self._damage.places
 
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:
-        """Go on with the database as it is, and tell the audit trail; what was wrong with it.
+        """Accept the database as the newest, record that in the audit trail, return `found`.
 
         Raises
         ------
         StoreError
-            If the database cannot be written; then it will be found again.
+            If the database cannot be written.
         """
-        found = self._marks.found
-        if found:
-            with self._writing() as writer:
+        found = self.found
+        if found and self._marks is not None:
+            with self._chain.writing() as writer:
                 self._marks.adopt(writer)
-                self._chain.add(writer, [_deed(finding, now_ns) for finding in found])
+                self._chain.add(writer, [_action(finding, now_ns) for finding in found])
             self._marks.adopted()
         return found
 
 
-def _deed(finding: MarkFinding, now_ns: int) -> AuditAction:
+def _action(finding: MarkFinding, now_ns: int) -> AuditAction:
     return AuditAction(
         time_ns=now_ns,
         actor="padwatch",

@@ -1,47 +1,46 @@
-"""Loops of the store: roll-ups, retention, and looking all stored rows through."""
+"""Background loops of the store: roll-ups, retention, and checks of all rows."""
 
 import asyncio
 
 from acquisition.clock import Clock
 from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.periodic import LOOK_S, TroubleLog, rest, rest_after
-from service.store.integrity_port import Integrity
+from service.store.integrity import Integrity
 from service.store.port import StoreError
-from service.store.retention.limits import RetentionLimits
-from service.store.retention.port import RetentionStore
-from service.store.rollups.port import RollupStore
+from service.store.retention import Ages, RetentionStore
+from service.store.rollups.gathering import RollupStore
 
 RETENTION_PERIOD_S = 600.0
-"""Between looks, when nothing is old any more."""
+"""Pause when no data are due for deletion."""
 
 RETENTION_REST_SHARE = 9.0
-"""How much longer to rest than to work: it takes a tenth of one core, and lets others write."""
+"""Ratio of pause to work: the loop takes a tenth of one core, and others can write."""
 
 
 class RetentionLoop:
-    """Deletes what is old, a little of each bearing in turn, in a thread and with rests between.
+    """Loop that deletes old data, some of each bearing in turn, with pauses.
 
-    Ages are counted from a moment that a day of results lies behind: a clock that is set years
-    ahead makes nothing old before it was believed for a day, though results are stamped by it.
+    Ages are counted from the newest time with a day of results up to it, so that a clock that is
+    set years ahead deletes nothing within a day.
     """
 
-    def __init__(self, store: RetentionStore, limits: RetentionLimits, clock: Clock) -> None:
+    def __init__(self, store: RetentionStore, limits: Ages, clock: Clock) -> None:
         self._store, self._limits, self._clock = store, limits, clock
         self._trouble = TroubleLog(
-            "what is old is not being deleted", "what is old is being deleted again"
+            "old data are not being deleted", "old data are being deleted again"
         )
-        self._held_up = TroubleLog(
-            "some of what is old cannot be deleted", "all of what is old can be deleted again"
+        self._blocked = TroubleLog(
+            "some old data cannot be deleted", "all old data can be deleted again"
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Delete for ever."""
+        """Run forever."""
         while True:
             if not await self.round(pulse):
                 await rest(RETENTION_PERIOD_S, self._clock, pulse)
 
     async def round(self, pulse: Pulse = UNHEARD) -> bool:
-        """Delete once of each bearing; whether there was anything to delete."""
+        """Delete once from each bearing; return whether any data were due."""
         found = False
         try:
             believed_ns = await asyncio.to_thread(self._store.believed_ns)
@@ -57,7 +56,7 @@ class RetentionLoop:
             self._trouble.note(str(error))
             return False
         self._trouble.note(None)
-        self._held_up.note(self._store.trouble)
+        self._blocked.note(self._store.trouble)
         return found
 
     async def _rested(self, series: int, now_ns: int, pulse: Pulse) -> bool:
@@ -69,30 +68,30 @@ class RetentionLoop:
 
 
 ROLLUP_PERIOD_S = 20.0
-"""Between looks, when all is gathered."""
+"""Pause when no readings are due."""
 
 ROLLUP_REST_SHARE = 3.0
-"""How much longer to rest than to work: gathering an old database takes a quarter of one core."""
+"""Ratio of pause to work: aggregating an old database takes a quarter of one core."""
 
 
 class RollupLoop:
-    """Gathers what is due, one bearing after the other, in a thread and with rests in between."""
+    """Loop that aggregates readings into roll-ups, one bearing after the other, with pauses."""
 
     def __init__(self, rollups: RollupStore, clock: Clock) -> None:
         self._rollups, self._clock = rollups, clock
         self._trouble = TroubleLog(
-            "trends are not being gathered", "trends are being gathered again"
+            "trends are not being aggregated", "trends are being aggregated again"
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Gather for ever."""
+        """Run forever."""
         while True:
             pulse.beat(ROLLUP_PERIOD_S)
             if not await self._round(pulse):
                 await self._clock.sleep(ROLLUP_PERIOD_S)
 
     async def _round(self, pulse: Pulse) -> bool:
-        """Gather once for each bearing that is due; returns whether there was any."""
+        """Aggregate once for each bearing that is due; return whether there was any."""
         now_ns = self._clock.now_ns()
         try:
             due = await asyncio.to_thread(self._rollups.due, now_ns)
@@ -110,15 +109,15 @@ class RollupLoop:
 
 
 SCRUB_REST_SHARE = 49.0
-"""How much longer to rest than to look: it takes a fiftieth of one core."""
+"""Ratio of pause to work: the loop takes a fiftieth of one core."""
 
-LEAST_REST_S = 0.2
+MIN_REST_S = 0.2
 SCRUB_PERIOD_S = 86_400.0
-"""From once around to the next."""
+"""Pause after all rows have been checked."""
 
 
 class ScrubLoop:
-    """Looks for damage, a little at a time, in a thread and with rests in between."""
+    """Loop that searches for damaged rows, a few at a time, with pauses."""
 
     def __init__(self, integrity: Integrity, clock: Clock) -> None:
         self._integrity, self._clock = integrity, clock
@@ -127,14 +126,14 @@ class ScrubLoop:
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Look for ever."""
+        """Run forever."""
         while True:
             pulse.beat(LOOK_S)
             if await self.look(pulse):
                 await rest(SCRUB_PERIOD_S, self._clock, pulse)
 
     async def look(self, pulse: Pulse = UNHEARD) -> bool:
-        """Look at some rows and rest; whether that was once around."""
+        """Check some rows and pause; return whether all rows have been checked once."""
         begun_s = self._clock.monotonic_s()
         try:
             is_around = await asyncio.to_thread(self._integrity.check_some)
@@ -145,7 +144,7 @@ class ScrubLoop:
         self._trouble.note(None)
         taken_s = self._clock.monotonic_s() - begun_s
         await rest_after(
-            max(LEAST_REST_S / SCRUB_REST_SHARE, taken_s),
+            max(MIN_REST_S / SCRUB_REST_SHARE, taken_s),
             SCRUB_REST_SHARE,
             self._clock,
             pulse,

@@ -1,16 +1,16 @@
-"""Letters queued in the transaction of what they report."""
+"""Messages to receivers, queued in the transaction that stores the reported event."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any
 
 from core.alarms.alarm import Alarm, AlarmEvent
-from service.store.database import Connect, Connection
+from service.store.database import Connection, Tables
 
 
 class MessageState(StrEnum):
-    """What has become of a letter; all but the first are for ever."""
+    """State of a message; all but `WAITING` are final."""
 
     WAITING = "waiting"
     DELIVERED = "delivered"
@@ -19,27 +19,27 @@ class MessageState(StrEnum):
 
 
 DEAD = (MessageState.REFUSED, MessageState.EXPIRED)
-"""Letters that will never be delivered."""
+"""States of messages that are never delivered."""
 
 
 @dataclass(frozen=True)
 class OutboxMessage:
-    """An event of an alarm, to be told to one receiver.
+    """Message about an event of an alarm to one receiver.
 
     Parameters
     ----------
     event_id
-        The same for all receivers and all attempts.
+        Identifier of the event, the same for all receivers and attempts.
     body
-        The message as JSON.
+        Message as JSON.
     queued_ns
-        When it was written, by the host's clock.
+        Host time of queueing.
     is_urgent
-        Whether it ends quiet hours.
+        Whether the message ends quiet hours.
     is_active
-        Whether the receiver takes the alarm for active once it has been told.
+        Whether the receiver regards the alarm as active after the message.
     closes
-        Whether it is only for a receiver that takes the alarm for active.
+        Whether the message is only for a receiver that regards the alarm as active.
     """
 
     receiver: str
@@ -52,28 +52,28 @@ class OutboxMessage:
 
 
 Address = Callable[[Alarm, AlarmEvent], Iterable[OutboxMessage]]
-"""Who is to be told of an event of an alarm."""
+"""Function that returns the messages about an event of an alarm."""
 
 
 def no_recipients(alarm: Alarm, event: AlarmEvent) -> Iterable[OutboxMessage]:  # noqa: ARG001
-    """Queue no letters."""
+    """Return no messages."""
     return ()
 
 
 @dataclass(frozen=True)
 class StoredMessage:
-    """A letter in the outbox.
+    """Message in the outbox.
 
     Parameters
     ----------
     id
-        Higher than that of all letters that were queued before it.
+        Number of the message, in the order of queueing.
     n_attempts
-        How often it was tried in vain.
+        Number of failed attempts.
     answer
-        What came of the newest attempt, in words.
+        Result of the last attempt.
     done_ns
-        When it was delivered or given up; None while it waits.
+        Time of delivery or of giving up; None while the message waits.
     """
 
     id: int
@@ -90,18 +90,18 @@ class StoredMessage:
 
 @dataclass(frozen=True)
 class Backlog:
-    """What an outbox holds for one receiver.
+    """Messages of one receiver.
 
     Parameters
     ----------
     oldest_ns
-        Since when the first of those that wait does; None if none does.
+        Queueing time of the oldest waiting message; None if no message waits.
     n_dead
-        How many were refused or given up, ever.
+        Total number of refused and expired messages.
     last_dead
-        The newest of these.
+        Newest refused or expired message.
     delivered_ns
-        When one was delivered last.
+        Time of the last delivery.
     """
 
     receiver: str
@@ -112,40 +112,8 @@ class Backlog:
     delivered_ns: int | None
 
 
-class Outbox(Protocol):
-    """Durable letters; each method that changes something is on the disk when it returns."""
-
-    def waiting(self, receiver: str, limit: int) -> Sequence[StoredMessage]:
-        """Read the first of what waits for a receiver, in order."""
-        ...
-
-    def urgent(self, receiver: str) -> bool:
-        """Whether anything that waits for a receiver ends quiet hours."""
-        ...
-
-    def finish(self, letter: int, state: MessageState, answer: str, now_ns: int) -> None:
-        """Note that a letter was delivered or refused."""
-        ...
-
-    def fail(self, letter: int, answer: str) -> None:
-        """Note an attempt in vain; the letter goes on waiting."""
-        ...
-
-    def expire(self, receiver: str, before_ns: int, answer: str, now_ns: int) -> int:
-        """Give up what has waited since before a time, and happened before it; return how many."""
-        ...
-
-    def revive(self, receiver: str, now_ns: int) -> int:
-        """Let what was refused or given up wait again, in its old place; return how many."""
-        ...
-
-    def backlogs(self) -> Sequence[Backlog]:
-        """Look at everyone for whom there ever was a letter."""
-        ...
-
-
 MAX_ANSWER = 500
-"""Characters of what a receiver has said that are kept."""
+"""Maximum length of a stored answer."""
 
 INSERT = """
     INSERT INTO outbox
@@ -156,7 +124,7 @@ INSERT = """
         ORDER BY number DESC LIMIT 1
     ) = 1
 """
-"""What was told last says whether a receiver takes an alarm for active."""
+"""A closing message is queued only if the previous one left the alarm active."""
 
 COLUMNS = "id, receiver, event_id, body, queued_ns, is_urgent, state, n_attempts, answer, done_ns"
 SELECT_WAITING = f"""
@@ -182,7 +150,7 @@ EXPIRE = """
         AND alarm_event.number = outbox.number AND alarm_event.time_ns >= ?
     )
 """
-"""What happened lately is not too old, even if it was queued in 1970 by a clock not yet set."""
+"""A recent event does not expire, even if a clock that was not yet set queued it in 1970."""
 
 REVIVE = """
     UPDATE outbox SET state = 'waiting', done_ns = NULL, queued_ns = ?
@@ -193,59 +161,51 @@ COUNT = """
 """
 
 
-def insert_messages(writer: Connection, event: AlarmEvent, letters: Iterable[OutboxMessage]) -> None:
-    """Queue what tells of an event that has just been stored for the first time."""
+def insert_messages(
+    writer: Connection, event: AlarmEvent, messages: Iterable[OutboxMessage]
+) -> None:
+    """Queue the messages about an event that has just been stored for the first time."""
     of = {"alarm": event.identity.id, "number": event.number}
-    writer.executemany(INSERT, [{**vars(letter), **of} for letter in letters])
+    writer.executemany(INSERT, [{**vars(message), **of} for message in messages])
 
 
-class SqlOutbox:
-    """The outbox of a database.
-
-    Parameters
-    ----------
-    write, read
-        A transaction of the database's one writer, and a short look at it; both raise `StoreError`.
-    """
-
-    def __init__(self, write: Connect, read: Connect) -> None:
-        self._write, self._read = write, read
+class Outbox(Tables):
+    """Durable messages; a change is on the disk when its method returns."""
 
     def waiting(self, receiver: str, limit: int) -> list[StoredMessage]:
-        """Read the first of what waits for a receiver, in order."""
-        with self._read() as reader:
-            return [_letter(row) for row in reader.execute(SELECT_WAITING, (receiver, limit))]
+        """Return the first messages that wait for a receiver, in order."""
+        with self._reading() as reader:
+            return [_message(row) for row in reader.execute(SELECT_WAITING, (receiver, limit))]
 
     def urgent(self, receiver: str) -> bool:
-        """Whether anything that waits for a receiver ends quiet hours."""
-        with self._read() as reader:
+        """Return whether any message that waits for a receiver ends quiet hours."""
+        with self._reading() as reader:
             return bool(reader.execute(SELECT_URGENT, (receiver,)).fetchone()[0])
 
-    def finish(self, letter: int, state: MessageState, answer: str, now_ns: int) -> None:
-        """Note that a letter was delivered or refused; saying so twice changes nothing."""
-        with self._write() as writer:
-            writer.execute(FINISH, (state.value, answer[:MAX_ANSWER], now_ns, letter))
+    def finish(self, message: int, state: MessageState, answer: str, now_ns: int) -> None:
+        """Record that a message was delivered or refused; repeating it has no effect."""
+        with self._writing() as writer:
+            writer.execute(FINISH, (state.value, answer[:MAX_ANSWER], now_ns, message))
 
-    def fail(self, letter: int, answer: str) -> None:
-        """Note an attempt in vain; the letter goes on waiting."""
-        with self._write() as writer:
-            writer.execute(FAIL, (answer[:MAX_ANSWER], letter))
+    def fail(self, message: int, answer: str) -> None:
+        """Record a failed attempt; the message keeps waiting."""
+        with self._writing() as writer:
+            writer.execute(FAIL, (answer[:MAX_ANSWER], message))
 
     def expire(self, receiver: str, before_ns: int, answer: str, now_ns: int) -> int:
-        """Give up what has waited since before a time; return how many."""
-        with self._write() as writer:
-            words = answer[:MAX_ANSWER]
-            given = (words, now_ns, receiver, before_ns, before_ns)
+        """Give up messages whose queueing and event are older than a time; return their number."""
+        given = (answer[:MAX_ANSWER], now_ns, receiver, before_ns, before_ns)
+        with self._writing() as writer:
             return writer.execute(EXPIRE, given).rowcount
 
     def revive(self, receiver: str, now_ns: int) -> int:
-        """Let what was refused or given up wait again, in its old place; return how many."""
-        with self._write() as writer:
+        """Queue refused and expired messages again, in their old order; return their number."""
+        with self._writing() as writer:
             return writer.execute(REVIVE, (now_ns, receiver)).rowcount
 
     def backlogs(self) -> list[Backlog]:
-        """Look at everyone for whom there ever was a letter."""
-        with self._read() as reader:
+        """Return the backlog of every receiver that ever had a message."""
+        with self._reading() as reader:
             names = reader.execute("SELECT DISTINCT receiver FROM outbox ORDER BY receiver")
             return [_backlog(reader, str(name)) for (name,) in names.fetchall()]
 
@@ -267,15 +227,13 @@ def _backlog(reader: Connection, receiver: str) -> Backlog:
 
 def _last(reader: Connection, receiver: str, state: MessageState) -> StoredMessage | None:
     row = reader.execute(SELECT_LAST, (receiver, state.value)).fetchone()
-    return _letter(row) if row else None
+    return _message(row) if row else None
 
 
-def _letter(row: tuple[Any, ...]) -> StoredMessage:
-    id_, receiver, event_id, body, queued_ns, is_urgent, state, n_attempts, answer, done_ns = row
-    return StoredMessage(
-        *(id_, receiver, event_id, body, queued_ns, bool(is_urgent), MessageState(state)),
-        *(n_attempts, answer, done_ns),
-    )
+def _message(row: tuple[Any, ...]) -> StoredMessage:
+    found = dict(zip(COLUMNS.split(", "), row, strict=True))
+    now = {"is_urgent": bool(found["is_urgent"]), "state": MessageState(found["state"])}
+    return StoredMessage(**found | now)
 
 
 OUTBOX_TABLES = """
@@ -299,9 +257,9 @@ OUTBOX_TABLES = """
     ) STRICT;
     CREATE INDEX outbox_of_receiver ON outbox (receiver, state, id);
     CREATE TRIGGER outbox_kept BEFORE DELETE ON outbox
-    BEGIN SELECT RAISE(ABORT, 'what was told is kept'); END;
+    BEGIN SELECT RAISE(ABORT, 'messages are kept'); END;
     CREATE TRIGGER outbox_kept_as_queued
     BEFORE UPDATE OF receiver, event_id, alarm, number, body ON outbox
-    BEGIN SELECT RAISE(ABORT, 'what is told is kept as it was queued'); END;
+    BEGIN SELECT RAISE(ABORT, 'messages are kept as they were queued'); END;
     """
-"""A letter for each event and receiver; nothing of it is changed but what has come of it."""
+"""Migration that creates the table: a message for each event and receiver."""

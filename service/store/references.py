@@ -1,70 +1,273 @@
-"""References: rows are added and never changed, the newest of a bearing rules."""
+"""References of probe gaps and of 1× vectors: rows are only added, the newest one is in force."""
 
-from service.store.database import Connection
-from service.store.gap_reference import GapReference, MicrometrePair, ReferenceSource
+import json
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from typing import Any, Generic, TypeVar
+
+from core.alarms.judgements import OrderVector, VectorReference
+from core.condition.operating_state import OperatingState
+from service.store.access.audit_entries import AuditAction, acting
+from service.store.audit import AuditedTables
+from service.store.database import insert
 from service.store.port import StoreError
 
+MAX_GAP_UM = 10_000.0
+MAX_AUTHOR = 80
+MAX_NOTE = 500
+
 MAX_HISTORY = 1000
-"""Most references of one bearing that are handed out at once."""
+"""Maximum number of references of one bearing that are returned."""
 
-COLUMNS = "unit, bearing, set_ns, author, x_um, y_um, opposite_x_um, opposite_y_um, source, note"
-INSERT = f"INSERT INTO gap_reference ({COLUMNS}) VALUES (?,?,?,?,?,?,?,?,?,?)"  # noqa: S608
-IN_FORCE = (
-    f"SELECT {COLUMNS} FROM gap_reference"  # noqa: S608
-    " WHERE id IN (SELECT max(id) FROM gap_reference GROUP BY unit, bearing) ORDER BY unit, bearing"
-)
-"""By order of setting, not by time: a clock that was put back makes no reference older."""
-HISTORY = (
-    f"SELECT {COLUMNS} FROM gap_reference"  # noqa: S608
-    " WHERE unit = ? AND bearing = ? ORDER BY id DESC LIMIT ?"
-)
-SET_THEN = f"SELECT {COLUMNS} FROM gap_reference WHERE unit = ? AND bearing = ? AND set_ns = ?"  # noqa: S608
-
-Row = tuple[str, str, int, str, float, float, float | None, float | None, str, str]
+MicrometrePair = tuple[float, float]
 
 
-def insert_reference(writer: Connection, reference: GapReference) -> None:
-    """Add a reference to its bearing's history."""
-    opposite = reference.opposite_reference_um or (None, None)
-    writer.execute(
-        INSERT,
-        (
-            reference.unit,
-            reference.bearing,
-            reference.set_ns,
-            reference.author,
-            *reference.gap_reference_um,
-            *opposite,
-            reference.source.value,
-            reference.note,
-        ),
+class ReferenceSource(StrEnum):
+    """Origin of the gaps of a reference."""
+
+    GIVEN = "given"
+    MEASURED = "measured"
+
+
+@dataclass(frozen=True)
+class GapReference:
+    """Probe gaps of a bearing with the shaft centred; followed by newer ones, never changed.
+
+    Parameters
+    ----------
+    set_ns
+        Time at which it was set, UTC.
+    author
+        Person who set it, 1 to 80 printable characters.
+    gap_reference_um
+        Probe gaps (x, y), above 0 up to 10 000 µm.
+    opposite_reference_um
+        Gaps of the probes across the shaft, where the bearing has them.
+    note
+        At most 500 printable characters; may be empty.
+
+    Raises
+    ------
+    ValueError
+        If a value is outside its limits; the message gives both.
+    """
+
+    unit: str
+    bearing: str
+    set_ns: int
+    author: str
+    gap_reference_um: MicrometrePair
+    opposite_reference_um: MicrometrePair | None
+    source: ReferenceSource
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        _check_pair("gap", self.gap_reference_um)
+        if self.opposite_reference_um is not None:
+            _check_pair("opposite gap", self.opposite_reference_um)
+        if not self.author.strip():
+            raise ValueError(f"author {self.author!r} is empty; name who sets the reference")
+        _check_text("author", self.author, MAX_AUTHOR)
+        _check_text("note", self.note, MAX_NOTE)
+
+
+def _check_pair(what: str, pair: MicrometrePair) -> None:
+    for axis, gap_um in zip("xy", pair, strict=True):
+        if not 0.0 < gap_um <= MAX_GAP_UM:  # also refuses NaN
+            raise ValueError(
+                f"{what} {axis} is {gap_um:g} µm, must be above 0 and at most {MAX_GAP_UM:g} µm"
+            )
+
+
+def _check_text(what: str, text: str, n_most: int) -> None:
+    if len(text) > n_most:
+        raise ValueError(f"{what} has {len(text)} characters, must be at most {n_most}")
+    if not text.isprintable():
+        raise ValueError(f"{what} {text!r} must be printable characters on one line")
+
+
+@dataclass(frozen=True)
+class SetVectorReference:
+    """Reference vectors of 1× as set; followed by newer ones, never changed.
+
+    Parameters
+    ----------
+    set_ns
+        Time at which they were set, UTC.
+    """
+
+    reference: VectorReference
+    set_ns: int
+    author: str
+    note: str = ""
+
+
+_Reference = TypeVar("_Reference", GapReference, SetVectorReference)
+
+
+class _References(AuditedTables, Generic[_Reference]):
+    table: str
+    columns: tuple[str, ...]
+    key: tuple[str, ...]
+    """First columns, which identify what a reference is in force for."""
+
+    order: str
+    """Order of the references in force."""
+
+    def add(self, reference: _Reference) -> None:
+        """Write a reference, which is in force from then on; writing it again has no effect.
+
+        Raises
+        ------
+        StoreError
+            If it was not written, or that is unknown.
+        """
+        row = self._row(reference)
+        key = " AND ".join(f"{name} = ?" for name in self.key)
+        statement = f"{self._select} WHERE {key} ORDER BY id DESC"
+        with self._writing() as writer:
+            rows = writer.execute(statement, row[: len(self.key)])
+            before = [self._load(each) for each in rows]
+            if reference not in before:
+                action = self._action(before[0] if before else None, reference)
+                self._audit.add(writer, [action])
+                writer.execute(insert(self.table, self.columns), row)
+
+    def in_force(self) -> list[_Reference]:
+        """Return the references in force: the last one set, whatever its time."""
+        newest = f"SELECT max(id) FROM {self.table} GROUP BY {', '.join(self.key)}"  # noqa: S608
+        return self._read(f"WHERE id IN ({newest}) ORDER BY {self.order}")
+
+    def history(self, unit: str, bearing: str) -> list[_Reference]:
+        """Return the references of a bearing, newest first; at most the newest thousand."""
+        where = "WHERE unit = ? AND bearing = ? ORDER BY id DESC LIMIT ?"
+        return self._read(where, unit, bearing, MAX_HISTORY)
+
+    @property
+    def _select(self) -> str:
+        return f"SELECT {', '.join(self.columns)} FROM {self.table}"  # noqa: S608
+
+    def _read(self, where: str, *parameters: object) -> list[_Reference]:
+        with self._reading() as reader:
+            rows = reader.execute(f"{self._select} {where}", parameters)
+            return [self._load(row) for row in rows]
+
+    def _row(self, reference: _Reference) -> tuple[object, ...]:
+        raise NotImplementedError
+
+    def _load(self, row: tuple[Any, ...]) -> _Reference:
+        raise NotImplementedError
+
+    def _action(self, before: _Reference | None, reference: _Reference) -> AuditAction:
+        raise NotImplementedError
+
+
+class GapReferenceStore(_References[GapReference]):
+    """Gap references, in force for a bearing."""
+
+    table = "gap_reference"
+    columns = (
+        *("unit", "bearing", "set_ns", "author", "x_um", "y_um"),
+        *("opposite_x_um", "opposite_y_um", "source", "note"),
     )
+    key = ("unit", "bearing")
+    order = "unit, bearing"
 
-
-def is_set(reader: Connection, reference: GapReference) -> bool:
-    """Whether it is written already: by a call whose end nobody could tell."""
-    where = (reference.unit, reference.bearing, reference.set_ns)
-    return any(_reference(row) == reference for row in reader.execute(SET_THEN, where))
-
-
-def select_in_force(reader: Connection) -> list[GapReference]:
-    """The newest reference of every bearing that has one."""
-    return [_reference(row) for row in reader.execute(IN_FORCE)]
-
-
-def select_history(reader: Connection, unit: str, bearing: str) -> list[GapReference]:
-    """The references of one bearing, newest first."""
-    return [_reference(row) for row in reader.execute(HISTORY, (unit, bearing, MAX_HISTORY))]
-
-
-def _reference(row: Row) -> GapReference:
-    unit, bearing, set_ns, author, x_um, y_um, far_x_um, far_y_um, source, note = row
-    opposite: MicrometrePair | None = None
-    if far_x_um is not None and far_y_um is not None:
-        opposite = (far_x_um, far_y_um)
-    try:
-        return GapReference(
-            unit, bearing, set_ns, author, (x_um, y_um), opposite, ReferenceSource(source), note
+    def _row(self, reference: GapReference) -> tuple[object, ...]:
+        return (
+            *(reference.unit, reference.bearing, reference.set_ns, reference.author),
+            *reference.gap_reference_um,
+            *(reference.opposite_reference_um or (None, None)),
+            *(reference.source.value, reference.note),
         )
-    except ValueError as error:
-        raise StoreError(f"a reference of unit {unit} bearing {bearing}: {error}") from error
+
+    def _load(self, row: tuple[Any, ...]) -> GapReference:
+        unit, bearing, set_ns, author, x_um, y_um, *opposite, source, note = row
+        gaps = ((x_um, y_um), None if opposite[0] is None else (opposite[0], opposite[1]))
+        try:
+            return GapReference(unit, bearing, set_ns, author, *gaps, ReferenceSource(source), note)
+        except ValueError as error:
+            raise StoreError(f"a reference of unit {unit} bearing {bearing}: {error}") from error
+
+    def _action(self, before: GapReference | None, reference: GapReference) -> AuditAction:
+        return AuditAction(
+            time_ns=reference.set_ns,
+            actor=reference.author,
+            action="gap_reference.set",
+            object=f"{reference.unit}:{reference.bearing}",
+            before=None if before is None else _gaps(before),
+            after=_gaps(reference),
+            reason=reference.note,
+            source=acting().source,
+            peer=acting().peer,
+        )
+
+
+def _gaps(reference: GapReference) -> dict[str, object]:
+    names = ("author", "set_ns", "gap_reference_um", "opposite_reference_um", "source")
+    return {name: getattr(reference, name) for name in names}
+
+
+class VectorReferenceStore(_References[SetVectorReference]):
+    """Reference vectors of 1×, in force for a bearing in an operating state."""
+
+    table = "vector_reference"
+    columns = ("unit", "bearing", "state", "set_ns", "author", "note", "vectors")
+    key = ("unit", "bearing", "state")
+    order = "id"
+
+    def _row(self, reference: SetVectorReference) -> tuple[object, ...]:
+        its = reference.reference
+        vectors = {p: (v.amplitude_um_pk, v.phase_deg) for p, v in its.vectors.items()}
+        key = (its.unit, its.bearing, int(its.state))
+        return (*key, reference.set_ns, reference.author, reference.note, json.dumps(vectors))
+
+    def _load(self, row: tuple[Any, ...]) -> SetVectorReference:
+        unit, bearing, state, set_ns, author, note, vectors = row
+        try:
+            found = {place: OrderVector(*vector) for place, vector in json.loads(vectors).items()}
+            reference = VectorReference(unit, bearing, OperatingState(state), found)
+        except (ValueError, TypeError) as error:
+            raise StoreError(f"a 1× reference of unit {unit} bearing {bearing}: {error}") from error
+        return SetVectorReference(reference, set_ns, author, note)
+
+    def _action(
+        self, before: SetVectorReference | None, reference: SetVectorReference
+    ) -> AuditAction:
+        its = reference.reference
+        return AuditAction(
+            time_ns=reference.set_ns,
+            actor=reference.author,
+            action="order1_reference.set",
+            object=f"{its.unit}:{its.bearing}:{its.state.name.lower()}",
+            before=None if before is None else _vectors(before),
+            after=_vectors(reference),
+            reason=reference.note,
+            source=acting().source,
+            peer=acting().peer,
+        )
+
+
+def _vectors(reference: SetVectorReference) -> dict[str, object]:
+    vectors = {place: asdict(vector) for place, vector in reference.reference.vectors.items()}
+    return {"author": reference.author, "set_ns": reference.set_ns, "vectors": vectors}
+
+
+VECTOR_REFERENCE_TABLES = """
+    CREATE TABLE vector_reference (
+        id INTEGER PRIMARY KEY AUTOINCREMENT,
+        unit TEXT NOT NULL,
+        bearing TEXT NOT NULL,
+        state INTEGER NOT NULL,
+        set_ns INTEGER NOT NULL,
+        author TEXT NOT NULL,
+        note TEXT NOT NULL,
+        vectors TEXT NOT NULL
+    ) STRICT;
+    CREATE INDEX vector_reference_of ON vector_reference (unit, bearing, id);
+    CREATE TRIGGER vector_reference_kept_as_set BEFORE UPDATE ON vector_reference
+    BEGIN SELECT RAISE(ABORT, 'references are kept as they were set'); END;
+    CREATE TRIGGER vector_reference_kept BEFORE DELETE ON vector_reference
+    BEGIN SELECT RAISE(ABORT, 'references are kept'); END;
+"""
+"""Migration that creates the table."""

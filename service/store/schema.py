@@ -1,21 +1,19 @@
-"""The schema and its migrations: numbered, atomic, never edited once released.
+"""Schema and migrations: numbered, atomic, never edited once released.
 
-They are written as SQLite takes them. PostgreSQL gets the same ones, translated by
-:mod:`service.store.postgres.dialect`, which knows column types, ``STRICT``, ``WITHOUT ROWID`` and
-triggers; one that it cannot translate is written for PostgreSQL beside it, in
-:mod:`service.store.postgres.schema`. So whoever adds a migration appends it here, and runs the
-tests of the store, which go over both.
+Migrations are written for SQLite. PostgreSQL gets them through `service.store.postgres.schema`,
+which translates column types, ``STRICT``, ``WITHOUT ROWID`` and triggers, and holds those that it
+cannot translate. A new migration is appended here; the tests of the store run it on both.
 """
 
 from service.store.access.tables import ACCESS_TABLES, MUST_CHANGE
-from service.store.audit_chain import AUDIT_TABLES
+from service.store.audit import AUDIT_TABLES
 from service.store.films import FILM_TABLES
 from service.store.outbox import OUTBOX_TABLES
-from service.store.retention.schema import RETENTION_TABLES
+from service.store.references import VECTOR_REFERENCE_TABLES
+from service.store.retention import RETENTION_TABLES
 from service.store.rollups.rows import ROLLUP_TABLES
 from service.store.sharing import COMMAND_TABLES, POSITION_TABLES, UNIT_STATUS_TABLES
 from service.store.spectra import SPECTRA_TABLES
-from service.store.vector_references import VECTOR_REFERENCE_TABLES
 from service.store.waveforms import WAVEFORM_TABLES
 
 MIGRATIONS = (
@@ -129,7 +127,7 @@ MIGRATIONS = (
     ) STRICT;
     CREATE INDEX alarm_event_of_unit ON alarm_event (unit, id);
     CREATE TRIGGER alarm_event_kept_as_told BEFORE UPDATE ON alarm_event
-    BEGIN SELECT RAISE(ABORT, 'events of alarms are kept as they were told'); END;
+    BEGIN SELECT RAISE(ABORT, 'events of alarms are kept as they were written'); END;
     CREATE TRIGGER alarm_event_kept BEFORE DELETE ON alarm_event
     BEGIN SELECT RAISE(ABORT, 'events of alarms are kept'); END;
     """,

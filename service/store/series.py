@@ -1,4 +1,4 @@
-"""Keys and encoding of stored series."""
+"""Series of results: identifiers, unique times, and readings as bytes."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -10,41 +10,71 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray
 from core.monitor.catalogue import Quantity
-from core.quality import Quality, Reading, Reason
+from core.quality import Level, Quality, Reading, Reason
 from service.store.database import Connection
 
 FIND = "SELECT id FROM series WHERE unit = ? AND bearing = ?"
 ADD = "INSERT INTO series (unit, bearing) VALUES (?, ?) ON CONFLICT DO NOTHING"
 
 
+def find_series(reader: Connection, unit: str, bearing: str) -> int | None:
+    """Return the number of a unit's bearing; None if it has none."""
+    found = reader.execute(FIND, (unit, bearing)).fetchone()
+    return None if found is None else int(found[0])
+
+
 def series_of(writer: Connection, unit: str, bearing: str) -> int:
-    """Number of a unit's bearing, given one within a transaction if it has none."""
-    found = writer.execute(FIND, (unit, bearing)).fetchone()
+    """Return the number of a unit's bearing, assigning one if it has none."""
+    found = find_series(writer, unit, bearing)
     if found is None:
         writer.execute(ADD, (unit, bearing))
-        found = writer.execute(FIND, (unit, bearing)).fetchone()
-    return int(found[0])
+        (found,) = writer.execute(FIND, (unit, bearing)).fetchone()
+    return int(found)
+
+
+def unique_time_ns(
+    writer: Connection,
+    select: str,
+    key: tuple[object, ...],
+    time_ns: int,
+    measured: tuple[object, ...],
+) -> int:
+    """Return the first time from `time_ns` on that is free, or is taken by the same measurement.
+
+    A device whose clock restarts or is set back produces the same times again for other
+    measurements.
+
+    Parameters
+    ----------
+    select
+        Statement that reads the columns of `measured` by key and time.
+    measured
+        Values that distinguish measurements.
+    """
+    while writer.execute(select, (*key, time_ns)).fetchone() not in (None, measured):
+        time_ns += 1
+    return time_ns
 
 
 LEVEL_SHIFT = 6
-"""A quality byte is the level in its two top bits and the number of the reason below."""
+"""A quality byte holds the level in its upper two bits and the number of the reason below."""
 
 
 U_RANDOM, U_SYSTEMATIC = ".u_random", ".u_systematic"
-"""Behind the name of a quantity: the column of its standard uncertainty."""
+"""Suffixes of the columns with the standard uncertainties of a quantity."""
 
 
 def columns_of(quantities: Iterable[Quantity]) -> tuple[str, ...]:
-    """Names of the columns that hold quantities and, where they are kept, their uncertainties."""
+    """Return the columns of quantities and of the uncertainties that are kept."""
     suffixes = {False: ("",), True: ("", U_RANDOM, U_SYSTEMATIC)}
     return tuple(q.name + suffix for q in quantities for suffix in suffixes[q.keeps_uncertainty])
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Which columns a stored row holds, and what its reason numbers mean.
+    """Columns of a stored row, and the reasons that its numbers stand for.
 
-    Rows keep the layout they were written with, so that the catalogue can grow.
+    Rows keep the layout with which they were written, so that the catalogue can grow.
     """
 
     quantities: tuple[str, ...]
@@ -52,21 +82,21 @@ class Layout:
 
     @classmethod
     def of(cls, quantities: tuple[str, ...]) -> "Layout":
-        """Layout that this version of padwatch writes."""
+        """Return the layout that this version of padwatch writes."""
         return cls(quantities, tuple(reason.value for reason in Reason))
 
     def dumps(self) -> tuple[str, str]:
-        """Quantities and reasons as JSON, as they stand in the database."""
+        """Return quantities and reasons as JSON, as stored."""
         return json.dumps(self.quantities), json.dumps(self.reasons)
 
     @staticmethod
     @lru_cache(maxsize=64)
     def loads(quantities: str, reasons: str) -> "Layout":
-        """Invert `dumps`; every query reads the same few again."""
+        """Invert `dumps`; cached, since every query reads the same few layouts."""
         return Layout(tuple(json.loads(quantities)), tuple(json.loads(reasons)))
 
     def encode(self, readings: Mapping[str, Reading]) -> tuple[bytes, bytes]:
-        """Values (NaN for none) and qualities, in the order of the layout."""
+        """Return values (NaN for none) and qualities, in the order of the layout."""
         ordered = [_column(readings, name) for name in self.quantities]
         values = np.array([number for number, _ in ordered], dtype="<f8")
         qualities = bytes(
@@ -78,11 +108,22 @@ class Layout:
     def decode(
         self, values: list[bytes], qualities: list[bytes]
     ) -> tuple[FloatArray, npt.NDArray[np.uint8]]:
-        """Values, NaN for none, and quality levels: (n_rows, n_quantities) both."""
+        """Return values (NaN for none) and quality levels, both (n_rows, n_quantities)."""
         shape = (len(values), len(self.quantities))
         number = np.frombuffer(b"".join(values), dtype="<f8").reshape(shape)
         byte = np.frombuffer(b"".join(qualities), dtype=np.uint8).reshape(shape)
         return number.astype(np.float64), (byte >> LEVEL_SHIFT).astype(np.uint8)
+
+    def readings(self, values: bytes, qualities: bytes) -> dict[str, Reading]:
+        """Return the readings of one row, without uncertainties."""
+        numbers, _ = self.decode([values], [qualities])
+        rows = zip(self.quantities, numbers[0].tolist(), qualities, strict=True)
+        return {name: self._reading(value, byte) for name, value, byte in rows if "." not in name}
+
+    def _reading(self, value: float, byte: int) -> Reading:
+        level = Level(byte >> LEVEL_SHIFT)
+        quality = Quality(level, Reason(self.reasons[byte & ((1 << LEVEL_SHIFT) - 1)]))
+        return Reading(None if level is Level.BAD else value, quality)
 
 
 def _column(readings: Mapping[str, Reading], column: str) -> tuple[float, Quality]:
@@ -95,7 +136,7 @@ def _column(readings: Mapping[str, Reading], column: str) -> tuple[float, Qualit
 
 
 def remember_layout(writer: Connection, layout: Layout) -> int:
-    """Number of a layout, given one within a transaction if it has none."""
+    """Return the number of a layout, assigning one if it has none."""
     key = layout.dumps()
     writer.execute(
         "INSERT INTO layout (quantities, reasons) VALUES (?, ?) ON CONFLICT DO NOTHING", key

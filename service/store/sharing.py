@@ -1,32 +1,31 @@
-"""Rows by which processes share a plant: state of units, commands, positions on the stream."""
+"""Rows by which processes share a plant: states of units, commands, positions in a stream."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import astuple, dataclass, fields
 from enum import StrEnum
-from typing import Protocol
 
 from core.units import NS_PER_S
-from service.store.database import Connect, Connection
+from service.store.database import Connection, Tables, insert, upsert
 
 
 @dataclass(frozen=True)
 class UnitReport:
-    """What a process says of a unit at one moment.
+    """Report of a process on a unit at one moment.
 
     Parameters
     ----------
     n_beats
-        How often the process has reported; a process that lives never repeats one.
+        Number of the report; a running process never repeats one.
     beat_ns
-        When, by its host's clock; nothing is concluded from it.
+        Time of the report by the clock of its host; for information only.
     link, reason
-        Whether samples arrive, in a word, and why not.
+        State of the link to the samples, and the reason for it.
     signs
-        Document: how samples arrive, and how old everything is.
+        Document on the arrival of samples and the age of all data.
     revision
-        Of the state; another one as soon as the state is another.
+        Revision of the state, which changes with it.
     state
-        Document: results and alarms; None where it is as it was at the report before.
+        Document with results and alarms; None if unchanged since the previous report.
     """
 
     unit: str
@@ -42,12 +41,12 @@ class UnitReport:
 
 @dataclass(frozen=True)
 class UnitBeat:
-    """The newest report on a unit, without its state.
+    """Newest report on a unit, without its state.
 
     Parameters
     ----------
     process
-        Which process has written it: another one after each start.
+        Identifier of the reporting process, which changes with each start.
     """
 
     unit: str
@@ -56,22 +55,6 @@ class UnitBeat:
     beat_ns: int
     signs: str
     revision: int
-
-
-class UnitStates(Protocol):
-    """The newest report on each unit."""
-
-    def report(self, process: str, reports: Sequence[UnitReport]) -> None:
-        """Write what a process says of its units, in one transaction."""
-        ...
-
-    def beats(self) -> Sequence[UnitBeat]:
-        """Read the newest report on each unit, without the states."""
-        ...
-
-    def states(self, units: Collection[str]) -> Mapping[str, tuple[str, int, bytes]]:
-        """Read states of units: by unit, which process's, its revision, and the document."""
-        ...
 
 
 UNIT_STATUS_TABLES = """
@@ -89,53 +72,42 @@ UNIT_STATUS_TABLES = """
     ) STRICT;
 """
 
-COLUMNS = "process, n_beats, beat_ns, link, reason, last_sample_ns, signs, revision"
-BEAT = """
-    UPDATE unit_status SET n_beats = ?, beat_ns = ?, link = ?, reason = ?, last_sample_ns = ?,
-    signs = ? WHERE unit = ? AND process = ? AND revision = ?
+REPORT_COLUMNS = [field.name for field in fields(UnitReport)]
+UPDATE_BEAT = """
+    UPDATE unit_status SET n_beats = :n_beats, beat_ns = :beat_ns, link = :link, reason = :reason,
+    last_sample_ns = :last_sample_ns, signs = :signs
+    WHERE unit = :unit AND process = :process AND revision = :revision
 """
-"""Leaves the state alone, which is large."""
+"""Does not write the state, which is large."""
 
-WHOLE = f"""
-    INSERT INTO unit_status (unit, {COLUMNS}, state) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
-    ON CONFLICT (unit) DO UPDATE SET process = excluded.process, n_beats = excluded.n_beats,
-    beat_ns = excluded.beat_ns, link = excluded.link, reason = excluded.reason,
-    last_sample_ns = excluded.last_sample_ns, signs = excluded.signs,
-    revision = excluded.revision, state = excluded.state
-"""  # noqa: S608
+UPSERT_REPORT = upsert("unit_status", [*REPORT_COLUMNS, "process"], ("unit",))
 SELECT_BEATS = (
     "SELECT unit, process, n_beats, beat_ns, signs, revision FROM unit_status ORDER BY unit"
 )
 SELECT_STATE = "SELECT process, revision, state FROM unit_status WHERE unit = ?"
 
 
-class StoredUnitStates:
-    """The newest report on each unit, in the database of a store.
-
-    Parameters
-    ----------
-    write, read
-        A transaction, and a short look; both raise `StoreError`.
-    """
-
-    def __init__(self, write: Connect, read: Connect) -> None:
-        self._write, self._read = write, read
+class UnitStates(Tables):
+    """Newest report on each unit."""
 
     def report(self, process: str, reports: Sequence[UnitReport]) -> None:
-        """Write what a process says of its units, in one transaction."""
-        with self._write() as writer:
-            # in one order everywhere, so that two writers never wait for each other
+        """Write reports of a process in one transaction."""
+        with self._writing() as writer:
+            # always in the same order, so that two writers cannot deadlock
             for report in sorted(reports, key=lambda report: report.unit):
-                _write(writer, process, report)
+                if report.state is None:
+                    writer.execute(UPDATE_BEAT, {**vars(report), "process": process})
+                else:
+                    writer.execute(UPSERT_REPORT, (*astuple(report), process))
 
     def beats(self) -> list[UnitBeat]:
-        """Read the newest report on each unit, without the states."""
-        with self._read() as reader:
+        """Return the newest report on each unit, without the states."""
+        with self._reading() as reader:
             return [UnitBeat(*row) for row in reader.execute(SELECT_BEATS)]
 
     def states(self, units: Collection[str]) -> dict[str, tuple[str, int, bytes]]:
-        """Read states of units."""
-        with self._read() as reader:
+        """Return the process, revision and state document of units, by unit."""
+        with self._reading() as reader:
             found = {unit: reader.execute(SELECT_STATE, (unit,)).fetchone() for unit in units}
         return {
             unit: (str(row[0]), int(row[1]), bytes(row[2]))
@@ -144,18 +116,8 @@ class StoredUnitStates:
         }
 
 
-def _write(writer: Connection, process: str, report: UnitReport) -> None:
-    beat = (report.n_beats, report.beat_ns, report.link, report.reason, report.last_sample_ns)
-    if report.state is None:
-        where = (report.signs, report.unit, process, report.revision)
-        writer.execute(BEAT, (*beat, *where))
-    else:
-        content = (report.signs, report.revision, report.state)
-        writer.execute(WHOLE, (report.unit, process, *beat, *content))
-
-
 class CommandState(StrEnum):
-    """What has come of a command."""
+    """State of a command."""
 
     WAITING = "waiting"
     TAKEN = "taken"
@@ -167,25 +129,25 @@ class CommandState(StrEnum):
 
 
 OPEN = (CommandState.WAITING, CommandState.TAKEN)
-"""Not answered yet."""
+"""States of unanswered commands."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """Something that somebody asks for; that he may was checked before.
+    """Command of an operator whose permission has been checked.
 
     Parameters
     ----------
     id
-        Another one for each.
+        Unique identifier.
     unit
-        Whose process is to carry it out.
+        Unit whose process executes the command.
     kind, document
-        What is to be done.
+        Kind of command, and its arguments.
     actor, peer
-        Who asks, and from where.
+        Operator, and the address of the request.
     expires_ns
-        Nobody begins to carry it out later than this, by his host's clock.
+        Latest time at which execution may begin, by the clock of the sending host.
     """
 
     id: str
@@ -200,7 +162,7 @@ class Command:
 
 @dataclass(frozen=True)
 class OpenCommand:
-    """A command that is not answered, and which process has taken it; None if none has."""
+    """Unanswered command, and the process that has taken it, if any."""
 
     command: Command
     taken_by: str | None
@@ -208,42 +170,13 @@ class OpenCommand:
 
 @dataclass(frozen=True)
 class Answer:
-    """What has come of a command, with words where there is something to say."""
+    """Final state of a command, with an explanation where there is one."""
 
     state: CommandState
     words: str
 
 
 DONE = Answer(CommandState.DONE, "")
-
-
-class Commands(Protocol):
-    """Commands of operators; each is carried out once or not at all."""
-
-    def ask(self, command: Command) -> None:
-        """Write a command down."""
-        ...
-
-    def open(self, units: Collection[str]) -> Sequence[OpenCommand]:
-        """Read what is not answered of units, in the order in which it was asked."""
-        ...
-
-    def take(self, id_: str, process: str) -> bool:
-        """Note that a process carries a command out now; False if it is answered already."""
-        ...
-
-    def answer(self, id_: str, answer: Answer, now_ns: int) -> None:
-        """Answer a command; one that is answered already stays as it is."""
-        ...
-
-    def withdraw(self, id_: str, words: str, now_ns: int) -> bool:
-        """Ask no more; False if somebody has taken or answered it."""
-        ...
-
-    def look(self, id_: str) -> Answer | None:
-        """What has come of a command; None if there is no such command."""
-        ...
-
 
 COMMAND_TABLES = """
     CREATE TABLE operator_command (
@@ -265,20 +198,16 @@ COMMAND_TABLES = """
 """
 
 KEPT_NS = 7 * 86_400 * NS_PER_S
-"""How long answered commands are kept; what they did stands in the audit trail."""
+"""Time for which answered commands are kept; the audit trail records their effects."""
 
 MAX_OPEN = 200
-"""Most that are read at once."""
+"""Maximum number of unanswered commands that are returned."""
 
-COMMAND_COLUMNS = "id, unit, kind, document, actor, peer, asked_ns, expires_ns"
-INSERT = (
-    f"INSERT INTO operator_command ({COMMAND_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"  # noqa: S608
-    " ON CONFLICT (id) DO NOTHING"
-)
-"""Asked again where nobody could tell whether it was written, it is there once."""
+COMMAND_COLUMNS = [field.name for field in fields(Command)]
+INSERT = insert("operator_command", COMMAND_COLUMNS) + " ON CONFLICT (id) DO NOTHING"
 FORGET = "DELETE FROM operator_command WHERE asked_ns < ?"
 SELECT_OPEN = f"""
-    SELECT {COMMAND_COLUMNS}, taken_by FROM operator_command
+    SELECT {", ".join(COMMAND_COLUMNS)}, taken_by FROM operator_command
     WHERE state IN ('waiting', 'taken') ORDER BY asked_ns, id LIMIT ?
 """  # noqa: S608
 TAKE = """
@@ -297,72 +226,63 @@ LOOK = "SELECT state, words FROM operator_command WHERE id = ?"
 MAX_WORDS = 2000
 
 
-class StoredCommands:
-    """Commands of operators in the database of a store.
-
-    Parameters
-    ----------
-    write, read
-        A transaction, and a short look; both raise `StoreError`.
-    """
-
-    def __init__(self, write: Connect, read: Connect) -> None:
-        self._write, self._read = write, read
+class Commands(Tables):
+    """Commands of operators; each is executed once or not at all."""
 
     def ask(self, command: Command) -> None:
-        """Write a command down, and forget those of long ago."""
-        with self._write() as writer:
+        """Write a command, and delete old ones; writing it again has no effect."""
+        with self._writing() as writer:
             writer.execute(FORGET, (command.asked_ns - KEPT_NS,))
-            writer.execute(INSERT, tuple(vars(command).values()))
+            writer.execute(INSERT, astuple(command))
 
     def open(self, units: Collection[str]) -> list[OpenCommand]:
-        """Read what is not answered of units, in the order in which it was asked."""
-        with self._read() as reader:
+        """Return the unanswered commands of units, in the order in which they were asked."""
+        with self._reading() as reader:
             rows = reader.execute(SELECT_OPEN, (MAX_OPEN,)).fetchall()
         found = [OpenCommand(Command(*row[:-1]), row[-1]) for row in rows]
         return [each for each in found if each.command.unit in units]
 
     def take(self, id_: str, process: str) -> bool:
-        """Note that a process carries a command out now; False if it is answered already."""
-        with self._write() as writer:
+        """Record that a process executes a command; return False if it is answered already."""
+        with self._writing() as writer:
             return bool(writer.execute(TAKE, (process, id_)).rowcount == 1)
 
     def answer(self, id_: str, answer: Answer, now_ns: int) -> None:
-        """Answer a command; one that is answered already stays as it is."""
-        with self._write() as writer:
+        """Answer a command; an answered command keeps its first answer."""
+        with self._writing() as writer:
             answer_command(writer, id_, answer, now_ns)
 
     def withdraw(self, id_: str, words: str, now_ns: int) -> bool:
-        """Ask no more; False if somebody has taken or answered it."""
-        with self._write() as writer:
+        """Withdraw a command; return False if it was taken or answered."""
+        with self._writing() as writer:
             return bool(writer.execute(WITHDRAW, (words, now_ns, id_)).rowcount == 1)
 
     def look(self, id_: str) -> Answer | None:
-        """What has come of a command; None if there is no such command."""
-        with self._read() as reader:
+        """Return the state of a command; None if the identifier is unknown."""
+        with self._reading() as reader:
             row = reader.execute(LOOK, (id_,)).fetchone()
         return None if row is None else Answer(CommandState(row[0]), str(row[1]))
 
 
 def answer_command(writer: Connection, id_: str, answer: Answer, now_ns: int) -> None:
-    """Answer a command in a transaction that somebody else has begun."""
+    """Answer a command within a transaction."""
     writer.execute(ANSWER, (answer.state.value, answer.words[:MAX_WORDS], now_ns, id_))
 
 
 @dataclass(frozen=True)
 class StreamPosition:
-    """Up to which message of a stream the stored results of a unit reach.
+    """Position in a stream up to which the results of a unit are stored.
 
     Parameters
     ----------
     stream
-        Which stream; another one where it was made anew, whose messages are counted anew.
+        Identifier of the stream, which changes when it is created anew and counts from 1 again.
     sequence
         Newest message whose results are stored.
     window_sequence
-        First message that must be looked at once more to go on from there.
+        First message that must be read again to resume.
     memory
-        Document: what must be known beside these messages.
+        Document with the state needed besides these messages.
     """
 
     unit: str
@@ -382,40 +302,25 @@ POSITION_TABLES = """
     ) STRICT;
 """
 
-WRITE = """
-    INSERT INTO stream_position (unit, stream, sequence, window_sequence, memory)
-    VALUES (?, ?, ?, ?, ?)
-    ON CONFLICT (unit) DO UPDATE SET stream = excluded.stream, sequence = excluded.sequence,
-    window_sequence = excluded.window_sequence, memory = excluded.memory
-    WHERE stream_position.stream <> excluded.stream
-    OR stream_position.sequence < excluded.sequence
-"""
-"""A position never goes back: who was overtaken writes what is there already."""
+POSITION_COLUMNS = [field.name for field in fields(StreamPosition)]
+WRITE_POSITION = upsert("stream_position", POSITION_COLUMNS, ("unit",)) + (
+    " WHERE stream_position.stream <> excluded.stream"
+    " OR stream_position.sequence < excluded.sequence"
+)
+"""A position never goes back: a process that was overtaken does not replace it."""
 
-READ = "SELECT unit, stream, sequence, window_sequence, memory FROM stream_position WHERE unit = ?"
+READ_POSITION = f"SELECT {', '.join(POSITION_COLUMNS)} FROM stream_position WHERE unit = ?"  # noqa: S608
 
 
 def write_positions(writer: Connection, positions: Iterable[StreamPosition]) -> None:
     """Write the newest position of each unit, within the transaction of its results."""
     newest = {position.unit: position for position in positions}
-    # in one order everywhere, so that two writers never wait for each other
+    # always in the same order, so that two writers cannot deadlock
     for _, position in sorted(newest.items()):
-        writer.execute(
-            WRITE,
-            (
-                position.unit,
-                position.stream,
-                position.sequence,
-                position.window_sequence,
-                position.memory,
-            ),
-        )
+        writer.execute(WRITE_POSITION, astuple(position))
 
 
 def select_position(reader: Connection, unit: str) -> StreamPosition | None:
-    """Read the position of a unit; None if it never had one."""
-    row = reader.execute(READ, (unit,)).fetchone()
-    if row is None:
-        return None
-    unit, stream, sequence, window_sequence, memory = row
-    return StreamPosition(unit, stream, int(sequence), int(window_sequence), bytes(memory))
+    """Return the position of a unit; None if its results never came from a stream."""
+    row = reader.execute(READ_POSITION, (unit,)).fetchone()
+    return None if row is None else StreamPosition(*row)

@@ -1,8 +1,10 @@
-"""Spectra over time in the database."""
+"""Spectra over time."""
 
 import hashlib
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
@@ -12,25 +14,137 @@ from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import Level, Quality, Reason, worst
 from core.stiffness.order_line import marked_hz
-from service.store.database import Connect, Connection
-from service.store.series import series_of
-from service.store.spectra_port import (
-    N_CHANNELS,
-    Spectra,
-    SpectraLimits,
-    SpectraQuery,
-    StoredSpectrum,
-    Tier,
-    TierLimits,
-)
+from core.units import ns_from_s
+from service.store.database import Connection, Tables, insert
+from service.store.series import find_series, series_of
 from service.store.trends import storable
 
+N_CHANNELS = 4
+"""Shaft x and y, bearing x and y."""
+
+
+class Tier(IntEnum):
+    """Density of stored spectra, as numbered in the database."""
+
+    DENSE = 0
+    SPARSE = 1
+
+
+@dataclass(frozen=True)
+class TierLimits:
+    """Interval at which one spectrum per bearing is kept, and maximum number of spectra."""
+
+    every_s: float
+    n_most: int
+
+    def slot(self, time_ns: int) -> int:
+        """Return the number of the interval that contains a time."""
+        return time_ns // ns_from_s(self.every_s)
+
+
+@dataclass(frozen=True)
+class SpectraLimits:
+    """Limits of stored spectra.
+
+    Parameters
+    ----------
+    n_most_lines
+        Maximum number of lines per channel, from the lowest frequency on.
+    """
+
+    dense: TierLimits = TierLimits(60.0, 1440)
+    sparse: TierLimits = TierLimits(600.0, 52_560)
+    n_most_lines: int = 1000
+
+    @property
+    def tiers(self) -> tuple[tuple[Tier, TierLimits], ...]:
+        """Both tiers with their limits."""
+        return (Tier.DENSE, self.dense), (Tier.SPARSE, self.sparse)
+
+
+@dataclass(frozen=True)
+class SpectraQuery:
+    """Query for spectra of one bearing.
+
+    Parameters
+    ----------
+    start_ns, end_ns
+        Half-open time range.
+    max_spectra
+        If the range has more, spectra are chosen evenly in time.
+    """
+
+    unit: str
+    bearing: str
+    start_ns: int
+    end_ns: int
+    max_spectra: int
+
+
+@dataclass(frozen=True, eq=False)
+class StoredSpectrum:
+    """Averaged spectra of the channels of a bearing.
+
+    Parameters
+    ----------
+    time_ns
+        End of the samples.
+    duration_s
+        Duration of all averaged samples.
+    n_segments
+        Number of segments in which all channels were usable.
+    quality
+        Worst quality of the 1× amplitudes.
+    bin_hz
+        Frequency of the first line, and spacing of the lines.
+    amplitude_um_pk : (N_CHANNELS, n_lines)
+        Displacement; NaN throughout where a channel was not usable.
+    """
+
+    time_ns: int
+    duration_s: float
+    n_segments: int
+    state: OperatingState
+    quality: Quality
+    speed_rpm: float | None
+    power_mw: float | None
+    order1_hz: float | None
+    vortex_hz: float | None
+    bin_hz: float
+    amplitude_um_pk: FloatArray
+
+    @property
+    def resolution(self) -> tuple[float, int]:
+        """Spacing and number of lines; spectra with different ones have no common axis."""
+        return self.bin_hz, self.amplitude_um_pk.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Spectra of one bearing, oldest first.
+
+    Parameters
+    ----------
+    n_found
+        Number of spectra in the range, before some were chosen.
+    damaged_ns
+        Times of chosen spectra with a wrong checksum, which are left out.
+    first_ns
+        Time of the oldest stored spectrum of this bearing, inside the range or not.
+    """
+
+    spectra: Sequence[StoredSpectrum]
+    n_found: int
+    damaged_ns: Sequence[int]
+    first_ns: int | None
+
+
 LOWEST_UM, HIGHEST_UM = 1e-6, 1e5
-"""What can be told apart: smaller amplitudes read zero, larger ones this."""
+"""Range of stored amplitudes: smaller ones read zero, larger ones read the upper end."""
 
 N_STEPS = 65_533
 STEP = math.log(HIGHEST_UM / LOWEST_UM) / N_STEPS
-"""Of the logarithm: amplitudes come back within 0.02 %, which no transducer is worth."""
+"""Step of the logarithm: amplitudes are accurate to 0.02 %, better than any transducer."""
 
 ZERO, UNUSABLE = 0, 65_535
 
@@ -38,7 +152,7 @@ CHECKSUM_BYTES = 8
 
 
 def encode(amplitude_um_pk: FloatArray) -> bytes:
-    """(N_CHANNELS, n_lines) amplitudes, NaN where a channel is not usable."""
+    """Encode (N_CHANNELS, n_lines) amplitudes, NaN where a channel is not usable."""
     usable = np.nan_to_num(amplitude_um_pk, nan=LOWEST_UM)
     steps = np.log(np.clip(usable, LOWEST_UM, HIGHEST_UM) / LOWEST_UM) / STEP
     codes = 1 + np.round(steps).astype(np.int64)
@@ -57,12 +171,12 @@ def decode(amplitudes: bytes) -> FloatArray:
 
 
 def checksum(facts: tuple[object, ...], amplitudes: bytes) -> bytes:
-    """Of all that is kept of a spectrum.
+    """Return the checksum of a spectrum.
 
     Parameters
     ----------
     facts
-        Integers, floats, texts and None, just as they come back from the database.
+        Integers, floats, texts and None, exactly as the database returns them.
     """
     digest = hashlib.blake2b(repr(facts).encode(), digest_size=CHECKSUM_BYTES)
     digest.update(amplitudes)
@@ -76,10 +190,7 @@ FACTS = (
 )
 """Columns that the checksum covers, besides the amplitudes."""
 
-INSERT = f"""
-    INSERT INTO spectrum (tier, slot, {", ".join(FACTS)}, amplitudes, checksum)
-    VALUES ({", ".join("?" * (len(FACTS) + 4))})
-"""  # noqa: S608
+INSERT = insert("spectrum", ("tier", "slot", *FACTS, "amplitudes", "checksum"))
 IS_TAKEN = "SELECT 1 FROM spectrum WHERE series = ? AND tier = ? AND slot = ?"
 TRIM = """
     DELETE FROM spectrum WHERE series = :series AND tier = :tier AND id <= (
@@ -87,14 +198,13 @@ TRIM = """
         ORDER BY id DESC LIMIT 1 OFFSET :n_kept
     )
 """
-"""By the order of writing: a device whose clock was wrong for a while drives nothing out."""
+"""By the order of writing, so that a temporarily wrong clock does not displace newer spectra."""
 
-SERIES = "SELECT id FROM series WHERE unit = ? AND bearing = ?"
 IN_RANGE = """
     SELECT min(id), time_ns FROM spectrum WHERE series = ? AND time_ns >= ? AND time_ns < ?
     GROUP BY time_ns ORDER BY time_ns
 """
-"""What is kept in both densities counts once."""
+"""A spectrum that is stored in both tiers counts once."""
 
 FIRST = "SELECT min(time_ns) FROM spectrum WHERE series = ?"
 SELECT = f"SELECT {', '.join(FACTS)}, amplitudes, checksum FROM spectrum WHERE id = ?"  # noqa: S608
@@ -105,35 +215,22 @@ JUDGED = tuple(
 
 
 def insert_spectra(
-    writer: Connection,
-    assessments: Iterable[Assessment],
-    limits: SpectraLimits,
+    writer: Connection, assessments: Iterable[Assessment], limits: SpectraLimits
 ) -> None:
-    """Keep the first spectrum of each stretch of time; within the writer's transaction."""
+    """Store the first spectrum of each interval, within a transaction."""
     for assessment in assessments:
         spectrum = assessment.spectrum
         if spectrum.frequency_hz.size and spectrum.n_segments.diagonal().any():
             series = series_of(writer, assessment.unit, assessment.bearing)
             for tier, its in limits.tiers:
-                _insert(writer, assessment, series, (tier, its), limits.n_most_lines)
-
-
-def _insert(
-    writer: Connection,
-    assessment: Assessment,
-    series: int,
-    kept: tuple[Tier, TierLimits],
-    n_most_lines: int,
-) -> None:
-    tier, limits = kept
-    slot = limits.slot(assessment.time_ns)
-    if writer.execute(IS_TAKEN, (series, int(tier), slot)).fetchone():
-        return
-    facts = _facts(assessment, series)
-    amplitudes = encode(_amplitudes(assessment)[:, :n_most_lines])
-    sealed = (*facts, amplitudes, checksum(facts, amplitudes))
-    writer.execute(INSERT, (int(tier), slot, *sealed))
-    writer.execute(TRIM, {"series": series, "tier": int(tier), "n_kept": limits.n_most})
+                key = (series, int(tier), its.slot(assessment.time_ns))
+                if not writer.execute(IS_TAKEN, key).fetchone():
+                    facts = _facts(assessment, series)
+                    amplitudes = encode(_amplitudes(assessment)[:, : limits.n_most_lines])
+                    row = (*key[1:], *facts, amplitudes, checksum(facts, amplitudes))
+                    writer.execute(INSERT, row)
+                    kept = {"series": series, "tier": int(tier), "n_kept": its.n_most}
+                    writer.execute(TRIM, kept)
 
 
 def _amplitudes(assessment: Assessment) -> FloatArray:
@@ -168,29 +265,19 @@ def _number(value: float | None) -> float | None:
     return None if value is None else float(value)
 
 
-class SqlSpectra:
-    """The spectra of one database.
-
-    Parameters
-    ----------
-    read
-        Opens a connection for one short read.
-    """
-
-    def __init__(self, read: Connect) -> None:
-        self._read = read
+class SpectraStore(Tables):
+    """Spectra of bearings, stored with assessments."""
 
     def read(self, query: SpectraQuery) -> Spectra:
-        """Read spectra of one bearing; those that are damaged are counted, not handed out."""
+        """Return spectra of one bearing; damaged ones are counted and left out."""
         start_ns, end_ns = storable(query.start_ns), storable(query.end_ns)
-        with self._read() as reader:
-            row = reader.execute(SERIES, (query.unit, query.bearing)).fetchone()
-            series = -1 if row is None else int(row[0])
+        with self._reading() as reader:
+            series = find_series(reader, query.unit, query.bearing)
             found = reader.execute(IN_RANGE, (series, start_ns, end_ns)).fetchall()
             first = reader.execute(FIRST, (series,)).fetchone()[0]
             chosen = _evenly(found, query.max_spectra)
             rows = [reader.execute(SELECT, (id_,)).fetchone() for id_, _ in chosen]
-        # one that was driven out between the two questions is no damage
+        # a spectrum that was deleted between the two queries is not damaged
         read = [(time_ns, row) for (_, time_ns), row in zip(chosen, rows, strict=True) if row]
         return Spectra(
             spectra=[_spectrum(row) for _, row in read if _is_whole(row)],
@@ -201,7 +288,7 @@ class SqlSpectra:
 
 
 def _evenly(found: Sequence[tuple[int, int]], n_most: int) -> Sequence[tuple[int, int]]:
-    """Of too many, those nearest to even steps of time; the first and the newest among them."""
+    """Return at most `n_most` entries nearest to even steps of time, with the first and last."""
     if len(found) <= n_most:
         return found
     time_ns = np.array([time for _, time in found], dtype=np.int64)
@@ -253,4 +340,4 @@ SPECTRA_TABLES = """
     CREATE INDEX spectrum_at ON spectrum (series, time_ns);
     CREATE INDEX spectrum_of ON spectrum (series, tier);
 """
-"""Statements of the migration that brings them."""
+"""Migration that creates the table."""

@@ -1,4 +1,4 @@
-"""Single readings by time and condition."""
+"""Queries of single readings by time and condition."""
 
 from collections.abc import Iterable, Iterator
 
@@ -8,23 +8,22 @@ from core.condition.operating_state import OperatingState
 from core.quality import Level
 from service.store.buckets import Summaries
 from service.store.database import Connection
-from service.store.port import QueryTooLargeError, StoreError, TrendQuery
+from service.store.port import QueryTooLargeError, StoreError, TrendQuery, ValueRange
 from service.store.series import Layout
-from service.store.value_range import ValueRange
 
 IN_STATES = """(
         CAST(:states AS TEXT) = '' OR CAST(:states AS TEXT) LIKE '%,' || operating_state || ',%'
     )"""
-"""Whether an operating state is among those listed as ``,2,3,``; an empty list asks for nothing."""
+"""Condition that an operating state is listed in ``,2,3,``; an empty list matches all."""
 
 
 def at_least(column: str, name: str) -> str:
-    """Whether a column reaches a parameter."""
+    """Return the condition that a column is at least a parameter, if that is not NULL."""
     return f"(CAST(:{name} AS DOUBLE PRECISION) IS NULL OR {column} >= :{name})"
 
 
 def at_most(column: str, name: str) -> str:
-    """Whether a column does not exceed a parameter."""
+    """Return the condition that a column is at most a parameter, if that is not NULL."""
     return f"(CAST(:{name} AS DOUBLE PRECISION) IS NULL OR {column} <= :{name})"
 
 
@@ -32,13 +31,13 @@ BETWEEN_BOUNDS = f"""{at_least("eccentricity_ratio", "eccentricity_low")}
     AND {at_most("eccentricity_ratio", "eccentricity_high")}
     AND {at_least("oil_temperature_c", "oil_low")}
     AND {at_most("oil_temperature_c", "oil_high")}"""
-"""Whether a single reading lies within the bounds that are asked for."""
+"""Condition that a single reading lies within the bounds of a query."""
 
 
 def condition_arguments(
     states: Iterable[OperatingState], eccentricity_ratio: ValueRange, oil_temperature_c: ValueRange
 ) -> dict[str, object]:
-    """Parameters of `IN_STATES` and `BETWEEN_BOUNDS`."""
+    """Return the parameters of `IN_STATES` and `BETWEEN_BOUNDS`."""
     return {
         "eccentricity_low": eccentricity_ratio.low,
         "eccentricity_high": eccentricity_ratio.high,
@@ -49,10 +48,10 @@ def condition_arguments(
 
 
 MAX_ROWS = 1_000_000
-"""Most readings that one query may touch: a few seconds."""
+"""Maximum number of readings that one query reads, in a few seconds."""
 
 ROWS_AT_ONCE = 4000
-"""Whole rows in memory; of the others only the columns asked for."""
+"""Number of whole rows in memory; from others only the requested columns are kept."""
 
 SELECT_ROWS = f"""
     SELECT time_ns, layout, reading_values, reading_qualities FROM assessment
@@ -64,14 +63,14 @@ SELECT_ROWS = f"""
 """  # noqa: S608
 
 Span = tuple[int, int]
-"""From the first time, up to but not including the second, ns."""
+"""Half-open time range, ns."""
 
 Row = tuple[int, int, bytes, bytes]
 """Time, layout, values and qualities of a reading."""
 
 
 def select_page(reader: Connection, query: TrendQuery) -> Summaries:
-    """The first readings of one bearing, oldest first, and one more than a page holds."""
+    """Return the first readings of a bearing, oldest first, and one more than a page holds."""
     rows = reader.execute(SELECT_ROWS, arguments(query) | {"most": query.max_points + 1})
     return decoded_rows(rows.fetchall(), select_layouts(reader), query.quantities)
 
@@ -79,17 +78,18 @@ def select_page(reader: Connection, query: TrendQuery) -> Summaries:
 def select_readings(
     reader: Connection, query: TrendQuery, spans: Iterable[Span], width_ns: int
 ) -> tuple[int, Summaries]:
-    """How many readings of one bearing there are in some spans of time, and they, oldest first.
+    """Return the number of readings of a bearing in spans of time, and the readings, oldest first.
 
     Parameters
     ----------
     width_ns
-        What is more than ``max_points`` is summed up in buckets of this width as it is read.
+        Readings beyond ``max_points`` are aggregated into buckets of this width while they are
+        read.
 
     Raises
     ------
     QueryTooLargeError
-        If they are more than `MAX_ROWS`.
+        If there are more than `MAX_ROWS`.
     """
     layouts = select_layouts(reader)
     n_readings, single, summed = 0, [decoded_rows([], layouts, query.quantities)], []
@@ -117,7 +117,7 @@ def _chunks(reader: Connection, query: TrendQuery, spans: Iterable[Span]) -> Ite
 
 
 def too_large() -> QueryTooLargeError:
-    """Build the refusal to read all that would be needed."""
+    """Return the error of a query that reads too many readings."""
     return QueryTooLargeError(
         f"more than {MAX_ROWS} single readings would have to be read: ask for a shorter time, for"
         " fewer points, or for bounds of eccentricity and oil temperature at whole cells"
@@ -125,7 +125,7 @@ def too_large() -> QueryTooLargeError:
 
 
 def select_layouts(reader: Connection) -> dict[int, Layout]:
-    """Every layout by its number."""
+    """Return all layouts by number."""
     return {
         id_: Layout.loads(quantities, reasons)
         for id_, quantities, reasons in reader.execute("SELECT * FROM whole_layout")
@@ -133,12 +133,12 @@ def select_layouts(reader: Connection) -> dict[int, Layout]:
 
 
 def storable(time_ns: int) -> int:
-    """The nearest time that a row can have: from 1970 to 2262."""
+    """Return the nearest time that can be stored, from 1970 to 2262."""
     return max(0, min(time_ns, 2**63 - 1))
 
 
 def arguments(query: TrendQuery) -> dict[str, object]:
-    """What a query asks for, as parameters of statements."""
+    """Return the parameters of statements for a query."""
     return {
         "unit": query.unit,
         "bearing": query.bearing,
@@ -149,7 +149,7 @@ def arguments(query: TrendQuery) -> dict[str, object]:
 
 
 def decoded_rows(rows: list[Row], layouts: dict[int, Layout], names: tuple[str, ...]) -> Summaries:
-    """Some columns of rows; what a row does not know is bad."""
+    """Decode columns of rows; columns missing in a row are bad."""
     time_ns = np.array([row[0] for row in rows], dtype=np.int64)
     layout_of_row = np.array([row[1] for row in rows], dtype=np.int64)
     value = np.full((len(rows), len(names)), np.nan)

@@ -1,10 +1,70 @@
-"""The index of waveform files in the database of a store."""
+"""Index of recordings in the database."""
 
 from collections.abc import Sequence
+from dataclasses import astuple, dataclass, fields
+from enum import StrEnum
+from typing import Any
 
-from service.store.database import Connect
+from service.store.database import Tables, upsert
 from service.store.port import StoreError
-from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
+
+
+class WaveformKind(StrEnum):
+    """Kind of a recording."""
+
+    CAPTURE = "capture"
+    CONTINUOUS = "continuous"
+
+
+class WaveformState(StrEnum):
+    """State of a recording on the disk."""
+
+    PRESENT = "present"
+    DAMAGED = "damaged"
+    MISSING = "missing"
+    REMOVED = "removed"
+
+
+@dataclass(frozen=True)
+class WaveformFile:
+    """Index entry of a recording.
+
+    Parameters
+    ----------
+    place
+        Identifier of the data folder, as several may share a database.
+    name
+        Name of the recording's folder within the folder of its kind.
+    start_ns, stop_ns
+        Time of the first sample, and time one sample after the last.
+    n_samples
+        Samples per channel.
+    n_bytes
+        Size of all files.
+    checksum
+        SHA-256 of the manifest, which lists those of the other files; empty if it is unreadable.
+    reason
+        Reason for the state.
+    changed_ns
+        Time of the last change of state.
+    checked_ns
+        Time of the last complete check.
+    """
+
+    place: str
+    kind: WaveformKind
+    name: str
+    unit: str
+    start_ns: int
+    stop_ns: int
+    n_samples: int
+    n_bytes: int
+    checksum: str
+    state: WaveformState = WaveformState.PRESENT
+    reason: str = ""
+    changed_ns: int = 0
+    checked_ns: int = 0
+
 
 WAVEFORM_TABLES = """
     CREATE TABLE waveform (
@@ -25,95 +85,48 @@ WAVEFORM_TABLES = """
     ) STRICT;
     CREATE INDEX waveform_of_state ON waveform (place, state, start_ns);
 """
-"""Statements of the migration that brings them."""
+"""Migration that creates the index."""
 
-COLUMNS = (
-    "place, kind, name, unit, start_ns, stop_ns, n_samples, n_bytes, checksum, state, reason,"
-    " changed_ns, checked_ns"
-)
-PUT = f"""
-    INSERT INTO waveform ({COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)
-    ON CONFLICT (place, kind, name) DO UPDATE SET unit = excluded.unit,
-    start_ns = excluded.start_ns, stop_ns = excluded.stop_ns, n_samples = excluded.n_samples,
-    n_bytes = excluded.n_bytes, checksum = excluded.checksum, state = excluded.state,
-    reason = excluded.reason, changed_ns = excluded.changed_ns, checked_ns = excluded.checked_ns
-"""  # noqa: S608
+COLUMNS = [field.name for field in fields(WaveformFile)]
+PUT = upsert("waveform", COLUMNS, ("place", "kind", "name"))
 FILES = (
-    f"SELECT {COLUMNS} FROM waveform WHERE place = ? AND state <> 'removed'"  # noqa: S608
+    f"SELECT {', '.join(COLUMNS)} FROM waveform WHERE place = ? AND state <> 'removed'"  # noqa: S608
     " ORDER BY start_ns, kind, name"
 )
 FORGET = (
     "DELETE FROM waveform WHERE place = ? AND state IN ('removed', 'missing') AND changed_ns < ?"
 )
 
-Row = tuple[str, str, str, str, int, int, int, int, str, str, str, int, int]
 
-
-class StoredWaveforms:
-    """Entries of all places; see :class:`service.store.waveform_port.WaveformStore`.
-
-    Parameters
-    ----------
-    write, read
-        A transaction, and a short look; both raise `StoreError`.
-    """
-
-    def __init__(self, write: Connect, read: Connect) -> None:
-        self._write, self._read = write, read
+class WaveformStore(Tables):
+    """Index of the recordings of all data folders; their files are not in the database."""
 
     def put(self, files: Sequence[WaveformFile]) -> None:
-        """Write entries in one transaction.
+        """Write entries in one transaction, replacing those of the same place, kind and name.
 
         Raises
         ------
         StoreError
             If nothing was written.
         """
-        with self._write() as writer:
-            writer.executemany(PUT, [_row(file) for file in files])
+        with self._writing() as writer:
+            writer.executemany(PUT, [astuple(file) for file in files])
 
     def files(self, place: str) -> list[WaveformFile]:
-        """Read what there is or should be in a place."""
-        with self._read() as reader:
+        """Return the entries of a place except those of removed recordings, oldest first."""
+        with self._reading() as reader:
             return [_file(row) for row in reader.execute(FILES, (place,))]
 
     def forget(self, place: str, before_ns: int) -> int:
-        """Drop entries of what has long been gone.
-
-        Raises
-        ------
-        StoreError
-            If nothing was dropped.
-        """
-        with self._write() as writer:
+        """Delete entries of recordings removed or missing before a time; return their number."""
+        with self._writing() as writer:
             return writer.execute(FORGET, (place, before_ns)).rowcount
 
 
-def _row(file: WaveformFile) -> Row:
-    span = (file.start_ns, file.stop_ns, file.n_samples, file.n_bytes)
-    now = (file.state.value, file.reason, file.changed_ns, file.checked_ns)
-    return (file.place, file.kind.value, file.name, file.unit, *span, file.checksum, *now)
-
-
-def _file(row: Row) -> WaveformFile:
-    place, kind, name, unit, *span, checksum, state, reason, changed_ns, checked_ns = row
+def _file(row: tuple[Any, ...]) -> WaveformFile:
+    found = dict(zip(COLUMNS, row, strict=True))
     try:
-        found = WaveformKind(kind), WaveformState(str(state))
+        found |= {"kind": WaveformKind(found["kind"]), "state": WaveformState(found["state"])}
     except ValueError as error:
-        raise StoreError(f"the entry of recording {name!r}: {error}") from error
-    start_ns, stop_ns, n_samples, n_bytes = (int(n) for n in span)
-    return WaveformFile(
-        place,
-        found[0],
-        name,
-        unit,
-        start_ns,
-        stop_ns,
-        n_samples,
-        n_bytes,
-        str(checksum),
-        found[1],
-        str(reason),
-        int(changed_ns),
-        int(checked_ns),
-    )
+        raise StoreError(f"index entry of recording {found['name']!r}: {error}") from error
+    return WaveformFile(**found)

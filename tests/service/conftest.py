@@ -27,7 +27,7 @@ from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.settings.toml_file import TomlFileError
 from service.settings.units import UnitSettings
-from service.store.postgres.address import PostgresAddress
+from service.store.postgres.connection import PostgresAddress
 from service.store.postgres.database import PostgresDatabase
 from service.store.sqlite import SqliteStore
 

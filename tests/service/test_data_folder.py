@@ -37,4 +37,4 @@ def test_a_second_service_on_the_same_data_is_refused_in_one_line(plant_path: Pa
     with exclusive_use(plant_path.parent / "data" / "padwatch.sqlite3"):
         found = padwatch("run", plant_path, "--port", "0")
     assert (found.exit_code, found.stderr.count("\n")) == (1, 1)
-    assert f"another padwatch (process {os.getpid()}) works with" in found.stderr
+    assert f"another padwatch (process {os.getpid()}) uses" in found.stderr

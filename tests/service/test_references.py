@@ -23,8 +23,8 @@ from service.measuring.references import (
     measured_gaps,
     with_reference,
 )
-from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoredReadings, StoreError
+from service.store.references import GapReference, ReferenceSource
 from service.store.sqlite import SqliteStore
 
 

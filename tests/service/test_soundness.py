@@ -15,7 +15,7 @@ from service.live.live_view import LiveView
 from service.measuring.integrity import LOOK_EVERY_S, IntegrityMonitor
 from service.measuring.metrics import soundness_metrics
 from service.measuring.service_alarms import ServiceAlarms, ServiceHealth
-from service.store.audit_port import AuditQuery
+from service.store.audit import AuditQuery
 from service.store.port import StoreError, TrendQuery
 from service.store.sqlite import SqliteStore
 

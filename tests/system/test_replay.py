@@ -163,7 +163,7 @@ def test_a_replay_that_only_shall_be_stored_ends_by_itself_and_is_mixed_with_not
     live.write_text(text.replace("[analysis]", service))
     refused = padwatch("run", live, "--port", "0")
     assert refused.exit_code == 1
-    assert "holds replay results and is not opened for live ones" in refused.stderr
+    assert "holds replay results and cannot be used for live ones" in refused.stderr
 
 
 async def test_a_replay_whose_daq_is_killed_ends_and_says_that_results_are_incomplete(

@@ -14,7 +14,7 @@ from harness.summary import Torture, planted
 
 from service.store.port import StoreError
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.trail import verify_trail
+from service.store.sqlite.store import file_trail
 
 N_DEEDS = 8
 FAILURES = (
@@ -88,7 +88,7 @@ def wrong(folder: Path, outcome: Outcome, seed: int, build: Build) -> Loss | str
     except StoreError as error:
         return None if outcome.acknowledged < 0 else str(error)
     # a trail without any entry has no head until there is one
-    is_whole = outcome.acknowledged < 0 or verify_trail(path).is_whole
+    is_whole = outcome.acknowledged < 0 or file_trail(path).verify().is_whole
     return None if is_whole else "the audit trail is not whole"
 
 

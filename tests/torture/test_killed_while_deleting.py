@@ -12,9 +12,8 @@ from harness.summary import Torture
 from harness.tape import environment, python
 from rigs.rolled_trends import gather_all
 
+from service.store import retention as deleting
 from service.store.port import Trend, TrendQuery
-from service.store.retention import deleting
-from service.store.retention.limits import RetentionLimits
 from service.store.sqlite import SqliteStore
 
 N_KILLS = 100
@@ -25,13 +24,12 @@ LATER_NS = 1 << 62
 DELETE_EVERYTHING = f"""
 import sys
 from pathlib import Path
-from service.store.retention.limits import RetentionLimits
 from service.store.sqlite import SqliteStore
 
 store = SqliteStore(Path(sys.argv[1]))
 print("begun", flush=True)
 for series in store.retention.series():
-    while store.retention.delete(series, RetentionLimits(readings_ns=0, minutes_ns=0), {LATER_NS}):
+    while store.retention.delete(series, dict(readings_days=0, minutes_days=0), {LATER_NS}):
         pass
 print("done", flush=True)
 """
@@ -111,9 +109,11 @@ def test_planted_bug_of_a_mark_in_a_transaction_of_its_own_is_found(
     path.write_bytes(old_file)
     with closing(SqliteStore(path)) as store:
         before = by_the_hour(store)
-        monkeypatch.setattr(deleting, "set_gone", lambda *_: None)  # killed before the second one
+        monkeypatch.setattr(
+            deleting, "set_deleted", lambda *_: None
+        )  # killed before the second one
         (series,) = store.retention.series()
-        store.retention.delete(series, RetentionLimits(readings_ns=0), LATER_NS)
+        store.retention.delete(series, {"readings_days": 0}, LATER_NS)
         fine = TrendQuery("U1", "UJB", ("speed_rpm",), T0_NS, T0_NS + HOUR_NS, 5000, 1)
 
         assert by_the_hour(store) == before  # by the hour nobody sees it

@@ -16,7 +16,7 @@ from harness.summary import Torture, planted
 from harness.tape import Acknowledged, Step, environment, python, record
 
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.trail import verify_trail
+from service.store.sqlite.store import file_trail
 
 N_DEEDS = 150
 N_CUTS, N_FEW = 5000, 50
@@ -87,7 +87,7 @@ def test_nothing_that_was_acknowledged_is_lost_by_a_power_cut(
         assert not lost, acknowledged
         assert not mark
         assert damage(path) == []
-        assert verify_trail(path).is_whole
+        assert file_trail(path).verify().is_whole
     torture.figure(f"power cuts: {n_cuts}, 0 acknowledged lost, 0 torn, 0 altered, 0 corrupt")
 
 

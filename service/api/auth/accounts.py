@@ -23,7 +23,7 @@ from service.store.access.identities import (
     Permission,
     Role,
 )
-from service.store.access.port import AccessRefusedError, Account
+from service.store.access.tables import AccessRefusedError, Account
 
 RoleName = Literal["viewer", "operator", "engineer", "admin"]
 

@@ -29,7 +29,7 @@ from service.store.access.identities import (
     key_id,
     new_token,
 )
-from service.store.access.port import AccessStore, Account
+from service.store.access.tables import AccessStore, Account
 
 
 def immediately(note: Callable[[], None]) -> None:

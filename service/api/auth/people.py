@@ -14,7 +14,7 @@ from service.store.access.identities import (
     new_key,
     new_token,
 )
-from service.store.access.port import AccessRefusedError, AccessStore
+from service.store.access.tables import AccessRefusedError, AccessStore
 
 NS_PER_S = 1_000_000_000
 SET_UP_S = 3600.0

@@ -10,7 +10,7 @@ from acquisition.clock import Clock
 from service.api.auth.gate import SAFE
 from service.api.load import TokenBucket
 from service.store.access.audit_entries import Acting, AuditAction, Source, acting, acting_as
-from service.store.audit_port import AuditStore
+from service.store.audit import AuditStore
 from service.store.port import StoreError
 
 log = structlog.get_logger()

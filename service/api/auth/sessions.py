@@ -26,7 +26,7 @@ from service.api.problems import ProblemError, problem_responses
 from service.api.values import ApiModel, RequestModel
 from service.store.access.audit_entries import AuditAction, acting, name_actor
 from service.store.access.identities import Identity, Means, Permission, Role
-from service.store.audit_port import AuditStore
+from service.store.audit import AuditStore
 from service.store.port import StoreError
 
 PermissionName = Literal["read", "act_on_alarms", "change_measuring", "read_audit", "change_access"]

@@ -23,7 +23,8 @@ from service.api.routes.alarm_models import (
     alarm_model,
 )
 from service.api.values import ApiModel, Time
-from service.store.port import AlarmQuery, Store
+from service.store.port import AlarmQuery
+from service.store.store import Store
 
 UnitKey = Annotated[str, Field(examples=["U1"])]
 

@@ -16,7 +16,7 @@ from service.api.tables import Column, Format, table_content, table_response
 from service.api.values import ApiModel, Time
 from service.store.access.audit_entries import MAX_NAME, AuditEntry
 from service.store.access.identities import Permission
-from service.store.audit_port import AuditQuery
+from service.store.audit import AuditQuery
 
 SourceName = Literal["api", "command_line", "padwatch"]
 

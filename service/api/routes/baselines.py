@@ -42,9 +42,14 @@ from service.live.commands import (
 from service.live.learning_progress import RECENT_DAYS, learning_progress
 from service.runtime.times import rfc3339
 from service.store.access.identities import Permission
-from service.store.baselines import Versions, versions_after
+from service.store.baselines import (
+    BaselineEntry,
+    BaselineStep,
+    StoredStep,
+    Versions,
+    versions_after,
+)
 from service.store.documents import BASELINE, FORMAT_VERSION, to_json
-from service.store.film_port import BaselineEntry, BaselineStep, StoredStep
 
 
 def version_model(

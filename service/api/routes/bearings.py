@@ -28,7 +28,7 @@ from service.api.values import (
     window_model,
 )
 from service.live.live_view import CurrentBearing
-from service.store.gap_reference import GapReference
+from service.store.references import GapReference
 
 MicrometrePair = Annotated[
     list[float], Field(min_length=2, max_length=2, examples=[[1998.5, 2003.1]])

@@ -34,7 +34,7 @@ from service.api.values import (
     listed,
     states_named,
 )
-from service.store.film_port import FilmHistory, FilmQuery
+from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.port import QueryTooLargeError
 
 EvidenceName = Literal["measured", "insufficient_excitation", "bad_quality"]

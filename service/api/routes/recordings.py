@@ -18,7 +18,7 @@ from service.api.problems import ProblemError, problem_responses
 from service.api.routes.channels import UNITS, ChannelUnit
 from service.api.values import ApiModel, Time
 from service.recordings.library import RecordingEntry, RecordingLibrary
-from service.store.waveform_port import WaveformKind
+from service.store.waveforms import WaveformKind
 
 
 class RunningRecordingModel(ApiModel):

@@ -23,8 +23,7 @@ from service.api.values import (
 )
 from service.measuring.references import VectorRefusedError, measured_vectors
 from service.store.access.identities import Permission
-from service.store.gap_reference import GapReference
-from service.store.vector_reference_port import SetVectorReference
+from service.store.references import GapReference, SetVectorReference
 
 
 class SetReferenceModel(ApiModel):

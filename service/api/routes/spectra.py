@@ -29,7 +29,7 @@ from service.api.values import (
     PlaceName,
     Time,
 )
-from service.store.spectra_port import SpectraQuery, StoredSpectrum
+from service.store.spectra import SpectraQuery, StoredSpectrum
 
 
 class PlaceSpectraModel(ApiModel):

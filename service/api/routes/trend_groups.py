@@ -8,8 +8,8 @@ from typing import Any, Literal
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingState
 from service.api.values import STATE_NAMES, bounds
-from service.store.port import Store, Trend, TrendQuery
-from service.store.value_range import ValueRange
+from service.store.port import Trend, TrendQuery, ValueRange
+from service.store.store import Store
 
 GroupName = Literal["state", "eccentricity", "oil_temperature"]
 

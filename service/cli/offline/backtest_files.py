@@ -29,7 +29,8 @@ from service.cli.offline.backtest_cells import (
 )
 from service.cli.offline.backtest_histories import BearingRows, Place, histories_of
 from service.cli.offline.backtest_tables import MAGIC, WRONG_FILE
-from service.store.film_port import FilmHistory, FilmQuery, FilmStore
+from service.store.film_readings import FilmHistory, FilmQuery
+from service.store.films import FilmStore
 
 MAX_NAMES = 2000
 """Different names in a column: 200 units of at most 8 bearings."""

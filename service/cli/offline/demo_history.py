@@ -19,7 +19,9 @@ from service.settings.core_values import film_rules_of
 from service.settings.films import FilmAlarmSettings
 from service.settings.plant import PlantFile
 from service.settings.units import UnitSettings
-from service.store.film_port import BaselineStep, FilmHistory, FilmStore, StoredStep
+from service.store.baselines import BaselineStep, StoredStep
+from service.store.film_readings import FilmHistory
+from service.store.films import FilmStore
 
 AUTHOR = "padwatch demo"
 EVENT = "learned from a simulated year"

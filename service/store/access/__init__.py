@@ -1,1 +1,1 @@
-"""Accounts, sessions, keys and the audit trail."""
+"""Accounts, sessions, keys and entries of the audit trail."""

@@ -1,4 +1,4 @@
-"""An entry of the audit trail, and the chain of hashes that it stands in."""
+"""Entries of the audit trail, and the chain of hashes that connects them."""
 
 import hashlib
 import json
@@ -12,21 +12,21 @@ from typing import TypeAlias
 from core.alarms.alarm import AlarmNews
 
 MAX_NAME = 300
-"""Characters of an actor, a peer, an action and an object that are kept."""
+"""Maximum length of a stored actor, peer, action or object."""
 
 MAX_REASON = 2000
 MAX_DOCUMENT = 65_536
-"""Characters of a document before or after; a longer one is kept as its beginning and its size."""
+"""Maximum length of a document; of a longer one only the beginning and the length are stored."""
 
 N_SHOWN = 1000
 
 
 Document: TypeAlias = object
-"""Of what JSON can hold."""
+"""JSON value."""
 
 
 class Source(StrEnum):
-    """What a deed was done through."""
+    """Interface through which an action was taken."""
 
     API = "api"
     COMMAND_LINE = "command_line"
@@ -35,22 +35,22 @@ class Source(StrEnum):
 
 @dataclass(frozen=True)
 class AuditAction:
-    """What is to be written into the audit trail.
+    """Action to be recorded in the audit trail.
 
     Parameters
     ----------
     time_ns
-        When, UTC.
+        Time of the action, UTC.
     actor
-        Who; empty if that is not known.
+        Name of the person or machine; empty if unknown.
     action
-        What was done, as "alarm.acknowledged".
+        Kind of action, such as "alarm.acknowledged".
     object
-        What it was done to.
+        Identifier of the changed object.
     before, after
-        What that was before and after it, of what JSON can hold; None where nothing is to be said.
+        State of the object as JSON values; None if there is nothing to record.
     peer
-        Address that it was asked from, or the user of the operating system; None if there is none.
+        Address of the request, or user of the operating system; None if there is none.
     """
 
     time_ns: int
@@ -66,16 +66,16 @@ class AuditAction:
 
 @dataclass(frozen=True)
 class AuditEntry:
-    """One link of the chain, as it is stored.
+    """Entry of the audit trail, as stored.
 
     Parameters
     ----------
     number
-        From 1 without a hole.
+        Consecutive number from 1.
     before, after
         Canonical JSON.
     previous_hash, hash
-        SHA-256 in hexadecimal, of the entry before and of all of this one but itself.
+        SHA-256 in hexadecimal, of the previous entry and of all other fields of this one.
     """
 
     number: int
@@ -93,12 +93,12 @@ class AuditEntry:
 
 
 def canonical(document: object) -> str | None:
-    """One and the same text for one and the same document; None for nothing.
+    """Return the canonical JSON text of a document; None for None.
 
     Raises
     ------
     ValueError
-        If it holds a number that is none.
+        If it contains a number that is not finite.
     """
     if document is None:
         return None
@@ -109,7 +109,7 @@ def canonical(document: object) -> str | None:
 
 
 def storable(text: str, n_most: int) -> str:
-    """A text as the store can hold it: halves of characters replaced, cut where it is too long."""
+    """Return a text that can be stored: lone surrogates replaced, and shortened if too long."""
     whole = text.encode("utf-8", "replace").decode("utf-8")
     return whole if len(whole) <= n_most else whole[: n_most - 1] + "…"
 
@@ -117,35 +117,35 @@ def storable(text: str, n_most: int) -> str:
 FORMAT = "padwatch-audit-1"
 
 FIRST = "0" * 64
-"""What the first entry has for the hash of the one before it."""
+"""Previous hash of the first entry."""
 
 
 def digest(values: Sequence[object]) -> str:
-    """SHA-256 of the columns of an entry without its own hash, in their order.
+    """Return the SHA-256 of the fields of an entry without its own hash, in their order.
 
     Raises
     ------
     TypeError
-        If one of them is neither text, number nor None.
+        If one of them is not text, a number or None.
     """
-    text = json.dumps([FORMAT, *values], separators=(",", ":"))  # ASCII: one text for one list
+    text = json.dumps([FORMAT, *values], separators=(",", ":"))  # ASCII, so that the text is unique
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
-def chained(deed: AuditAction, number: int, previous_hash: str) -> AuditEntry:
-    """A deed as the entry that follows another."""
+def chained(action: AuditAction, number: int, previous_hash: str) -> AuditEntry:
+    """Return the entry of an action that follows another entry."""
     columns = (
-        *(number, deed.time_ns, storable(deed.actor, MAX_NAME), deed.source.value),
-        None if deed.peer is None else storable(deed.peer, MAX_NAME),
-        *(storable(deed.action, MAX_NAME), storable(deed.object, MAX_NAME)),
-        *(canonical(deed.before), canonical(deed.after), storable(deed.reason, MAX_REASON)),
+        *(number, action.time_ns, storable(action.actor, MAX_NAME), action.source.value),
+        None if action.peer is None else storable(action.peer, MAX_NAME),
+        *(storable(action.action, MAX_NAME), storable(action.object, MAX_NAME)),
+        *(canonical(action.before), canonical(action.after), storable(action.reason, MAX_REASON)),
         previous_hash,
     )
     return AuditEntry(*columns, digest(columns))
 
 
 def recomputed(entry: AuditEntry) -> str | None:
-    """The hash that an entry should have; None if it holds what no entry holds."""
+    """Return the hash that an entry should have; None if its fields have wrong types."""
     try:
         return digest(astuple(entry)[:-1])
     except TypeError:
@@ -154,16 +154,16 @@ def recomputed(entry: AuditEntry) -> str | None:
 
 @dataclass(frozen=True)
 class Acting:
-    """Who is at work.
+    """Context of actions.
 
     Parameters
     ----------
     peer
-        Address of a request, or the user of the operating system.
+        Address of the request, or user of the operating system.
     actor
-        Who that is, once it is known; empty until then.
+        Name of the person or machine; empty until it is known.
     command
-        Which command in the database is being carried out; None where none is.
+        Identifier of the command in the database that is being executed; None if there is none.
     """
 
     source: Source = Source.PADWATCH
@@ -174,33 +174,33 @@ class Acting:
 
 @dataclass(frozen=True)
 class ActedNews(AlarmNews):
-    """News of an alarm that an action of a person has caused.
+    """News of an alarm that a person's action has caused.
 
     Parameters
     ----------
     peer
-        Network address of the client that asked for it, if known.
+        Network address of the client, if known.
     command
-        Id of the command that asked for it; it is answered by being stored with the news.
+        Identifier of the command that asked for it; storing the news answers the command.
     """
 
     peer: str | None = None
     command: str | None = None
 
 
-NOBODY = Acting()
+PADWATCH_ITSELF = Acting()
 
-_ACTING: ContextVar[Acting] = ContextVar("acting", default=NOBODY)
+_ACTING: ContextVar[Acting] = ContextVar("acting", default=PADWATCH_ITSELF)
 
 
 def acting() -> Acting:
-    """Who is at work in this task or thread; padwatch itself where nobody has said so."""
+    """Return the context of this task or thread; by default that of padwatch itself."""
     return _ACTING.get()
 
 
 @contextmanager
 def acting_as(who: Acting) -> Iterator[None]:
-    """Write down what is done within as done by somebody."""
+    """Record actions within the block in a context."""
     token = _ACTING.set(who)
     try:
         yield
@@ -209,5 +209,5 @@ def acting_as(who: Acting) -> Iterator[None]:
 
 
 def name_actor(actor: str) -> None:
-    """Say who is behind the request that is being answered, once that has been checked."""
+    """Set the actor of the current context, once the actor is authenticated."""
     _ACTING.set(replace(acting(), actor=actor))

@@ -1,12 +1,11 @@
-"""Whether the audit trail is whole: its chain, and the file that names its newest entry."""
+"""Verification of the audit trail: its chain, and the file that names its newest entry."""
 
 import json
-import os
-import tempfile
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from service.runtime.files import write_private
 from service.store.access.audit_entries import FIRST, AuditEntry, recomputed
 
 FORMAT = "padwatch-audit-head"
@@ -16,28 +15,28 @@ MAX_BYTES = 4096
 
 @dataclass(frozen=True)
 class AuditHead:
-    """The newest entry: its number, 0 before the first, and its hash."""
+    """Number of the newest entry, 0 before the first, and its hash."""
 
     number: int = 0
     hash: str = FIRST
 
 
 class HeadError(ValueError):
-    """A head file is not there or holds no head; the message says which."""
+    """A head file is missing or invalid; the message says which."""
 
 
 def head_path(database: Path) -> Path:
-    """Where the head of a database's audit trail is."""
+    """Return the path of the head of a database's audit trail."""
     return database.with_name(database.stem + SUFFIX)
 
 
 def read_head(path: Path) -> AuditHead:
-    """Read a head.
+    """Return the head in a file.
 
     Raises
     ------
     HeadError
-        If the file is not there, or is no head.
+        If the file is missing or invalid.
     """
     try:
         with path.open("rb") as file:
@@ -53,35 +52,14 @@ def read_head(path: Path) -> AuditHead:
 
 
 def write_head(path: Path, head: AuditHead) -> None:
-    """Write a head aside, bring it to the disk and give it its name.
+    """Write a head, durable on return.
 
     Raises
     ------
     OSError
-        If the disk refuses; what was there stays.
+        If that fails; the previous head stays.
     """
-    document = {"format": FORMAT, **asdict(head)}
-    # a name of its own: another process may be writing as well
-    descriptor, aside = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
-    try:
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(json.dumps(document).encode() + b"\n")
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(aside, path)
-    except BaseException:
-        Path(aside).unlink(missing_ok=True)
-        raise
-    _sync_folder(path.parent)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Bring the name to the disk, too: without it a power cut may leave the head before."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+    write_private(path, json.dumps({"format": FORMAT, **asdict(head)}).encode() + b"\n")
 
 
 def _head(document: object) -> AuditHead:
@@ -95,21 +73,21 @@ def _head(document: object) -> AuditHead:
 
 
 HEAD_DIFFERED = "audit.head_differed"
-"""Action of an entry that tells that the head did not fit the chain when it was written."""
+"""Action of an entry which records that the head contradicted the chain."""
 
 
 MAX_BEHIND = 64
-"""Entries by which a head may lag; a crash leaves out those of one transaction."""
+"""Maximum number of entries by which a head may lag; a crash omits those of one transaction."""
 
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong.
+    """Defect of an audit trail.
 
     Parameters
     ----------
     number
-        The first entry that it is wrong with; None where it is the head.
+        Number of the first affected entry; None for the head.
     """
 
     number: int | None
@@ -118,35 +96,35 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What there is to say of an audit trail.
+    """Result of verifying an audit trail.
 
     Parameters
     ----------
     n_entries
-        That are whole, from the first one on.
+        Number of valid entries, from the first one on.
     hash
-        Of the last of them.
+        Hash of the last valid entry.
     finding
-        What is wrong with what follows; None if nothing is.
+        Defect of what follows; None if there is none.
     n_behind
-        By how many entries the head lags, as after a crash; it is repaired by the next entry.
+        Number of entries by which the head lags, as after a crash; the next entry repairs it.
+    contradictions
+        Numbers of entries which record that the head contradicted the chain.
     is_shared
-        Whether other hosts write to the trail as well, each with a head of its own: then it lags
-        by what they have written since.
-    told
-        Entries which tell that the head did not fit the chain when they were written.
+        Whether other hosts, each with its own head, write to the trail as well. The head then lags
+        by the entries that they have written since.
     """
 
     n_entries: int
     hash: str
     finding: Finding | None
     n_behind: int = 0
-    told: tuple[int, ...] = ()
+    contradictions: tuple[int, ...] = ()
     is_shared: bool = False
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing is wrong with the chain as it is now."""
+        """Whether the chain has no defect now."""
         return self.finding is None
 
 
@@ -157,32 +135,34 @@ def walk(
     *,
     is_shared: bool = False,
 ) -> Verdict:
-    """Look at every entry, oldest first, and compare the last with the head.
+    """Verify every entry, oldest first, and compare the last one with the head.
 
     Parameters
     ----------
     head
-        From the file beside; where it cannot be had, why. Read before the entries: it may lag
-        behind them, never the other way round.
+        Head in the file, or the reason why there is none. Must be read before the entries, since it
+        may lag behind them but not lead.
     rename
-        Says in words where an entry belongs whose hash is not its own.
+        Describes the defect of an entry whose hash is wrong.
     is_shared
         Whether other hosts write to the trail as well.
     """
     number, hash_, at_head = 0, FIRST, ""
-    told: list[int] = []
+    contradictions: list[int] = []
     for entry in entries:
         finding = _wrong(entry, number, hash_, rename)
         if finding is not None:
-            return Verdict(number, hash_, finding, told=tuple(told), is_shared=is_shared)
+            return Verdict(
+                number, hash_, finding, contradictions=tuple(contradictions), is_shared=is_shared
+            )
         number, hash_ = entry.number, entry.hash
         if entry.action == HEAD_DIFFERED:
-            told.append(number)
+            contradictions.append(number)
         if isinstance(head, AuditHead) and number == head.number:
             at_head = hash_
     finding = _wrong_head(number, at_head, head, is_shared)
     n_behind = 0 if finding or isinstance(head, str) else number - head.number
-    return Verdict(number, hash_, finding, n_behind, tuple(told), is_shared)
+    return Verdict(number, hash_, finding, n_behind, tuple(contradictions), is_shared)
 
 
 def _wrong(
@@ -190,7 +170,7 @@ def _wrong(
 ) -> Finding | None:
     due = before + 1
     if type(entry.number) is not int or entry.number < due:
-        return Finding(due, f"entry {entry.number!r} stands where entry {due} belongs")
+        return Finding(due, f"entry {entry.number!r} is in the place of entry {due}")
     if entry.number > due:
         last = entry.number - 1
         missing = f"entry {due} is" if last == due else f"entries {due} to {last} are"
@@ -206,7 +186,7 @@ def _wrong_head(
     number: int, at_head: str, head: AuditHead | str, is_shared: bool
 ) -> Finding | None:
     if isinstance(head, str):
-        return Finding(None, f"the head {head}: nothing says how far the trail went")
+        return Finding(None, f"the head {head}: the end of the trail cannot be verified")
     if head.number > number:
         count = f"entries {number + 1} to {head.number} are"
         if head.number == number + 1:
@@ -220,8 +200,8 @@ def _wrong_head(
 
 
 def place_of(entry: AuditEntry, last: int) -> str:
-    """Whether an entry was altered, or stands under the number of another one."""
+    """Return whether an entry was altered, or has the number of another entry."""
     for number in range(1, last + 1):
         if recomputed(replace(entry, number=number)) == entry.hash:
-            return f"entry {entry.number} is out of order: what stands there is entry {number}"
+            return f"entry {entry.number} is out of order: it holds entry {number}"
     return f"entry {entry.number} was altered"

@@ -1,4 +1,4 @@
-"""Who may do what: roles, accounts, sessions and keys as values."""
+"""Roles, accounts, sessions and keys as values."""
 
 import re
 import secrets
@@ -10,26 +10,26 @@ from types import MappingProxyType
 
 
 class Permission(StrEnum):
-    """Something that an operation of the service needs."""
+    """Permission required by an operation of the service."""
 
     READ = "read"
-    """See the plant: results, alarms, evidence, health."""
+    """Read the plant: results, alarms, evidence, health."""
 
     ACT_ON_ALARMS = "act_on_alarms"
     """Acknowledge, comment and shelve alarms."""
 
     CHANGE_MEASURING = "change_measuring"
-    """References, baselines, alarms out of service, recordings, sending again."""
+    """Change references, baselines, alarms out of service and recordings; send messages again."""
 
     READ_AUDIT = "read_audit"
-    """See who did what."""
+    """Read the audit trail."""
 
     CHANGE_ACCESS = "change_access"
-    """Accounts and keys."""
+    """Change accounts and keys."""
 
 
 class Role(StrEnum):
-    """What somebody is to the plant, from the least to the most."""
+    """Role of an account or key, from the lowest to the highest."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"
@@ -38,11 +38,11 @@ class Role(StrEnum):
 
     @property
     def rank(self) -> int:
-        """Place in the order of roles; higher roles may all that lower ones may."""
+        """Position in the order of roles; a role includes the permissions of lower ones."""
         return tuple(Role).index(self)
 
     def may(self, permission: Permission) -> bool:
-        """Whether the role has a permission."""
+        """Return whether the role has a permission."""
         return self.rank >= MIN_ROLE[permission].rank
 
 
@@ -55,33 +55,33 @@ MIN_ROLE: Mapping[Permission, Role] = MappingProxyType(
         Permission.CHANGE_ACCESS: Role.ADMIN,
     }
 )
-"""The lowest role that has each permission."""
+"""Lowest role that has each permission."""
 
 
 class Means(StrEnum):
-    """How somebody showed who they are."""
+    """Method of authentication."""
 
     SESSION = "session"
     KEY = "key"
 
     LOCAL = "local"
-    """By being on this computer."""
+    """None: the request comes from this computer."""
 
 
 @dataclass(frozen=True)
 class Identity:
-    """A person or machine whose right to be here has been checked for this one request.
+    """Authenticated person or machine behind one request.
 
     Parameters
     ----------
     name
-        Of the account or the key, or `LOCAL`.
+        Name of the account or the key, or `LOCAL`.
     role
-        As it is now, not as it was at login.
+        Current role, which may differ from that at login.
     units
-        The only units that are open to it; empty for all.
+        Units to which access is limited; empty for all.
     must_change_password
-        Whether nothing is open to it before it has changed a password that somebody else has set.
+        Whether the only permitted operation is changing the password, which another person has set.
     """
 
     name: str
@@ -92,18 +92,18 @@ class Identity:
 
     @property
     def actor(self) -> str:
-        """What is written beside actions; a key is told from an account of the same name."""
+        """Name recorded with actions; distinguishes a key from an account of the same name."""
         return f"key:{self.name}" if self.means is Means.KEY else self.name
 
     @property
     def is_proven(self) -> bool:
-        """Whether its name is more than a place."""
+        """Whether the identity was authenticated, not only located on this computer."""
         return self.means is not Means.LOCAL
 
     def may(self, permission: Permission, unit: str | None = None) -> bool:
-        """Whether it may do something, to a unit or to what belongs to no single unit.
+        """Return whether an operation is permitted, for a unit or for data of no single unit.
 
-        A key for some units may see, but not change, what belongs to no single unit.
+        A key that is limited to units may read data of no single unit, but not change them.
         """
         if not self.role.may(permission):
             return False
@@ -113,7 +113,7 @@ class Identity:
 
 
 LOCAL = "local"
-"""Name of a program or browser on this computer that shows nothing."""
+"""Name of an unauthenticated program or browser on this computer."""
 
 
 NS_PER_S = 1_000_000_000
@@ -121,14 +121,14 @@ NS_PER_S = 1_000_000_000
 
 @dataclass(frozen=True)
 class Session:
-    """A login of an account, as it is stored.
+    """Login of an account, as stored.
 
     Parameters
     ----------
     digest
-        Of the token in the browser's cookie.
+        Digest of the token in the browser's cookie.
     seen_ns
-        When it was last used, to `SessionLimits.step_s`.
+        Time of the last use, to a resolution of `SessionLimits.step_s`.
     """
 
     digest: bytes = field(repr=False)
@@ -139,18 +139,18 @@ class Session:
 
 @dataclass(frozen=True)
 class SessionLimits:
-    """When a login ends by itself.
+    """Limits of the lifetime of a session.
 
     Parameters
     ----------
     idle_s
-        After the last use.
+        Maximum time since the last use.
     absolute_s
-        After the login, whatever is done with it.
+        Maximum time since the login.
     step_s
-        How exactly the last use is noted; each note is a write to the disk.
+        Resolution of the stored time of last use; each update is a write to the disk.
     slack_s
-        How far a session may lie in the future: a host's clock may be put right by so much.
+        Maximum time by which a session may lie in the future, after the host clock was corrected.
     """
 
     idle_s: float = 1800.0
@@ -159,30 +159,31 @@ class SessionLimits:
     slack_s: float = 300.0
 
     def is_live(self, session: Session, now_ns: int) -> bool:
-        """Whether a session may still be used.
+        """Return whether a session is valid.
 
-        One from the future is not: a clock that was years ahead must leave no eternal logins.
+        A session from the future is not: a clock that ran years ahead must not leave permanent
+        logins.
         """
         age_s = (now_ns - session.created_ns) / NS_PER_S
         idle_s = (now_ns - session.seen_ns) / NS_PER_S
         return -self.slack_s <= age_s < self.absolute_s and -self.slack_s <= idle_s < self.idle_s
 
     def is_news(self, session: Session, now_ns: int) -> bool:
-        """Whether the last use is so long ago that this one is to be noted."""
+        """Return whether the stored time of last use must be updated."""
         return now_ns - session.seen_ns >= self.step_s * NS_PER_S
 
     def oldest_ns(self, now_ns: int) -> int:
-        """Sessions that were begun before this are over."""
+        """Return the time before which every session has ended."""
         return now_ns - round(self.absolute_s * NS_PER_S)
 
 
 MAX_DAYS = 3650
 SEEN_STEP_NS = 60 * 1_000_000_000
-"""How exactly the last use is noted; each note is a write to the disk."""
+"""Resolution of the stored time of last use; each update is a write to the disk."""
 
 
 class KeyState(StrEnum):
-    """Whether a key opens anything."""
+    """State of a key."""
 
     VALID = "valid"
     EXPIRED = "expired"
@@ -191,20 +192,20 @@ class KeyState(StrEnum):
 
 @dataclass(frozen=True)
 class ApiKey:
-    """A key as it is stored: never the key itself.
+    """Key as stored, without the secret.
 
     Parameters
     ----------
     id
-        Public; part of the key.
+        Public identifier, part of the key.
     digest
-        Of the whole key.
+        Digest of the whole key.
     units
-        The only units that it opens; empty for all.
+        Units to which the key is limited; empty for all.
     used_ns
-        Its last use, to a minute; None if it never was.
+        Time of the last use, to a minute; None if unused.
     revoked_ns
-        When it was taken back; None if it was not.
+        Time of revocation; None if not revoked.
     """
 
     id: str
@@ -218,13 +219,13 @@ class ApiKey:
     revoked_ns: int | None = None
 
     def state(self, now_ns: int) -> KeyState:
-        """Whether it opens anything at a time."""
+        """Return the state of the key at a time."""
         if self.revoked_ns is not None:
             return KeyState.REVOKED
         return KeyState.VALID if now_ns < self.expires_ns else KeyState.EXPIRED
 
     def is_news(self, now_ns: int) -> bool:
-        """Whether the last use is so long ago that this one is to be noted."""
+        """Return whether the stored time of last use must be updated."""
         return self.used_ns is None or now_ns - self.used_ns >= SEEN_STEP_NS
 
 
@@ -233,16 +234,16 @@ NAME = re.compile(r"[a-z0-9](?:[a-z0-9._@-]{0,62}[a-z0-9])?", re.ASCII)
 
 
 class NameRefusedError(ValueError):
-    """No name for an account or a key; the message says what is."""
+    """Invalid name of an account or a key; the message gives the rules."""
 
 
 def account_name(written: str) -> str:
-    """Bring a name to the one way in which it is stored: a name is not told apart by its case.
+    """Return a name in its stored form, which is in lower case.
 
     Raises
     ------
     NameRefusedError
-        If it is none.
+        If it is invalid.
     """
     name = written.strip().lower()
     if NAME.fullmatch(name) is None:
@@ -254,7 +255,7 @@ def account_name(written: str) -> str:
 
 
 N_BYTES = 32
-"""256 bits: a digest without salt or stretching is enough, nobody can guess through it."""
+"""256 bits cannot be guessed, so that a digest without salt or stretching suffices."""
 
 KEY_ID_BYTES = 6
 TOKEN = re.compile(r"[A-Za-z0-9_-]{43}", re.ASCII)
@@ -262,32 +263,32 @@ KEY = re.compile(r"pw_([0-9a-f]{12})_[A-Za-z0-9_-]{43}", re.ASCII)
 
 
 def new_token() -> str:
-    """Draw a token for a session or for setting up."""
+    """Return a random token for a session or for setting up."""
     return secrets.token_urlsafe(N_BYTES)
 
 
 def new_key() -> tuple[str, str]:
-    """Draw a key for a machine: its public id and the whole key, which begins with it."""
+    """Return a random key: its public identifier, and the whole key."""
     id_ = secrets.token_hex(KEY_ID_BYTES)
     return id_, f"pw_{id_}_{secrets.token_urlsafe(N_BYTES)}"
 
 
 def key_id(key: str) -> str | None:
-    """Read the public id in a key; None if it is no key at all."""
+    """Return the public identifier in a key; None if the text is not a key."""
     found = KEY.fullmatch(key)
     return found.group(1) if found else None
 
 
 def is_token(text: str) -> bool:
-    """Whether a text could be a token at all."""
+    """Return whether a text has the form of a token."""
     return TOKEN.fullmatch(text) is not None
 
 
 def digest(token: str) -> bytes:
-    """What is stored of a token."""
+    """Return the digest of a token, as stored."""
     return sha256(token.encode()).digest()
 
 
 def is_token_of(token: str, stored: bytes) -> bool:
-    """Whether a token has a stored digest, in a time that does not tell how nearly."""
+    """Return whether a token has a stored digest, in constant time."""
     return secrets.compare_digest(digest(token), stored)

@@ -1,24 +1,56 @@
-"""Accounts, sessions and keys in the database."""
+"""Accounts, sessions and keys in the database.
+
+A change and its audit entries are on the disk when the method that makes it returns.
+"""
 
 import json
+from dataclasses import dataclass, field
 from typing import Any
 
 from service.store.access.audit_entries import AuditAction, Document, acting
 from service.store.access.identities import ApiKey, Role, Session
-from service.store.access.port import AccessRefusedError, Account
-from service.store.audit_chain import AuditChain
-from service.store.database import Connect, Connection
+from service.store.audit import AuditChain, AuditedTables
+from service.store.database import Connection, Reading
 
 
-def account_deed(
+class AccessRefusedError(Exception):
+    """A change of accounts or keys is refused; the message says why."""
+
+
+@dataclass(frozen=True)
+class Account:
+    """Account of a person.
+
+    Parameters
+    ----------
+    password_hash
+        Argon2id hash in its usual text form, which holds its parameters.
+    password_number
+        Number of the password; a session belongs to the password with which it was begun.
+    password_ns
+        Time at which the password was set.
+    must_change
+        Whether another person set the password, so that it permits only changing it.
+    """
+
+    name: str
+    role: Role
+    password_hash: str = field(repr=False)
+    password_number: int
+    created_ns: int
+    password_ns: int
+    must_change: bool = False
+
+
+def _account_action(
     done: str, name: str, now_ns: int, before: Role | None = None, after: Role | None = None
 ) -> AuditAction:
-    """Something that has been done to an account, with its role before and after."""
-    return _deed(f"account.{done}", name, now_ns, _role_document(before), _role_document(after))
+    """Return the audit entry about a change of an account, with its role before and after."""
+    return _action(f"account.{done}", name, now_ns, _role_document(before), _role_document(after))
 
 
-def key_deed(done: str, id_: str, now_ns: int, made: ApiKey | None = None) -> AuditAction:
-    """Something that has been done to a key, with what it opens if it is new."""
+def _key_action(done: str, id_: str, now_ns: int, made: ApiKey | None = None) -> AuditAction:
+    """Return the audit entry about a change of a key, with its permissions if it is new."""
     after = None
     if made is not None:
         after = {
@@ -27,20 +59,24 @@ def key_deed(done: str, id_: str, now_ns: int, made: ApiKey | None = None) -> Au
             "units": list(made.units),
             "expires_ns": made.expires_ns,
         }
-    return _deed(f"key.{done}", id_, now_ns, None, after)
+    return _action(f"key.{done}", id_, now_ns, None, after)
 
 
 def _role_document(role: Role | None) -> Document:
     return None if role is None else {"role": role.value}
 
 
-def _deed(action: str, object_: str, now_ns: int, before: Document, after: Document) -> AuditAction:
+def _action(
+    action: str, object_: str, now_ns: int, before: Document, after: Document
+) -> AuditAction:
     who = acting()
-    return AuditAction(now_ns, who.actor, action, object_, before, after, source=who.source, peer=who.peer)
+    return AuditAction(
+        now_ns, who.actor, action, object_, before, after, source=who.source, peer=who.peer
+    )
 
 
 MAX_SESSIONS = 16
-"""Of one account; the oldest end when there are more."""
+"""Maximum number of sessions per account; beyond it the oldest end."""
 
 SELECT_ACCOUNTS = """
     SELECT name, role, password_hash, password_number, created_ns, password_ns, must_change
@@ -64,57 +100,46 @@ END_OLDEST = """
 """
 
 
-class SqlAccounts:
-    """The accounts of one database.
-
-    Parameters
-    ----------
-    write, read
-        A transaction of the database's one writer, and a short look at it; both raise `StoreError`.
-    audit
-        Told of each change in its own transaction.
-    """
-
-    def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
-        self._write, self._read, self._audit = write, read, audit
+class AccountStore(AuditedTables):
+    """Accounts of people."""
 
     def add(
         self, name: str, role: Role, password_hash: str, now_ns: int, must_change: bool = False
     ) -> None:
-        """Add an account; refused if there is another one of that name."""
-        with self._write() as writer:
+        """Add an account. Raises `AccessRefusedError` if the name is taken."""
+        with self._writing() as writer:
             found = writer.execute(SELECT_ACCOUNTS, {"name": name}).fetchone()
             if found and tuple(found[:3]) == (name, role.value, password_hash):
-                return  # by a call whose end nobody could tell: no two hashes are alike
+                return  # already written by a call whose outcome was unknown: hashes are unique
             if not insert_account(writer, name, role, password_hash, now_ns, must_change):
-                raise AccessRefusedError(f"there is an account {name} already")
-            self._audit.add(writer, [account_deed("added", name, now_ns, after=role)])
+                raise AccessRefusedError(f"account {name} already exists")
+            self._audit.add(writer, [_account_action("added", name, now_ns, after=role)])
 
     def get(self, name: str) -> Account | None:
-        """Read an account; None if there is none of that name."""
-        with self._read() as reader:
+        """Return an account; None if there is none of that name."""
+        with self._reading() as reader:
             row = reader.execute(SELECT_ACCOUNTS, {"name": name}).fetchone()
         return _account(row) if row else None
 
     def all(self) -> list[Account]:
-        """Read every account, by name."""
-        with self._read() as reader:
+        """Return all accounts, by name."""
+        with self._reading() as reader:
             return [_account(row) for row in reader.execute(SELECT_ACCOUNTS, {"name": None})]
 
     def set_role(self, name: str, role: Role, now_ns: int) -> None:
-        """Change a role; refused if no admin would be left."""
-        with self._write() as writer:
+        """Change a role; `AccessRefusedError` if no admin would be left, or it is unknown."""
+        with self._writing() as writer:
             before = _role(writer, name)
             if role is not Role.ADMIN:
                 _require_other_admin(writer, name, before)
             writer.execute("UPDATE account SET role = ? WHERE name = ?", (role.value, name))
-            self._audit.add(writer, [account_deed("role_set", name, now_ns, before, role)])
+            self._audit.add(writer, [_account_action("role_set", name, now_ns, before, role)])
 
     def set_password(
         self, name: str, password_hash: str, now_ns: int, must_change: bool = False
     ) -> None:
-        """Change a password and end all sessions of the account."""
-        with self._write() as writer:
+        """Change a password and end all sessions; `AccessRefusedError` if it is unknown."""
+        with self._writing() as writer:
             _role(writer, name)
             writer.execute(
                 "UPDATE account SET password_hash = ?, password_number = password_number + 1,"
@@ -122,11 +147,11 @@ class SqlAccounts:
                 (password_hash, now_ns, int(must_change), name),
             )
             writer.execute("DELETE FROM session WHERE account = ?", (name,))
-            self._audit.add(writer, [account_deed("password_set", name, now_ns)])
+            self._audit.add(writer, [_account_action("password_set", name, now_ns)])
 
     def rehash(self, account: Account, password_hash: str) -> None:
-        """Write the same password's new hash, unless the password has changed meanwhile."""
-        with self._write() as writer:
+        """Write a new hash of the same password, unless the password has changed meanwhile."""
+        with self._writing() as writer:
             writer.execute(
                 "UPDATE account SET password_hash = ? WHERE name = ? AND password_number = ?"
                 " AND created_ns = ?",
@@ -134,40 +159,37 @@ class SqlAccounts:
             )
 
     def remove(self, name: str, now_ns: int) -> None:
-        """Remove an account with its sessions; refused if others would be left without admin."""
-        with self._write() as writer:
+        """Remove an account with its sessions.
+
+        Raises `AccessRefusedError` if others would be left without an admin, or it is unknown.
+        """
+        with self._writing() as writer:
             role = _role(writer, name)
             if writer.execute(IS_OTHER, (name,)).fetchone()[0]:
                 _require_other_admin(writer, name, role)
             writer.execute("DELETE FROM account WHERE name = ?", (name,))
-            self._audit.add(writer, [account_deed("removed", name, now_ns, before=role)])
+            self._audit.add(writer, [_account_action("removed", name, now_ns, before=role)])
 
 
-class SqlSessions:
-    """The sessions of one database.
-
-    Parameters
-    ----------
-    write, read
-        As for `SqlAccounts`; logins are told of where they are asked for.
-    """
-
-    def __init__(self, write: Connect, read: Connect) -> None:
-        self._write, self._read = write, read
+class SessionStore(AuditedTables):
+    """Sessions of accounts; logins are recorded by their callers."""
 
     def add(self, session: Session, password_number: int, oldest_ns: int) -> bool:
-        """Begin a session, unless the password it was given for is no longer the account's."""
+        """Begin a session; return False if the password has changed since it was checked.
+
+        Sessions begun before `oldest_ns`, and the oldest above `MAX_SESSIONS`, are deleted.
+        """
         name = session.account
         row = (session.digest, session.created_ns, session.seen_ns, name, password_number)
-        with self._write() as writer:
+        with self._writing() as writer:
             writer.execute("DELETE FROM session WHERE created_ns < ?", (oldest_ns,))
             is_begun = writer.execute(INSERT_SESSION, row).rowcount == 1
             writer.execute(END_OLDEST, (name, name, MAX_SESSIONS))
         return is_begun
 
     def get(self, digest: bytes) -> tuple[Session, Account] | None:
-        """Read a session with its account as it is now."""
-        with self._read() as reader:
+        """Return a session with the current state of its account; None if there is none."""
+        with self._reading() as reader:
             row = reader.execute(SELECT_SESSION, (digest,)).fetchone()
         if row is None:
             return None
@@ -175,18 +197,18 @@ class SqlSessions:
         return Session(bytes(row[0]), account.name, row[1], row[2]), account
 
     def see(self, digest: bytes, now_ns: int) -> None:
-        """Note that a session was used."""
-        with self._write() as writer:
+        """Record the use of a session."""
+        with self._writing() as writer:
             writer.execute("UPDATE session SET seen_ns = ? WHERE digest = ?", (now_ns, digest))
 
     def end(self, digest: bytes) -> None:
-        """End a session; ending it twice is fine."""
-        with self._write() as writer:
+        """End a session; ending it twice has no effect."""
+        with self._writing() as writer:
             writer.execute("DELETE FROM session WHERE digest = ?", (digest,))
 
     def end_all(self) -> None:
-        """End the sessions of all accounts."""
-        with self._write() as writer:
+        """End all sessions of all accounts."""
+        with self._writing() as writer:
             writer.execute("DELETE FROM session")
 
 
@@ -198,20 +220,20 @@ def insert_account(
     now_ns: int,
     must_change: bool = False,
 ) -> bool:
-    """Add an account unless there is one of that name; whether it was added."""
+    """Add an account and return True, or return False if the name is taken."""
     row = (name, role.value, password_hash, now_ns, now_ns, int(must_change))
     insert = "INSERT INTO account VALUES (?, ?, ?, 1, ?, ?, ?) ON CONFLICT (name) DO NOTHING"
     return writer.execute(insert, row).rowcount == 1
 
 
 def _require_other_admin(writer: Connection, name: str, role: Role) -> None:
-    """Refuse what would leave no admin; an account that is no admin may change as it likes."""
+    """Raise `AccessRefusedError` if the account is the only admin."""
     if role is Role.ADMIN and not writer.execute(IS_OTHER_ADMIN, (name,)).fetchone()[0]:
-        raise AccessRefusedError(f"{name} is the only admin; make somebody else one first")
+        raise AccessRefusedError(f"{name} is the only admin; make another account admin first")
 
 
 def _role(writer: Connection, name: str) -> Role:
-    """Role of an account that is about to be changed; refused if there is none such."""
+    """Return the role of an account; raise `AccessRefusedError` if it is unknown."""
     row = writer.execute("SELECT role FROM account WHERE name = ?", (name,)).fetchone()
     if row is None:
         raise AccessRefusedError(f"there is no account {name}")
@@ -234,107 +256,86 @@ IS_TAKEABLE = """
 """
 
 
-class SqlKeys:
-    """The keys of one database.
-
-    Parameters
-    ----------
-    write, read, audit
-        As for `SqlAccounts`.
-    """
-
-    def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
-        self._write, self._read, self._audit = write, read, audit
+class KeyStore(AuditedTables):
+    """API keys of machines."""
 
     def add(self, key: ApiKey) -> None:
-        """Add a key; called again with the same one, it is nothing."""
+        """Add a key; adding the same key again has no effect."""
         units = json.dumps(key.units)
         made = (key.id, key.name, key.digest, key.role.value, units, key.created_ns, key.expires_ns)
-        with self._write() as writer:
+        with self._writing() as writer:
             found = writer.execute(SELECT_KEYS, {"id": key.id}).fetchone()
             if found and _key(found) == key:
-                return  # by a call whose end nobody could tell
+                return  # already written by a call whose outcome was unknown
             writer.execute("INSERT INTO api_key VALUES (?, ?, ?, ?, ?, ?, ?, NULL, NULL)", made)
-            self._audit.add(writer, [key_deed("created", key.id, key.created_ns, key)])
+            self._audit.add(writer, [_key_action("created", key.id, key.created_ns, key)])
 
     def get(self, id_: str) -> ApiKey | None:
-        """Read a key; None if there is none with that id."""
-        with self._read() as reader:
+        """Return a key; None if the id is unknown."""
+        with self._reading() as reader:
             row = reader.execute(SELECT_KEYS, {"id": id_}).fetchone()
         return _key(row) if row else None
 
     def all(self) -> list[ApiKey]:
-        """Read every key that ever was, oldest first."""
-        with self._read() as reader:
+        """Return all keys, also revoked and expired ones, oldest first."""
+        with self._reading() as reader:
             return [_key(row) for row in reader.execute(SELECT_KEYS, {"id": None})]
 
     def see(self, id_: str, now_ns: int) -> None:
-        """Note that a key was used."""
-        with self._write() as writer:
+        """Record the use of a key."""
+        with self._writing() as writer:
             writer.execute("UPDATE api_key SET used_ns = ? WHERE id = ?", (now_ns, id_))
 
     def revoke(self, id_: str, now_ns: int) -> bool:
-        """Take a key back for ever; whether it was not taken back before."""
+        """Revoke a key permanently; return False if it was revoked before."""
         revoke = "UPDATE api_key SET revoked_ns = ? WHERE id = ? AND revoked_ns IS NULL"
-        with self._write() as writer:
+        with self._writing() as writer:
             is_news = writer.execute(revoke, (now_ns, id_)).rowcount == 1
             if is_news:
-                self._audit.add(writer, [key_deed("revoked", id_, now_ns)])
+                self._audit.add(writer, [_key_action("revoked", id_, now_ns)])
         return is_news
 
 
-class SqlSetUp:
-    """The set-up token of one database.
-
-    Parameters
-    ----------
-    write, read, audit
-        As for `SqlAccounts`.
-    """
-
-    def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
-        self._write, self._read, self._audit = write, read, audit
+class SetUpStore(AuditedTables):
+    """Token with which the first account is created."""
 
     def offer(self, digest: bytes, expires_ns: int) -> bool:
-        """Put a token in the place of any before it; not if there is an account."""
+        """Replace the token; return False if an account exists."""
         offer = """
             INSERT INTO set_up_token SELECT 1, ?, ? WHERE NOT EXISTS (SELECT 1 FROM account)
             ON CONFLICT (id) DO UPDATE SET
             digest = excluded.digest, expires_ns = excluded.expires_ns
         """
-        with self._write() as writer:
+        with self._writing() as writer:
             return writer.execute(offer, (digest, expires_ns)).rowcount == 1
 
     def holds(self, digest: bytes, now_ns: int) -> bool:
-        """Whether a token could be taken now."""
-        with self._read() as reader:
+        """Return whether a token is valid now."""
+        with self._reading() as reader:
             return bool(reader.execute(IS_TAKEABLE, (digest, now_ns)).fetchone()[0])
 
     def take(self, digest: bytes, name: str, password_hash: str, now_ns: int) -> bool:
-        """Make the first account, an admin, and use the token up."""
-        with self._write() as writer:
+        """Create the first account, an admin, and delete the token.
+
+        Returns False if the token is wrong or expired, or an account exists.
+        """
+        with self._writing() as writer:
             if not writer.execute(IS_TAKEABLE, (digest, now_ns)).fetchone()[0]:
                 return False
             writer.execute("DELETE FROM set_up_token")
             insert_account(writer, name, Role.ADMIN, password_hash, now_ns)
-            self._audit.add(writer, [account_deed("set_up", name, now_ns, after=Role.ADMIN)])
+            self._audit.add(writer, [_account_action("set_up", name, now_ns, after=Role.ADMIN)])
         return True
 
 
-class SqlAccess:
-    """All that one database says about who may come in.
+class AccessStore:
+    """Stored access: accounts, sessions, keys and the set-up token."""
 
-    Parameters
-    ----------
-    write, read, audit
-        As for `SqlAccounts`.
-    """
-
-    def __init__(self, write: Connect, read: Connect, audit: AuditChain) -> None:
-        self.accounts = SqlAccounts(write, read, audit)
-        self.sessions = SqlSessions(write, read)
-        self.keys = SqlKeys(write, read, audit)
-        self.set_up = SqlSetUp(write, read, audit)
+    def __init__(self, chain: AuditChain, reading: Reading) -> None:
+        self.accounts = AccountStore(chain, reading)
+        self.sessions = SessionStore(chain, reading)
+        self.keys = KeyStore(chain, reading)
+        self.set_up = SetUpStore(chain, reading)
 
 
 def _key(row: tuple[Any, ...]) -> ApiKey:
@@ -347,7 +348,7 @@ MUST_CHANGE = """
     ALTER TABLE account ADD COLUMN must_change INTEGER NOT NULL DEFAULT 0
         CHECK (must_change IN (0, 1));
 """
-"""Whether a password was set by somebody else, and must be changed at the next login."""
+"""Migration that adds whether a password was set by another person and must be changed."""
 
 ACCESS_TABLES = """
     CREATE TABLE account (
@@ -390,4 +391,4 @@ ACCESS_TABLES = """
     BEFORE UPDATE OF id, name, digest, role, units, created_ns, expires_ns ON api_key
     BEGIN SELECT RAISE(ABORT, 'keys are kept as they were made'); END;
     """
-"""No secret is here: passwords as argon2id hashes, tokens and keys as digests."""
+"""Migration that creates the tables, which hold no secrets but argon2id hashes and digests."""

@@ -1,1 +1,1 @@
-"""The high-water mark: a file beside the database that knows how far the database had come."""
+"""High-water mark, which detects a database that was restored from an older copy."""

@@ -1,15 +1,150 @@
-"""`CommitMarks`: counts transactions in the database, and notes the count beside it."""
+"""Commit counter that detects a database restored from an older copy."""
 
+import hashlib
 import os
+import sqlite3
 from collections.abc import Callable, Sequence
-from dataclasses import astuple
-from typing import Any, Protocol
+from contextlib import closing
+from dataclasses import astuple, dataclass
+from datetime import UTC, datetime
+from enum import StrEnum
+from pathlib import Path
 
-from service.store.highwater.comparison import MarkFinding, compared
-from service.store.highwater.file import MarkError, MarkFile, NoMarkError
-from service.store.highwater.host import host_id
-from service.store.highwater.mark import Mark
+from core.units import s_from_ns
+from service.store.database import Connection
+from service.store.highwater.mark import Mark, MarkError, MarkFile, NoMarkError, mark_path
 from service.store.port import StoreError
+
+MACHINE_ID = Path("/etc/machine-id")
+NO_HOST = ""
+
+
+def host_id(machine_id: Path = MACHINE_ID) -> str:
+    """Return an identifier of this machine that does not reveal its own.
+
+    Empty where machines have none, as in many containers.
+    """
+    try:
+        text = machine_id.read_bytes().strip()
+    except OSError:
+        return NO_HOST
+    if not text or text == b"uninitialized":
+        return NO_HOST
+    return hashlib.blake2b(text, key=b"padwatch", digest_size=8).hexdigest()
+
+
+MAX_BEHIND = 64
+"""Maximum number of transactions by which the file may lag; a crash omits each process's last."""
+
+
+class Kind(StrEnum):
+    """Kind of a difference."""
+
+    ROLLED_BACK = "rolled_back"
+    REPLACED = "replaced"
+    MARK_LOST = "mark_lost"
+    MARK_BEHIND = "mark_behind"
+    OTHER_HOST = "other_host"
+
+
+@dataclass(frozen=True)
+class MarkFinding:
+    """Difference between the mark in the file and that in the database.
+
+    Parameters
+    ----------
+    n_missing
+        Number of committed transactions that are missing; None if unknown.
+    detail
+        Sentence that describes it.
+    """
+
+    kind: Kind
+    n_missing: int | None
+    detail: str
+
+
+def compared(mark: Mark | str, database: Mark, host: str) -> list[MarkFinding]:
+    """Return the differences; none if the database is the newest.
+
+    Parameters
+    ----------
+    mark
+        Mark in the file, read before that in the database; or the reason why there is none.
+    host
+        Identifier of this machine.
+    """
+    if isinstance(mark, str):
+        return [MarkFinding(Kind.MARK_LOST, None, _lost(mark, database))]
+    found = _history(mark, database)
+    if NO_HOST not in (host, mark.host) and mark.host != host:
+        found.append(MarkFinding(Kind.OTHER_HOST, None, OTHER_HOST))
+    return found
+
+
+OTHER_HOST = (
+    "the data folder was last written by another machine: if padwatch still runs there, two"
+    " services monitor the same plant"
+)
+
+
+def _history(mark: Mark, database: Mark) -> list[MarkFinding]:
+    if mark.store != database.store:
+        return [MarkFinding(Kind.REPLACED, None, _replaced(mark, database))]
+    n_missing = mark.n_commits - database.n_commits
+    if n_missing > 0:
+        return [MarkFinding(Kind.ROLLED_BACK, n_missing, _rolled_back(mark, database))]
+    if n_missing == 0 and mark.nonce != database.nonce:
+        return [MarkFinding(Kind.ROLLED_BACK, None, _parted(mark, database))]
+    if n_missing < -MAX_BEHIND:
+        return [MarkFinding(Kind.MARK_BEHIND, 0, _behind(mark, database))]
+    return []
+
+
+def _rolled_back(mark: Mark, database: Mark) -> str:
+    n = mark.n_commits - database.n_commits
+    last, known = _when(database.time_ns), _when(mark.time_ns)
+    return (
+        f"the database was rolled back: {n} transactions, written after {last} and up to {known},"
+        " are missing"
+    )
+
+
+def _parted(mark: Mark, database: Mark) -> str:
+    return (
+        f"the database is not the last one used here: transaction {database.n_commits} differs from"
+        f" that of {_when(mark.time_ns)}"
+    )
+
+
+def _replaced(mark: Mark, database: Mark) -> str:
+    return (
+        f"the database was replaced by another one: {mark.n_commits} transactions up to"
+        f" {_when(mark.time_ns)} were in the one before, {database.n_commits} are in this one"
+    )
+
+
+def _behind(mark: Mark, database: Mark) -> str:
+    return (
+        f"the high-water mark is older than the database: it counts {mark.n_commits} transactions"
+        f" of {database.n_commits}"
+    )
+
+
+def _lost(why: str, database: Mark) -> str:
+    return (
+        f"the high-water mark {why}: it is unknown whether the database, whose last transaction is"
+        f" of {_when(database.time_ns)}, is the newest"
+    )
+
+
+def _when(time_ns: int) -> str:
+    try:
+        moment = datetime.fromtimestamp(s_from_ns(time_ns), UTC)
+    except (ValueError, OverflowError, OSError):
+        return "an unknown time"
+    return f"{moment:%Y-%m-%dT%H:%M:%SZ}"
+
 
 CREATE = """
     CREATE TABLE IF NOT EXISTS high_water (
@@ -21,36 +156,35 @@ CREATE = """
         time_ns INTEGER NOT NULL
     ) STRICT
 """
-"""No migration: PostgreSQL, where one row for all writers would hold them up, has no such table."""
+"""Not a migration: in PostgreSQL one row would block all writers."""
 
 COLUMNS = "store, host, n_commits, nonce, time_ns"
 SELECT = """
     SELECT CAST(store AS BLOB), CAST(host AS BLOB), n_commits, CAST(nonce AS BLOB), time_ns
     FROM high_water WHERE id = 1
 """
-"""Texts as bytes: what is damaged need not be text."""
+"""Texts as bytes, since damaged text may not be UTF-8."""
 PUT = f"INSERT OR REPLACE INTO high_water (id, {COLUMNS}) VALUES (1, ?, ?, ?, ?, ?)"  # noqa: S608
 
 
-class Writer(Protocol):
-    """A connection within a transaction."""
-
-    def execute(self, statement: str, parameters: Any = ..., /) -> Any:
-        """Carry out a statement."""
-        ...
-
-
 class CommitMarks:
-    """The marks of one database, used by whoever holds its writer.
+    """Marks of one database; used only by the holder of its writing connection.
 
     Parameters
     ----------
     file
-        Beside the database.
+        File beside the database.
     now_ns
-        Clock on the wall.
+        Wall clock.
     host
-        Name of this machine.
+        Returns the identifier of this machine.
+
+    Attributes
+    ----------
+    found
+        Differences at opening, until they are adopted.
+    error
+        Error of the last attempt to write the file; None if it succeeded.
     """
 
     def __init__(
@@ -61,34 +195,34 @@ class CommitMarks:
         self.found: Sequence[MarkFinding] = ()
         self.error: str | None = None
 
-    def open(self, writer: Writer, said: Mark | str | None) -> None:
-        """Compare the file with the database that has just been opened, within a transaction.
+    def open(self, writer: Connection, in_file: Mark | str | None) -> None:
+        """Compare the file with a database that has just been opened, within a transaction.
 
-        A database without a mark gets one, and so does the folder where there was none before.
+        A database without a mark gets one, as does a folder without a file.
         """
         writer.execute(CREATE)
         mark = select_mark(writer)
         if mark is None:
-            mark = Mark(_chance(16), self._host, 0, _chance(8), self._now_ns())
+            mark = Mark(_random_hex(16), self._host, 0, _random_hex(8), self._now_ns())
             writer.execute(PUT, astuple(mark))
-            if said is None:
+            if in_file is None:
                 self._file.replace(mark)
                 return
-        self.found = compared("is not there" if said is None else said, mark, self._host)
+        self.found = compared("is not there" if in_file is None else in_file, mark, self._host)
 
-    def count(self, writer: Writer) -> None:
-        """Count the transaction that is about to be committed, in it."""
+    def count(self, writer: Connection) -> None:
+        """Count the current transaction, within it."""
         if self.found:
-            return  # what was found stays to be seen until it is adopted
+            return  # the differences stay visible until they are adopted
         last = select_mark(writer)
         if last is None:
             raise StoreError("the database has lost its high-water mark")
         self._put(writer, last, last.n_commits + 1)
 
     def settle(self) -> None:
-        """Note beside the database what has been committed.
+        """Write the committed mark to the file.
 
-        What is on the disk is not undone because of it: until it succeeds the file lags.
+        If that fails, the transaction stays committed and the file lags behind until it succeeds.
         """
         if self._newest is None or self.found:
             return
@@ -99,17 +233,17 @@ class CommitMarks:
         else:
             self.error = None
 
-    def adopt(self, writer: Writer) -> None:
-        """Take the database as it is for the newest, within a transaction."""
-        last, said = select_mark(writer), self.said()
+    def adopt(self, writer: Connection) -> None:
+        """Accept the database as the newest, within a transaction."""
+        last, in_file = select_mark(writer), self.in_file()
         if last is None:
             raise StoreError("the database has lost its high-water mark")
-        n_before = said.n_commits if isinstance(said, Mark) else 0
-        # beyond both, so that no mark of before fits ever again
+        n_before = in_file.n_commits if isinstance(in_file, Mark) else 0
+        # above both, so that no earlier mark ever fits again
         self._put(writer, last, max(last.n_commits, n_before) + 1)
 
     def adopted(self) -> None:
-        """Note beside the database what was adopted; if that fails, it will be found again."""
+        """Write the adopted mark to the file; if that fails, the differences are found again."""
         if self._newest is None:
             return
         try:
@@ -119,14 +253,14 @@ class CommitMarks:
         else:
             self.found, self.error = (), None
 
-    def _put(self, writer: Writer, last: Mark, n_commits: int) -> None:
-        self._newest = Mark(last.store, self._host, n_commits, _chance(8), self._now_ns())
+    def _put(self, writer: Connection, last: Mark, n_commits: int) -> None:
+        self._newest = Mark(last.store, self._host, n_commits, _random_hex(8), self._now_ns())
         writer.execute(PUT, astuple(self._newest))
 
-    def said(self) -> Mark | str | None:
-        """What the file says, or why it says nothing; None if it is not there.
+    def in_file(self) -> Mark | str | None:
+        """Return the mark in the file, or the reason why it is unreadable; None if there is none.
 
-        Before the database is opened to be compared with it: the file may lag, but not lead.
+        It must be read before the database: the file may lag behind, but not lead.
         """
         try:
             return self._file.read()
@@ -136,8 +270,8 @@ class CommitMarks:
             return str(error)
 
 
-def select_mark(reader: Writer) -> Mark | None:
-    """Read the mark in a database; None if it has none yet."""
+def select_mark(reader: Connection) -> Mark | None:
+    """Return the mark in a database; None if it has none yet."""
     row = reader.execute(SELECT).fetchone()
     if row is None:
         return None
@@ -147,5 +281,31 @@ def select_mark(reader: Writer) -> Mark | None:
     return Mark(store, host, int(n_commits), nonce, int(time_ns))
 
 
-def _chance(n_bytes: int) -> str:
+def _random_hex(n_bytes: int) -> str:
     return os.urandom(n_bytes).hex()
+
+
+def adopt_restored(database: Path) -> None:
+    """Write the mark of a restored database to the file beside it.
+
+    Raises
+    ------
+    OSError
+        If the disk refuses; the next start then finds the database older than the mark.
+    sqlite3.Error
+        If the database cannot be read.
+    """
+    mark = _mark_of(database)
+    file = MarkFile(mark_path(database))
+    if mark is None:  # an old copy without a mark gets one when it is opened
+        file.path.unlink(missing_ok=True)
+    else:
+        file.replace(mark)
+
+
+def _mark_of(database: Path) -> Mark | None:
+    # immutable: no journal is read or created
+    uri = f"{database.absolute().as_uri()}?mode=ro&immutable=1"
+    with closing(sqlite3.connect(uri, uri=True)) as reader:
+        has_one = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'high_water'"
+        return select_mark(reader) if reader.execute(has_one).fetchone() else None

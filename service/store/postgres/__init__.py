@@ -1,4 +1,4 @@
-"""PostgreSQL behind the store's interface."""
+"""PostgreSQL implementation of the store."""
 
 from service.store.postgres.store import PostgresStore
 

@@ -1,19 +1,81 @@
-"""Connections to PostgreSQL, and how a statement is cancelled."""
+"""Connections to PostgreSQL: address, errors, advisory locks, and cancellation of statements."""
 
+import hashlib
+import os
+import re
+import socket
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
 import psycopg
 from psycopg.abc import Buffer
 from psycopg.adapt import AdaptersMap, Dumper
+from psycopg.conninfo import conninfo_to_dict, make_conninfo
 
 from service.runtime.asker import ASKER, Asker
 from service.store.database import Parameters
-from service.store.port import StoreError
-from service.store.postgres.address import PostgresAddress
-from service.store.postgres.statements import translated
+from service.store.port import RefusedRowError, StoreError
+
+MAX_PASSWORD_BYTES = 4096
+DEFAULTS = {
+    "connect_timeout": "5",
+    "keepalives_idle": "10",
+    "keepalives_interval": "5",
+    "keepalives_count": "3",
+    "tcp_user_timeout": "25000",
+}
+"""A server that disappears silently is detected within half a minute."""
+
+
+@dataclass(frozen=True)
+class PostgresAddress:
+    """Address of a database.
+
+    Parameters
+    ----------
+    conninfo
+        Connection string of libpq, without a password.
+    password_file
+        File with only the password, readable by its owner alone; without it libpq reads
+        ``~/.pgpass``.
+    """
+
+    conninfo: str
+    password_file: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the database in messages."""
+        parts = conninfo_to_dict(self.conninfo)
+        database = parts.get("dbname") or parts.get("user") or "named like the user"
+        host = parts.get("host") or parts.get("service") or "this computer"
+        return f"PostgreSQL database {database} at {host}"
+
+    def full(self, purpose: str) -> str:
+        """Return the connection string with the password, which must never be shown."""
+        given = conninfo_to_dict(self.conninfo)
+        name = f"padwatch {purpose} {os.getpid()}@{socket.gethostname()}"[:63]
+        settings = {**DEFAULTS, "application_name": name, **given, "client_encoding": "UTF8"}
+        if self.password_file is not None:
+            settings["password"] = self._password(self.password_file)
+        return make_conninfo(**settings)  # type: ignore[arg-type]
+
+    def _password(self, path: Path) -> str:
+        try:
+            with path.open("rb") as file:
+                mode = os.fstat(file.fileno()).st_mode
+                found = file.read(MAX_PASSWORD_BYTES)
+        except OSError as error:
+            raise StoreError(f"[store] password_file {path}: {error.strerror}") from error
+        if mode & 0o077:
+            raise StoreError(f"[store] password_file {path} is readable by others: chmod 600 it")
+        return found.decode("utf-8", "surrogateescape").rstrip("\r\n")
+
 
 BIGINT_OID = 20
 DOUBLE_OID = 701
@@ -24,16 +86,16 @@ SESSION = """
     SET tcp_keepalives_idle = 10; SET tcp_keepalives_interval = 5; SET tcp_keepalives_count = 3;
     SET idle_in_transaction_session_timeout = '30s';
 """
-"""Of every session; a client that has gone without a word keeps no lock for long."""
+"""Settings of every session; one whose client disappeared releases its locks soon."""
 
-SETTINGS = """
+SERVER_SETTINGS = """
     SELECT current_setting('fsync'), current_setting('full_page_writes'),
     current_setting('server_encoding'), pg_is_in_recovery(), current_schema() IS NOT NULL
 """
 
 
 class _TruthDumper(Dumper):
-    """Truths as 0 and 1, as they are stored."""
+    """Dumps booleans as 0 and 1, as they are stored."""
 
     oid = BIGINT_OID
 
@@ -42,7 +104,7 @@ class _TruthDumper(Dumper):
 
 
 class _NumberDumper(Dumper):
-    """Numbers; what is none is NULL, as SQLite has it."""
+    """Dumps floats; NaN as NULL, as in SQLite."""
 
     oid = DOUBLE_OID
 
@@ -63,7 +125,7 @@ Session = psycopg.Connection[tuple[Any, ...]]
 
 
 class PostgresConnection:
-    """A session within a transaction, for statements that are written once for both databases."""
+    """Session within a transaction, for statements written for both databases."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -71,7 +133,7 @@ class PostgresConnection:
     def execute(
         self, statement: str, parameters: Parameters = (), /
     ) -> psycopg.Cursor[tuple[Any, ...]]:
-        """Run a statement; all that it found is in memory then."""
+        """Run a statement and fetch all rows."""
         return self._session.execute(translated(statement), parameters or None, binary=True)
 
     def executemany(
@@ -84,7 +146,7 @@ class PostgresConnection:
 
 
 def connected(address: PostgresAddress, purpose: str, settings: str) -> Session:
-    """Open a session with some settings of its own."""
+    """Open a session with additional settings."""
     session = psycopg.connect(address.full(purpose), autocommit=True, context=_Context)
     try:
         session.execute((SESSION + settings).encode())
@@ -100,20 +162,20 @@ class _Context:
 
 
 def require_fit(session: Session, where: str) -> None:
-    """Refuse a server that cannot keep what padwatch writes.
+    """Refuse an unsuitable server.
 
     Raises
     ------
     StoreError
-        If it is too old, loses data at a power cut, is a standby or has no place for tables.
+        If it is too old, loses data at a power cut, is a standby or has no schema for tables.
     """
     if session.info.server_version < OLDEST_VERSION:
         version = session.info.parameter_status("server_version")
         raise StoreError(
-            f"{where} is of PostgreSQL {version}, which is too old: padwatch needs"
+            f"{where} runs on PostgreSQL {version}, which is too old: padwatch needs"
             f" {OLDEST_VERSION // 10_000} or newer"
         )
-    row = session.execute(SETTINGS.encode()).fetchone()
+    row = session.execute(SERVER_SETTINGS.encode()).fetchone()
     why = None if row is None else _unfit(*row)
     if why is not None:
         raise StoreError(f"{where} {why}")
@@ -123,7 +185,7 @@ def _unfit(
     fsync: str, full_page_writes: str, encoding: str, is_standby: bool, has_schema: bool
 ) -> str | None:
     if is_standby:
-        return "is a standby, which only reads: name the primary in [store] postgresql"
+        return "is a read-only standby: name the primary in [store] postgresql"
     if fsync != "on" or full_page_writes != "on":
         return (
             "would lose results at a power cut: set fsync = on and full_page_writes = on"
@@ -142,12 +204,12 @@ CANCEL_WITHIN_S = 2.0
 
 @contextmanager
 def cancelled_when_gone(session: Session) -> Iterator[None]:
-    """Cancel what a session does as soon as its asker has gone; nothing where nobody asks.
+    """Cancel the statements of a session when the client of the request has gone.
 
     Raises
     ------
     StoreError
-        If the asker has gone.
+        If the client has gone.
     """
     asker = ASKER.get()
     if asker is None:
@@ -162,7 +224,7 @@ def cancelled_when_gone(session: Session) -> Iterator[None]:
         is_done.set()
         watcher.join()
         if asker.has_gone:
-            raise StoreError("interrupted: nobody waits for the answer")
+            raise StoreError("interrupted: the client has disconnected")
 
 
 def _watch(session: Session, asker: Asker, is_done: Event) -> None:
@@ -172,4 +234,109 @@ def _watch(session: Session, asker: Asker, is_done: Event) -> None:
     try:
         session.cancel_safe(timeout=CANCEL_WITHIN_S)
     except psycopg.Error:
-        return  # the server is gone, and what it did with it
+        return  # the server is gone, and its statements with it
+
+
+BY_STATE = {
+    "53100": "the disk of the database is full: free space there",
+    "53200": "the database server is out of memory",
+    "53300": "too many connections are open: raise max_connections",
+    "57014": "the query timed out: the database is too slow, or overloaded",
+    "55P03": "another padwatch has been writing for too long: check what it waits for",
+    "25P03": "a transaction was left open for too long",
+    "25006": "the database is read-only: name the primary in [store] postgresql, not a standby",
+    "42501": "the role lacks permission: grant the rights listed in the how-to for PostgreSQL",
+    "57P01": "the database server is shutting down; padwatch retries",
+    "57P02": "the database server has crashed and is recovering; padwatch retries",
+    "57P03": "the database server is starting or stopping; padwatch retries",
+    "XX001": "the database is damaged: restore a backup",
+    "XX002": "an index is damaged: run reindexdb",
+}
+"""Advice by SQLSTATE."""
+
+BY_WORDS = {
+    "password authentication failed": "correct [store] password_file, or the role's password",
+    "no password supplied": "name a [store] password_file",
+    "no pg_hba.conf entry": "permit this host and role in pg_hba.conf of the server",
+    "does not exist": "create it (see the how-to for PostgreSQL), or correct [store] postgresql",
+    "too many clients": BY_STATE["53300"],
+    "remaining connection slots": BY_STATE["53300"],
+    "the database system is": BY_STATE["57P03"],
+    "could not translate host name": "correct the host in [store] postgresql",
+    "session is read-only": BY_STATE["25006"],
+    "certificate": "correct sslmode, sslrootcert or sslcert in [store] postgresql",
+}
+"""Advice by the text of errors that occur before there is a session."""
+
+OF_THE_ROW = (
+    psycopg.IntegrityError,
+    psycopg.DataError,
+    psycopg.errors.DataCorrupted,
+    psycopg.errors.IndexCorrupted,
+)
+"""Errors caused by a row or its page: others of its transaction can be written."""
+
+UNREACHABLE = "check that PostgreSQL runs and can be reached; padwatch retries"
+
+
+def sentence(where: str, error: psycopg.Error) -> str:
+    """Return a message with advice."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    said = (error.diag.message_primary or (lines[0] if lines else type(error).__name__)).rstrip(".")
+    advice = _advice(error)
+    return f"{where}: {said}" + (f"; {advice}" if advice else "")
+
+
+def _advice(error: psycopg.Error) -> str | None:
+    if error.sqlstate in BY_STATE:
+        return BY_STATE[error.sqlstate]
+    if error.sqlstate is None and isinstance(error, psycopg.OperationalError):
+        said = str(error)
+        return next((advice for words, advice in BY_WORDS.items() if words in said), UNREACHABLE)
+    return None
+
+
+@contextmanager
+def renamed(where: str) -> Iterator[None]:
+    """Raise `StoreError` for errors of PostgreSQL, its library and the system."""
+    try:
+        yield
+    except psycopg.Error as error:
+        kind = RefusedRowError if isinstance(error, OF_THE_ROW) else StoreError
+        raise kind(sentence(where, error)) from error
+    except UnicodeEncodeError as error:
+        raise RefusedRowError(f"{where}: {error}") from error
+    except OSError as error:
+        raise StoreError(f"{where}: {error}") from error
+
+
+def lock_number(name: str) -> int:
+    """Return the number of an advisory lock by name, the same in every process."""
+    digest = hashlib.sha256(b"padwatch " + name.encode("utf-8", "surrogateescape")).digest()
+    return int.from_bytes(digest[:8], "big", signed=True)
+
+
+MIGRATING = lock_number("/migrating")
+WRITING = lock_number("/writing")
+"""Held by every writing transaction, so that only one writes at a time, as in SQLite."""
+
+
+_PIECE = re.compile(r"('(?:[^']|'')*')|\?|(?<!:):([A-Za-z_][A-Za-z_0-9]*)|%|\bwhole_(?=[a-z])")
+
+
+@lru_cache(maxsize=1024)
+def translated(statement: str) -> bytes:
+    """Return a statement with ``%s`` for ``?`` and ``%(name)s`` for ``:name``, except in literals.
+
+    The prefix ``whole_`` of tables is removed, since the server checks its data itself.
+    """
+    return _PIECE.sub(_piece, statement).encode()
+
+
+def _piece(found: re.Match[str]) -> str:
+    quoted, name = found[1], found[2]
+    if quoted is not None:
+        return quoted.replace("%", "%%")
+    if name is not None:
+        return f"%({name})s"
+    return {"?": "%s", "%": "%%"}.get(found[0], "")

@@ -1,28 +1,320 @@
-"""PostgreSQL under the store: synchronous commits, one writer at a time, short reads."""
+"""PostgreSQL database: one writer, several readers, and names held by a process."""
 
+import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
+from threading import Lock
+from types import TracebackType
+
+import psycopg
 
 from service.settings.storage import Origin
 from service.store.database import Connection, Unreadable
-from service.store.postgres.address import PostgresAddress
-from service.store.postgres.connection import PostgresConnection
-from service.store.postgres.errors import renamed
-from service.store.postgres.holding import PostgresHold
-from service.store.postgres.migrating import migrate
-from service.store.postgres.readers import Readers
-from service.store.postgres.writer import Writer, writing_session
+from service.store.port import StoreError
+from service.store.postgres.connection import (
+    WRITING,
+    PostgresAddress,
+    PostgresConnection,
+    Session,
+    cancelled_when_gone,
+    connected,
+    lock_number,
+    renamed,
+    require_fit,
+    sentence,
+)
+from service.store.postgres.schema import migrate
+
+N_KEPT = 4
+READER_SETTINGS = """
+    SET default_transaction_read_only = on; SET statement_timeout = '30s';
+"""
+BEGIN_READING = b"BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"
 
 
-class PostgresDatabase:
-    """One database of a server; may be used from several threads, and by several processes.
+class Readers:
+    """Read-only sessions of one database, each used by one thread at a time."""
+
+    def __init__(self, address: PostgresAddress) -> None:
+        self._address = address
+        self._lock = Lock()
+        self._idle: list[Session] = []
+        self._is_closed = False
+
+    @contextmanager
+    def reading(self) -> Iterator[PostgresConnection]:
+        """Borrow a session; one that raised an error is not used again."""
+        with renamed(self._address.name):
+            session = self._begun()
+            try:
+                with cancelled_when_gone(session):
+                    yield PostgresConnection(session)
+                session.execute("COMMIT")
+            except BaseException:
+                session.close()
+                raise
+            self._put_back(session)
+
+    def close(self) -> None:
+        """Close idle sessions now, and the others when they are returned."""
+        with self._lock:
+            self._is_closed = True
+            idle, self._idle = self._idle, []
+        for session in idle:
+            session.close()
+
+    def _begun(self) -> Session:
+        while (idle := self._taken()) is not None:
+            try:
+                idle.execute(BEGIN_READING)
+            except psycopg.OperationalError:  # the server has been restarted since
+                idle.close()
+            else:
+                return idle
+        session = connected(self._address, "reader", READER_SETTINGS)
+        session.execute(BEGIN_READING)
+        return session
+
+    def _taken(self) -> Session | None:
+        with self._lock:
+            if self._is_closed:
+                raise StoreError(f"{self._address.name} is closed")
+            return self._idle.pop() if self._idle else None
+
+    def _put_back(self, session: Session) -> None:
+        with self._lock:
+            if not self._is_closed and len(self._idle) < N_KEPT:
+                self._idle.append(session)
+                return
+        session.close()
+
+
+WRITER_SETTINGS = """
+    SET synchronous_commit = on; SET lock_timeout = '20s'; SET statement_timeout = '60s';
+"""
+BEGIN_WRITING = f"""
+    BEGIN ISOLATION LEVEL READ COMMITTED READ WRITE; SELECT pg_advisory_xact_lock({WRITING});
+"""
+NUMBER = "SELECT pg_current_xact_id()::text"
+OUTCOME = "SELECT pg_xact_status(%s::xid8)"
+"""``committed``, ``aborted``, or ``in progress`` while the lost session still exists."""
+
+DOUBT_S = 8.0
+"""Maximum time to determine the outcome of a commit without an answer."""
+
+PAUSE_S = 0.2
+
+
+class Writer:
+    """Writing session, with one transaction at a time among all processes.
 
     Parameters
     ----------
     address
-        Of the database; it has to be there, and empty or padwatch's.
+        Address of the database.
+    session
+        Open session to a suitable server.
+    """
+
+    def __init__(self, address: PostgresAddress, session: Session) -> None:
+        self._address, self._where = address, address.name
+        self._session, self._lock = session, Lock()
+        self._is_closed = False
+
+    def close(self) -> None:
+        """End the session; closing twice has no effect."""
+        with self._lock:
+            self._is_closed = True
+            self._session.close()
+
+    @contextmanager
+    def writing(self) -> Iterator[PostgresConnection]:
+        """Open a transaction; durable when left."""
+        with self._lock, renamed(self._where):
+            number = self._begin()
+            try:
+                yield PostgresConnection(self._session)
+            except BaseException:
+                self._roll_back()
+                raise
+            self._commit(number)
+
+    def _begin(self) -> str:
+        if self._is_closed:
+            raise StoreError(f"{self._where} is closed")
+        if not self._session.closed:
+            try:
+                return self._begun()
+            except psycopg.OperationalError:
+                if not self._session.closed:
+                    self._roll_back()
+                    raise
+        self._session = writing_session(self._address)  # it was lost after the last transaction
+        return self._begun()
+
+    def _begun(self) -> str:
+        try:
+            self._session.execute(BEGIN_WRITING.encode())
+            row = self._session.execute(NUMBER).fetchone()
+        except psycopg.Error:
+            self._roll_back()
+            raise
+        return "" if row is None else str(row[0])
+
+    def _commit(self, number: str) -> None:
+        try:
+            done = self._session.execute("COMMIT")
+        except psycopg.OperationalError as error:
+            if not self._session.closed:
+                self._roll_back()
+                raise
+            self._settle(number, error)
+        else:
+            if done.statusmessage != "COMMIT":
+                raise StoreError(f"{self._where}: an error rolled the transaction back")
+
+    def _settle(self, number: str, lost: psycopg.Error) -> None:
+        """Determine the outcome of an unanswered commit; raise an error unless it succeeded."""
+        until_s = time.monotonic() + DOUBT_S
+        outcome = self._outcome(number)
+        while outcome is None and time.monotonic() < until_s:
+            time.sleep(PAUSE_S)
+            outcome = self._outcome(number)
+        if outcome == "committed":
+            return
+        if outcome == "aborted":
+            raise StoreError(sentence(self._where, lost))
+        raise StoreError(
+            f"{self._where}: the connection was lost during a commit whose outcome is unknown;"
+            " the results are written again"
+        )
+
+    def _outcome(self, number: str) -> str | None:
+        """Return the outcome of a transaction; None while it is unknown."""
+        try:
+            if self._session.closed:
+                self._session = writing_session(self._address)
+            row = self._session.execute(OUTCOME, (number,)).fetchone()
+        except (psycopg.OperationalError, StoreError):
+            return None
+        return None if row is None or row[0] == "in progress" else row[0]
+
+    def _roll_back(self) -> None:
+        if self._session.closed:
+            return
+        try:
+            self._session.execute("ROLLBACK")
+        except psycopg.Error:
+            self._session.close()  # also rolls back
+
+
+def writing_session(address: PostgresAddress) -> Session:
+    """Open a session that may write.
+
+    Raises
+    ------
+    StoreError
+        If the server is unsuitable.
+    psycopg.Error
+        If it cannot be reached, or refuses.
+    """
+    session = connected(address, "writer", WRITER_SETTINGS)
+    try:
+        require_fit(session, address.name)
+    except BaseException:
+        session.close()
+        raise
+    return session
+
+
+TAKE = "SELECT pg_try_advisory_lock(%s)"
+HOLD_SETTINGS = "SET statement_timeout = '5s';"
+HOLDER = """
+    SELECT application_name, client_addr::text FROM pg_locks JOIN pg_stat_activity USING (pid)
+    WHERE locktype = 'advisory' AND granted AND objsubid = 1
+    AND pg_locks.database = (SELECT oid FROM pg_database WHERE datname = current_database())
+    AND ((classid::bigint << 32) | objid::bigint) = %s
+"""
+
+
+class PostgresHold:
+    """Name held in a database, from entering to leaving, by an advisory lock of its own session.
+
+    The lock ends with the session: when the process ends, when the server restarts, or at most half
+    a minute after the host or the network fails. The holder must therefore check `is_held` before
+    every action that only one process may take; a lost name stays lost.
+
+    Parameters
+    ----------
+    address
+        Address of the database.
+    name
+        Name to hold.
+    """
+
+    def __init__(self, address: PostgresAddress, name: str) -> None:
+        self._address, self._name = address, name
+        self._session: Session | None = None
+        self._lock = Lock()
+
+    @property
+    def is_held(self) -> bool:
+        """Check with the server; False forever once it did not answer."""
+        with self._lock:
+            if self._session is None:
+                return False
+            try:
+                self._session.execute("SELECT 1")
+            except psycopg.Error:
+                self._end()
+                return False
+            return True
+
+    def __enter__(self) -> "PostgresHold":
+        with renamed(self._address.name):
+            self._session = connected(self._address, f"holds {self._name}", HOLD_SETTINGS)
+            try:
+                self._take(self._session)
+            except BaseException:
+                self._end()
+                raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        with self._lock:
+            self._end()
+
+    def _take(self, session: Session) -> None:
+        number = lock_number(self._name)
+        if session.execute(TAKE, (number,)).fetchone() == (True,):
+            return
+        row = session.execute(HOLDER, (number,)).fetchone()
+        holder = "unknown" if row is None else " at ".join(str(part) for part in row if part)
+        raise StoreError(
+            f"{self._name} is held by another padwatch ({holder}) in {self._address.name}:"
+            " stop it first"
+        )
+
+    def _end(self) -> None:
+        if self._session is not None:
+            self._session.close()
+            self._session = None
+
+
+class PostgresDatabase:
+    """One database of a server; used by several threads and processes.
+
+    Parameters
+    ----------
+    address
+        Address of the database, which must exist and be empty or padwatch's.
     origin
-        What it is to hold; one that holds the other is refused.
+        Origin of its data; a database with data of the other origin is refused.
 
     Raises
     ------
@@ -44,12 +336,12 @@ class PostgresDatabase:
         self._writer, self._readers = Writer(address, session), Readers(address)
 
     def close(self) -> None:
-        """End all sessions; closing twice is fine."""
+        """End all sessions; closing twice has no effect."""
         self._readers.close()
         self._writer.close()
 
     def writing(self) -> AbstractContextManager[PostgresConnection]:
-        """Open a transaction, alone among all processes; durable when left."""
+        """Open the only writing transaction of all processes; durable when left."""
         return self._writer.writing()
 
     @contextmanager
@@ -57,14 +349,14 @@ class PostgresDatabase:
         self,
         unreadable: Unreadable = "strict",  # noqa: ARG002
     ) -> Iterator[PostgresConnection]:
-        """Open a look at one state of the database, which stores no unreadable text."""
+        """Open a read-only transaction; the database stores no unreadable text."""
         with self._readers.reading() as reader:
             yield reader
 
     def ever_had(self, connection: Connection, table: str) -> bool:  # noqa: ARG002
-        """Assume so: what is beside the database was begun as it was opened."""
+        """Return True: files beside the database are created when it is opened."""
         return True
 
     def hold(self, name: str) -> PostgresHold:
-        """Take a name among all processes that use this database."""
+        """Hold a name among all processes that use this database."""
         return PostgresHold(self.address, name)

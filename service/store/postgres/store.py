@@ -1,37 +1,40 @@
-"""The store in a PostgreSQL database."""
+"""Store in a PostgreSQL database."""
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditAction, acting
 from service.store.access.audit_verification import AuditHead, write_head
-from service.store.audit_chain import newest_of
+from service.store.audit import Trail, newest_of
 from service.store.outbox import Address, no_recipients
 from service.store.port import StoreError
-from service.store.postgres.address import PostgresAddress
-from service.store.postgres.database import PostgresDatabase
-from service.store.spectra_port import SpectraLimits
-from service.store.sql_store import SqlStore
+from service.store.postgres.connection import PostgresAddress, PostgresConnection
+from service.store.postgres.database import PostgresDatabase, Readers
+from service.store.spectra import SpectraLimits
+from service.store.store import Store
 
 HEAD_BEGUN = "audit.head_begun"
 
 
-class PostgresStore(SqlStore):
-    """A store that several processes on several hosts may share.
+class PostgresStore(Store):
+    """Store that several processes on several hosts may share.
 
     Parameters
     ----------
     address
-        Of the database; it has to be there, and empty or padwatch's.
+        Address of the database, which must exist and be empty or padwatch's.
     head
-        File on this host that names the newest entry of the audit trail that this host has seen.
+        File on this host that names the newest entry of the audit trail read here.
     origin
-        What it is to hold; one that holds the other is refused.
+        Origin of its data; a database with data of the other origin is refused.
     to
-        Who is to be told of events of alarms.
+        Function that returns the messages about an event of an alarm.
     spectra
-        How many spectra are kept.
+        Limits of stored spectra.
 
     Raises
     ------
@@ -62,7 +65,7 @@ class PostgresStore(SqlStore):
 
 
 def _begin_head(database: PostgresDatabase, head: Path) -> bool:
-    """Write the head of a host that is new to a trail; whether the trail was there before it."""
+    """Write the head of a new host; return whether the trail already had entries."""
     if head.exists():
         return False
     head.parent.mkdir(parents=True, exist_ok=True)
@@ -73,14 +76,29 @@ def _begin_head(database: PostgresDatabase, head: Path) -> bool:
 
 
 def _begun(head: Path) -> AuditAction:
-    """Tell of it, so that a head that was taken away is noticed in the trail."""
+    """Return an entry about a new head, so that the removal of a head is visible in the trail."""
     who = acting()
     return AuditAction(
         time_ns=time.time_ns(),
         actor="padwatch",
         action=HEAD_BEGUN,
         object="audit",
-        reason=f"{head.absolute()} was not there",
+        reason=f"{head.absolute()} did not exist",
         source=who.source,
         peer=who.peer,
     )
+
+
+def server_trail(address: PostgresAddress, head: Path) -> Trail:
+    """Return the audit trail of a database, with the head of this host; nothing is upgraded."""
+    return Trail(partial(_opened, address), head, is_shared=True)
+
+
+@contextmanager
+def _opened(address: PostgresAddress) -> Iterator[PostgresConnection]:
+    readers = Readers(address)
+    try:
+        with readers.reading() as reader:
+            yield reader
+    finally:
+        readers.close()

@@ -1,1 +1,1 @@
-"""Trends gathered beforehand: buckets of a minute, ten minutes and an hour, parted by condition."""
+"""Roll-ups: readings aggregated per minute, ten minutes and hour, by operating condition."""

@@ -1,4 +1,4 @@
-"""A span of time from as few roll-ups as possible."""
+"""Trends of a time range from as few roll-ups as possible."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,16 +16,16 @@ from service.store.buckets import (
 )
 from service.store.database import Connection
 from service.store.port import Trend, TrendQuery
-from service.store.retention.marks import Gone, select_gone
-from service.store.rollups.making import select_mark
 from service.store.rollups.rows import ANYTHING, HOUR_NS, WIDTHS_NS, Cells, Conditions, select_cells
+from service.store.rollups.writing import DeletedUntil, select_deleted, select_mark
+from service.store.series import find_series
 from service.store.trends import Span, arguments, select_page, select_readings, storable, too_large
 
 MAX_SPANS = 4096
-"""That many are read at a time, so that no range needs more memory than another."""
+"""Spans per query, which bounds memory."""
 
 MAX_CUT_SPANS = 100_000
-"""Finer roll-ups that are looked at because bounds cut through wider ones; a second or two."""
+"""Maximum number of finer roll-ups that are read because bounds cut through wider ones."""
 
 REDONE = """
     SELECT start_ns FROM rollup_redo
@@ -35,20 +35,20 @@ REDONE = """
 
 @dataclass
 class Cover:
-    """What a query is answered from.
+    """Data that answer a query.
 
     Parameters
     ----------
     summaries
-        Out of roll-ups of which every reading is wanted, summed up in buckets.
+        Roll-ups whose readings are all requested, aggregated into buckets.
     spans
-        Where single readings are to be read instead.
+        Spans whose single readings must be read.
     rolled_spans
-        From when to when the roll-ups go.
+        Spans of the roll-ups.
     n_rolled
-        Readings in them, usable or not.
+        Number of readings in them, usable or not.
     is_coarse
-        Whether some of the readings in them are gone.
+        Whether some of these readings were deleted.
     """
 
     summaries: list[Summaries] = field(default_factory=list)
@@ -58,43 +58,38 @@ class Cover:
     is_coarse: bool = False
 
 
-def select_series(reader: Connection, query: TrendQuery) -> int | None:
-    """Number of the bearing that is asked for; None if there never was one."""
-    found = reader.execute(
-        "SELECT id FROM series WHERE unit = ? AND bearing = ?", (query.unit, query.bearing)
-    ).fetchone()
-    return None if found is None else int(found[0])
-
-
 def covered(
     reader: Connection,
     query: TrendQuery,
-    gone: Gone,
+    deleted: DeletedUntil,
     whole: Span,
     bucket_ns: int,
 ) -> Cover:
-    """Cover a range of time.
+    """Cover a time range.
 
-    Where single readings are gone, roll-ups that reach beyond the range count as a whole, and those
-    that bounds of conditions cut through not at all.
-
-    Raises `QueryTooLargeError` if bounds of conditions cut through too much of it.
+    Where single readings were deleted, roll-ups that extend beyond the range count as a whole, and
+    those that bounds of conditions cut through are left out.
 
     Parameters
     ----------
-    gone
-        What there is no more of the bearing.
+    deleted
+        Times up to which data of the bearing were deleted.
     bucket_ns
-        Width of the buckets asked for.
+        Width of the requested buckets.
+
+    Raises
+    ------
+    QueryTooLargeError
+        If bounds of conditions cut through too many roll-ups.
     """
-    series = select_series(reader, query)
+    series = find_series(reader, query.unit, query.bearing)
     if series is None:
         return Cover()
     covering = _Covering(reader, query, series, bucket_ns)
-    for stretch in gone.stretches(whole):
-        if stretch[0] < gone.readings_ns:
+    for stretch in deleted.stretches(whole):
+        if stretch[0] < deleted.readings_ns:
             covering.take_coarse(
-                stretch, [w for w in gone.kept_ns(stretch[0]) if bucket_ns % w == 0]
+                stretch, [w for w in deleted.kept_ns(stretch[0]) if bucket_ns % w == 0]
             )
         else:
             covering.take(stretch, [w for w in WIDTHS_NS if bucket_ns % w == 0])
@@ -113,7 +108,7 @@ class _Covering:
         self.cover = Cover()
 
     def take(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span; what does not fit the widest roll-ups goes to finer ones, then to rows."""
+        """Cover a span by the widest roll-ups, its ends by finer ones, then by single readings."""
         if span[0] >= span[1]:
             return
         if not widths_ns:
@@ -131,13 +126,13 @@ class _Covering:
         self.take((inner[1], span[1]), finer_ns)
 
     def take_coarse(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span of which only roll-ups are there, and readings that have come too late."""
+        """Cover a span whose single readings were deleted, except late ones."""
         self._take_cells(span, widths_ns)
         late = self._redone(span)
         self.cover.spans += [_within(span, (hour, hour + HOUR_NS)) for hour in late]
 
     def _take_cells(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span with the widest roll-ups that fit; the narrowest ones may reach beyond."""
+        """Cover a span by the widest roll-ups that fit; the narrowest may extend beyond it."""
         width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
         inner = _inside(span, width_ns) if finer_ns else _around(span, width_ns)
         if finer_ns and inner[0] >= inner[1]:
@@ -202,7 +197,7 @@ class _Covering:
             self.cover.rolled_spans += _runs(np.unique(chosen.time_ns), width_ns)
 
     def _cut(self, conditions: Conditions) -> npt.NDArray[np.bool_]:
-        """Cells of which some readings may be wanted and others not."""
+        """Return the cells whose readings may be requested only in part."""
         asked = self._asked
         sides = (
             (asked["eccentricity_low"], conditions.eccentricity_low, -1.0),
@@ -230,7 +225,7 @@ def _around(span: Span, width_ns: int) -> Span:
 
 
 def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
-    """Spans of neighbours, out of their starts."""
+    """Return the spans of adjacent buckets, given their starts."""
     breaks = np.flatnonzero(np.diff(time_ns) > width_ns)
     if time_ns.size:
         firsts = np.concatenate([time_ns[:1], time_ns[breaks + 1]]).tolist()
@@ -240,32 +235,34 @@ def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
 
 
 def read_trend(reader: Connection, query: TrendQuery) -> Trend:
-    """Read trends of one bearing, gathered into buckets if they are many.
+    """Return trends of one bearing, aggregated into buckets if they are many.
 
     Raises
     ------
     QueryTooLargeError
-        If more single readings would have to be read than can be.
+        If too many single readings would have to be read.
     """
-    gone = _gone(reader, query)
+    deleted = _deleted(reader, query)
     whole = (storable(query.start_ns), storable(query.end_ns))
-    coarse_ns = gone.readings_ns if whole[0] < gone.readings_ns else None
+    coarse_ns = deleted.readings_ns if whole[0] < deleted.readings_ns else None
     if query.is_page:
         found = page(select_page(reader, query), query.max_points, query.hole_ns)
     else:
-        finest_ns = gone.finest_ns(whole[0]) or 1
+        finest_ns = deleted.finest_ns(whole[0]) or 1
         width_ns = bucket_width_ns(*whole, query.max_points, finest_ns)
-        found = _read(reader, query, gone, whole, width_ns)
+        found = _read(reader, query, deleted, whole, width_ns)
     return replace(found, coarse_until_ns=coarse_ns)
 
 
-def _gone(reader: Connection, query: TrendQuery) -> Gone:
-    series = select_series(reader, query)
-    return Gone({}) if series is None else select_gone(reader, series)
+def _deleted(reader: Connection, query: TrendQuery) -> DeletedUntil:
+    series = find_series(reader, query.unit, query.bearing)
+    return DeletedUntil({}) if series is None else select_deleted(reader, series)
 
 
-def _read(reader: Connection, query: TrendQuery, gone: Gone, whole: Span, width_ns: int) -> Trend:
-    cover = covered(reader, query, gone, whole, width_ns)
+def _read(
+    reader: Connection, query: TrendQuery, deleted: DeletedUntil, whole: Span, width_ns: int
+) -> Trend:
+    cover = covered(reader, query, deleted, whole, width_ns)
     n_single, singles = select_readings(reader, query, cover.spans, width_ns)
     if cover.is_coarse or cover.n_rolled + n_single > query.max_points:
         return bucketed(Summaries.together([*cover.summaries, singles]), width_ns)

@@ -1,8 +1,119 @@
-"""Roll-ups behind the store's interface."""
+"""Aggregation of readings into roll-ups, in bounded steps."""
 
-from service.store.database import Connect
-from service.store.rollups.making import MINUTE_NS
-from service.store.rollups.rolling import gather_anew, gather_next
+from itertools import pairwise
+
+from service.store.database import Connection, Tables
+from service.store.rollups.rows import HOUR_NS, WIDTHS_NS, select_cells, together
+from service.store.rollups.writing import (
+    MINUTE_NS,
+    DeletedUntil,
+    forget_width,
+    insert_cells,
+    minutes_of,
+    rolled_columns,
+    select_deleted,
+    select_mark,
+)
+from service.store.trends import Span
+
+DELETE_HOUR = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?"
+
+
+def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUntil) -> None:
+    """Merge late readings of an hour whose single readings were deleted into its roll-ups.
+
+    The readings are deleted in the same transaction, so that each is either stored or merged. A
+    reading that is written twice after its hour was deleted counts twice, since it cannot be
+    recognized.
+    """
+    hour = (hour_ns, hour_ns + HOUR_NS)
+    minutes = minutes_of(writer, series, hour)
+    if minutes is None:
+        return
+    for width_ns in deleted.kept_ns(hour_ns):
+        late = minutes.gathered(width_ns)
+        before = select_cells(writer, series, width_ns, hour, rolled_columns())
+        forget_width(writer, series, width_ns, hour)
+        all_ = late if before is None else together(before, late).gathered(width_ns)
+        insert_cells(writer, series, width_ns, all_)
+    writer.execute(DELETE_HOUR, (series, *hour))
+
+
+MAX_READINGS = 2000
+"""Readings per step, which blocks other writers for some tens of milliseconds."""
+
+MAX_REDONE = 24
+"""Hours per step."""
+
+NEXT_TIMES = """
+    SELECT time_ns FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?
+    ORDER BY time_ns LIMIT ?
+"""
+SET_MARK = """
+    INSERT INTO rollup_mark VALUES (?, ?)
+    ON CONFLICT (series) DO UPDATE SET until_ns = excluded.until_ns
+"""
+
+
+def gather_next(writer: Connection, series: int, now_ns: int) -> None:
+    """Aggregate readings after the mark, in complete minutes, and move the mark."""
+    mark_ns = select_mark(writer, series)
+    until_ns = _until(writer, series, mark_ns, now_ns)
+    if until_ns > mark_ns:
+        _gather(writer, series, (mark_ns, until_ns))
+        writer.execute(SET_MARK, (series, until_ns))
+
+
+def gather_again(writer: Connection, series: int) -> None:
+    """Aggregate again the hours that received readings since they were aggregated."""
+    mark_ns = select_mark(writer, series)
+    hours = writer.execute(
+        "SELECT start_ns FROM rollup_redo WHERE series = ? ORDER BY start_ns LIMIT ?",
+        (series, MAX_REDONE),
+    ).fetchall()
+    deleted = select_deleted(writer, series)
+    for (hour_ns,) in hours:
+        if hour_ns < deleted.readings_ns:
+            merge_late(writer, series, hour_ns, deleted)
+        else:
+            _gather_hour(writer, series, (hour_ns, min(hour_ns + HOUR_NS, mark_ns)))
+        writer.execute(
+            "DELETE FROM rollup_redo WHERE series = ? AND start_ns = ?", (series, hour_ns)
+        )
+
+
+def _gather_hour(writer: Connection, series: int, span: Span) -> None:
+    for width_ns in WIDTHS_NS:
+        forget_width(writer, series, width_ns, span)
+    _gather(writer, series, span)
+
+
+def _until(writer: Connection, series: int, mark_ns: int, now_ns: int) -> int:
+    """Return the end of the next step: whole minutes that are followed by a reading."""
+    end_ns = now_ns + 1
+    times = writer.execute(NEXT_TIMES, (series, mark_ns, end_ns, MAX_READINGS)).fetchall()
+    if not times:
+        return mark_ns
+    first_ns, last_ns = (_floor(time[0], MINUTE_NS) for time in (times[0], times[-1]))
+    is_one_minute = len(times) == MAX_READINGS and last_ns == first_ns
+    return first_ns + MINUTE_NS if is_one_minute else max(mark_ns, last_ns)
+
+
+def _gather(writer: Connection, series: int, span: Span) -> None:
+    """Write the roll-ups of every width that end within a span."""
+    minutes = minutes_of(writer, series, span)
+    if minutes is not None:
+        insert_cells(writer, series, MINUTE_NS, minutes)
+    for finer_ns, width_ns in pairwise(WIDTHS_NS):
+        whole = (_floor(span[0], width_ns), _floor(span[1], width_ns))
+        cells = select_cells(writer, series, finer_ns, whole, rolled_columns())
+        if cells is not None:
+            insert_cells(writer, series, width_ns, cells.gathered(width_ns))
+
+
+def _floor(time_ns: int, width_ns: int) -> int:
+    return time_ns - time_ns % width_ns
+
 
 DUE = """
     SELECT id FROM (
@@ -18,34 +129,23 @@ DUE = """
 """
 
 
-class SqlRollups:
-    """The tables of roll-ups of one database.
-
-    Parameters
-    ----------
-    writing
-        Opens a transaction that is durable when left.
-    reading
-        Opens a connection that only reads.
-    """
-
-    def __init__(self, writing: Connect, reading: Connect) -> None:
-        self._writing, self._reading = writing, reading
+class RollupStore(Tables):
+    """Roll-ups of readings. Readings that are not aggregated yet are read one by one."""
 
     def due(self, now_ns: int) -> list[int]:
-        """Numbers of the bearings that have readings to gather, the one most behind first."""
+        """Return the bearings with readings to aggregate, the one furthest behind first."""
         with self._reading() as reader:
             rows = reader.execute(DUE, {"now_ns": now_ns, "width_ns": MINUTE_NS})
             return [int(row[0]) for row in rows]
 
     def gather(self, series: int, now_ns: int) -> None:
-        """Gather some readings of one bearing.
+        """Aggregate some readings of one bearing in one short transaction.
 
         Raises
         ------
         StoreError
-            If nothing was gathered; the message is the database's.
+            If nothing was aggregated.
         """
         with self._writing() as writer:
-            gather_anew(writer, series)
+            gather_again(writer, series)
             gather_next(writer, series, now_ns)

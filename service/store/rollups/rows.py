@@ -1,4 +1,4 @@
-"""Roll-ups by condition cell: rows and bytes."""
+"""Roll-ups by operating condition: rows and their encoding."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -17,21 +17,21 @@ from service.store.trends import IN_STATES, Span, at_least, at_most, select_layo
 NO_STATE = -1
 NO_BIN = np.iinfo(np.int64).min
 GRID = CellGrid()
-"""How fine conditions are told apart in roll-ups; a filter may cut through a cell all the same."""
+"""Resolution of operating conditions in roll-ups; a filter may still cut through a cell."""
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Under which conditions readings were taken.
+    """Operating conditions of readings.
 
     Parameters
     ----------
     state : (n,)
-        Operating state, `NO_STATE` where it is not known.
+        Operating state, `NO_STATE` if unknown.
     n_readings : (n,)
-        How many, usable or not.
+        Number of readings, usable or not.
     eccentricity_low, eccentricity_high, oil_low_c, oil_high_c : (n,)
-        Extremes, NaN where they are not known.
+        Extremes, NaN if unknown.
     """
 
     state: IntArray
@@ -43,12 +43,12 @@ class Conditions:
 
     @classmethod
     def of(cls, state: IntArray, eccentricity: FloatArray, oil_c: FloatArray) -> "Conditions":
-        """Of single readings."""
+        """Return the conditions of single readings."""
         one = np.ones(state.size, dtype=np.int64)
         return cls(state, one, eccentricity, eccentricity, oil_c, oil_c)
 
     def summed(self, order: IntArray, starts: IntArray) -> "Conditions":
-        """One for each run of rows of an order; all rows of a run are of one cell."""
+        """Aggregate runs of ordered rows; all rows of a run are of one cell."""
         return Conditions(
             self.state[order][starts],
             np.add.reduceat(self.n_readings[order], starts),
@@ -61,13 +61,13 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Cells:
-    """Summaries of readings with the conditions that they were taken under, in order of time."""
+    """Summaries of readings with their operating conditions, in order of time."""
 
     conditions: Conditions
     summaries: Summaries
 
     def gathered(self, width_ns: int) -> "Cells":
-        """The same in spans of this width: one for each condition of each span."""
+        """Aggregate into spans of a width, with one row for each condition of each span."""
         bucket = self.summaries.time_ns // width_ns
         keys = np.stack(
             [
@@ -86,7 +86,7 @@ class Cells:
         )
 
     def slots(self) -> IntArray:
-        """Number of each cell within its span."""
+        """Return the number of each cell within its span."""
         time_ns = self.summaries.time_ns
         first = np.flatnonzero(np.concatenate([[True], np.diff(time_ns) != 0]))
         lengths = np.diff(np.append(first, time_ns.size))
@@ -94,18 +94,18 @@ class Cells:
 
 
 def together(one: Cells, other: Cells) -> Cells:
-    """Cells of both, the one's first: to be gathered, which puts them in order."""
+    """Concatenate cells; aggregating them restores the order."""
     conditions = Conditions(
         *(
             np.concatenate([getattr(one.conditions, name), getattr(other.conditions, name)])
             for name in (field.name for field in fields(Conditions))
         )
     )
-    return Cells(conditions, one.summaries.followed_by(other.summaries))
+    return Cells(conditions, Summaries.joined([one.summaries, other.summaries]))
 
 
 def bins(value: FloatArray, width: float) -> IntArray:
-    """Bin of each value, with bounds as people write them; `NO_BIN` where there is no value."""
+    """Return the bin of each value, with decimal bounds; `NO_BIN` where there is no value."""
     known = np.isfinite(value)
     safe = np.clip(np.where(known, value, 0.0), -1e9, 1e9)
     number = np.floor(safe / width).astype(np.int64)
@@ -115,18 +115,18 @@ def bins(value: FloatArray, width: float) -> IntArray:
 
 
 PART_COLUMNS = 24
-"""Columns of one part: its bytes fit into a page's share, without a chain of further pages."""
+"""Columns per part, whose bytes fit in a page without overflow pages."""
 
 
 def parts_of(columns: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
-    """Columns cut into parts, each with neighbours of the catalogue."""
+    """Split columns into parts of neighbours."""
     return tuple(
         columns[first : first + PART_COLUMNS] for first in range(0, len(columns), PART_COLUMNS)
     )
 
 
 def encoded(summaries: Summaries) -> list[bytes]:
-    """Bytes of each row."""
+    """Return the bytes of each row."""
     usable = summaries.count > 0
     packed = np.packbits(usable, axis=1)
     found: list[bytes] = [b""] * len(packed)
@@ -177,7 +177,7 @@ def _record(n_columns: int, n_usable: int) -> np.dtype[np.void]:
 
 
 def _alike(patterns: list[bytes]) -> list[tuple[bytes, npt.NDArray[np.int64]]]:
-    """Rows by the columns in which they have numbers: few patterns, many rows."""
+    """Group rows by the columns that have numbers: there are few patterns and many rows."""
     rows: dict[bytes, list[int]] = {}
     for row, pattern in enumerate(patterns):
         rows.setdefault(pattern, []).append(row)
@@ -224,16 +224,15 @@ ROLLUP_TABLES = """
         ON CONFLICT DO NOTHING;
     END;
 """
-"""Statements of the migration that brings them.
+"""Migration that creates the tables.
 
-Whoever writes a reading into what has been gathered already marks its hour in the same transaction,
-and until that is gathered anew nobody reads its roll-ups.
-"""
+A reading that is written into aggregated time schedules its hour to be redone in the same
+transaction. Until then roll-ups of that hour are not read."""
 
 
 NS_PER_S = 1_000_000_000
 WIDTHS_S = (60, 600, 3600)
-"""Finest first; each divides the next, and the last one is that of what is redone."""
+"""Finest first; each divides the next, and the last one is the unit of redoing."""
 
 WIDTHS_NS = tuple(width * NS_PER_S for width in WIDTHS_S)
 HOUR_NS = WIDTHS_NS[-1]
@@ -285,12 +284,12 @@ def select_cells(
     names: tuple[str, ...],
     asked: Mapping[str, object] = ANYTHING,
 ) -> Cells | None:
-    """Cells that readings which are asked for may be in; None if there are none.
+    """Return the cells that may contain readings of a query; None if there are none.
 
     Parameters
     ----------
     names
-        Columns that are wanted.
+        Requested columns.
     asked
         Bounds of the conditions.
     """
@@ -320,7 +319,7 @@ def _conditions(rows: Iterable[tuple[object, ...]]) -> Conditions:
 
 
 def _nothing(names: tuple[str, ...], start_ns: IntArray) -> Summaries:
-    """Readings of quantities that nobody knew at the time."""
+    """Return empty summaries, as of unknown quantities."""
     value = np.full((start_ns.size, len(names)), np.nan)
     level = np.full(value.shape, Level.BAD, dtype=np.uint8)
     count = np.zeros(value.shape, dtype=np.int64)
@@ -334,13 +333,13 @@ def _put(
     width_ns: int,
     rows: list[tuple[int, int, bytes]],
 ) -> None:
-    """Put the columns of one layout where they belong."""
+    """Copy the columns of one layout into summaries."""
     if not rows:
         return
     start_ns, slot = (np.array([row[i] for row in rows], dtype=np.int64) for i in (0, 1))
     wanted = start_ns // width_ns * MOST_SLOTS + slot
     where = np.searchsorted(places, wanted)
-    has_cell = np.flatnonzero(np.take(places, where, mode="clip") == wanted)  # or it is damaged
+    has_cell = np.flatnonzero(np.take(places, where, mode="clip") == wanted)
     where, start_ns = where[has_cell], start_ns[has_cell]
     part = decoded(layout.quantities, start_ns, [rows[i][2] for i in has_cell])
     theirs = [column for column, name in enumerate(layout.quantities) if name in into.names]

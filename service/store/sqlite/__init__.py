@@ -1,4 +1,4 @@
-"""SQLite behind the store's interface."""
+"""SQLite implementation of the store."""
 
 from service.store.sqlite.store import SqliteStore
 

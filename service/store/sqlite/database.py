@@ -1,4 +1,4 @@
-"""SQLite under the store: WAL, synchronous=FULL, one writer, short reads."""
+"""SQLite database: WAL, synchronous=FULL, one writer, short reads."""
 
 import sqlite3
 from collections.abc import Iterator
@@ -9,45 +9,48 @@ from acquisition.clock import SystemClock
 from service.settings.storage import Origin
 from service.store.database import Connection, Unreadable
 from service.store.highwater.commits import CommitMarks
-from service.store.highwater.file import MarkFile, mark_path
+from service.store.highwater.mark import MarkFile, mark_path
 from service.store.holds import why_unusable
 from service.store.port import RefusedRowError, StoreError
-from service.store.seals import DamageLog
-from service.store.sqlite.holding import FileHold, held
+from service.store.seals import DamageLog, Seals
+from service.store.sqlite.connections import Readers, Writer, opened
+from service.store.sqlite.file import (
+    FileHold,
+    OpenedFile,
+    error_message,
+    held,
+    is_of_the_row,
+    truncation_of,
+)
 from service.store.sqlite.migrating import migrate
-from service.store.sqlite.opened_file import OpenedFile, why_cut
-from service.store.sqlite.readers import Readers
-from service.store.sqlite.sealing import Seals
-from service.store.sqlite.trouble import is_of_the_row, told
-from service.store.sqlite.writer import Writer, opened
 
 PAGE_BYTES = 8192
-"""In pages of half that size, a result of all quantities would need a page of its own."""
+"""A result with all quantities would fill a page of half that size."""
 
 EVER_HAD = "SELECT 1 FROM sqlite_sequence WHERE name = ?"
 HAS_TRAIL = "SELECT 1 FROM sqlite_master WHERE name = 'audit'"
 
 
 class SqliteDatabase:
-    """One database file; may be used from several threads, writes are taken one at a time.
+    """One database file; used from several threads, with one writing transaction at a time.
 
     Parameters
     ----------
     path
-        Created, with its folder, if it does not exist.
+        Path of the file; created, with its folder, if missing.
     origin
-        What it is to hold; a file that holds the other is refused.
+        Origin of its data; a file with data of the other origin is refused.
 
     Attributes
     ----------
     had_trail
-        Whether there was an audit trail in it before it was opened.
+        Whether it had an audit trail before it was opened.
     damage
-        Rows that were found not to be what was written.
+        Damaged rows found since the start.
     marks
-        Whether it is the database that was here last.
+        High-water mark.
     file
-        Whether its file is still the one that was opened.
+        Identity of the opened file.
 
     Raises
     ------
@@ -62,12 +65,12 @@ class SqliteDatabase:
         self.damage = DamageLog()
         self.seals = Seals(self.damage)
         self.file = OpenedFile(path)
-        self._readers = Readers(path, prepare=self.seals.guard, require=self.file.require)
+        self._readers = Readers(path, prepare=self.seals.install_views, require=self.file.require)
         self.marks = CommitMarks(MarkFile(mark_path(path)), SystemClock().now_ns)
-        with self._renamed_errors():
+        with self._store_errors():
             if (unusable := why_unusable(path)) is not None:
                 raise StoreError(unusable)
-            if (cut := why_cut(path)) is not None:
+            if (cut := truncation_of(path)) is not None:
                 raise StoreError(f"{path}: {cut}")
             connection = opened(path)
             try:
@@ -78,16 +81,16 @@ class SqliteDatabase:
             self.file.remember()
 
     def close(self) -> None:
-        """Release the file; closing twice is fine."""
-        self._readers.close()  # first: the last to close brings the journal into the file
+        """Close all connections; closing twice has no effect."""
+        self._readers.close()  # first: the last connection to close moves the log into the file
         with self.writer.lock:
             self.writer.close()
         self.file.keep_logs_apart()
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """Open a transaction of the one writer; durable, and marked as such, when left."""
-        with self.writer.lock, self._renamed_errors():
+        """Open a transaction; committed, durable and counted when left."""
+        with self.writer.lock, self._store_errors():
             self.file.require()
             with self.writer.transaction() as writer:
                 yield writer
@@ -96,8 +99,8 @@ class SqliteDatabase:
 
     @contextmanager
     def reading(self, unreadable: Unreadable = "strict") -> Iterator[sqlite3.Connection]:
-        """Open a look at one state of the file."""
-        with self._renamed_errors(), self._readers.reading() as reader:
+        """Open a read-only transaction, which sees one state of the file."""
+        with self._store_errors(), self._readers.reading() as reader:
             if unreadable == "strict":
                 yield reader
                 return
@@ -106,39 +109,39 @@ class SqliteDatabase:
             reader.text_factory = str
 
     def give_back(self) -> bool:
-        """Give some free room back to the disk; whether there is more."""
-        with self.writer.lock, self._renamed_errors():
+        """Return some free space to the disk; return whether there is more."""
+        with self.writer.lock, self._store_errors():
             return self.writer.give_back()
 
     def ever_had(self, connection: Connection, table: str) -> bool:
-        """Whether a table that numbers its rows ever had one."""
+        """Return whether a table that numbers its rows ever had one."""
         return connection.execute(EVER_HAD, (table,)).fetchone() is not None
 
     def hold(self, name: str) -> FileHold:
-        """Take a name, by the lock of a file beside the database."""
+        """Hold a name by the lock of a file beside the database."""
         return held(self._path, name)
 
     def _prepare(self, connection: sqlite3.Connection, origin: Origin) -> bool:
-        """Bring the file up to date; whether it had an audit trail before."""
-        said = self.marks.said()
+        """Upgrade the file; return whether it had an audit trail before."""
+        in_file = self.marks.in_file()
         for setting in (f"page_size = {PAGE_BYTES}", "auto_vacuum = INCREMENTAL"):
-            connection.execute(f"PRAGMA {setting}")  # of a file yet to be written
+            connection.execute(f"PRAGMA {setting}")  # effective only in a new file
         had_trail = connection.execute(HAS_TRAIL).fetchone() is not None
-        migrate(connection, str(self._path), origin)  # first: what is not ours stays as it is
+        migrate(connection, str(self._path), origin)  # first: a foreign file stays unchanged
         self.writer = Writer(self._path, connection, self.marks, self.seals.begin)
         with self.writer.transaction():
-            self.marks.open(connection, said)
+            self.marks.open(connection, in_file)
             self.seals.begin(connection)
         return had_trail
 
     @contextmanager
-    def _renamed_errors(self) -> Iterator[None]:
+    def _store_errors(self) -> Iterator[None]:
         try:
             yield
         except (OSError, sqlite3.Error, OverflowError, UnicodeEncodeError) as error:
             kind = RefusedRowError if is_of_the_row(error) else StoreError
-            raise kind(told(self._path, error)) from error
-        except UnicodeDecodeError as error:  # in words of SQLite's about what is damaged
+            raise kind(error_message(self._path, error)) from error
+        except UnicodeDecodeError as error:  # in an error message about damage
             raise StoreError(
-                f"{self._path}: the file is damaged: names in it are no text"
+                f"{self._path}: the file is damaged: names in it are not text"
             ) from error

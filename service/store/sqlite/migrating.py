@@ -1,4 +1,4 @@
-"""Bringing a SQLite file to the newest schema."""
+"""Migration of a SQLite file to the current schema."""
 
 import sqlite3
 
@@ -7,18 +7,18 @@ from service.store import schema
 from service.store.port import StoreError
 
 APPLICATION_IDS = {Origin.LIVE: 0x5057_4454, Origin.REPLAY: 0x5057_5250}
-"""Mark the file as padwatch's, and as what it is (``PRAGMA application_id``)."""
+"""Mark of padwatch's files by origin (``PRAGMA application_id``)."""
 
 
 def migrate(connection: sqlite3.Connection, name: str, origin: Origin = Origin.LIVE) -> None:
-    """Bring a database to the newest schema, one transaction a step.
+    """Migrate a database to the current schema, one transaction per step.
 
     Raises
     ------
     StoreError
         If the file belongs to another program, to a newer padwatch, or to the other origin.
     """
-    connection.execute("BEGIN")  # one look at all three: another process may be upgrading
+    connection.execute("BEGIN")  # one state of all three: another process may be upgrading
     n_tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
     version = int(connection.execute("PRAGMA user_version").fetchone()[0])
     application = int(connection.execute("PRAGMA application_id").fetchone()[0])
@@ -28,7 +28,7 @@ def migrate(connection: sqlite3.Connection, name: str, origin: Origin = Origin.L
         raise StoreError(f"{name} is not a padwatch database; choose another data folder")
     if version > len(schema.MIGRATIONS):
         raise StoreError(
-            f"{name} has schema {version}, this padwatch knows up to {len(schema.MIGRATIONS)};"
+            f"{name} has schema {version}, this padwatch supports up to {len(schema.MIGRATIONS)};"
             " run the padwatch that wrote it, or restore a backup"
         )
     for number in range(version, len(schema.MIGRATIONS)):
@@ -39,13 +39,13 @@ def _require_origin(application: int, name: str, origin: Origin) -> None:
     for other, application_id in APPLICATION_IDS.items():
         if other is not origin and application == application_id:
             raise StoreError(
-                f"{name} holds {other} results and is not opened for {origin} ones;"
+                f"{name} holds {other} results and cannot be used for {origin} ones;"
                 " choose another data folder"
             )
 
 
 def _step(connection: sqlite3.Connection, number: int, application_id: int) -> None:
-    """Lead from one schema to the next, unless another process has done so meanwhile."""
+    """Apply one migration, unless another process has done so meanwhile."""
     try:
         connection.executescript(
             f"BEGIN IMMEDIATE; PRAGMA application_id = {application_id};"

@@ -1,35 +1,39 @@
-"""The store in a SQLite file."""
+"""Store in a SQLite file."""
 
 import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from threading import Lock
 
 from service.settings.storage import Origin
 from service.store.access.audit_verification import head_path
-from service.store.audit_chain import begin_head
-from service.store.integrity import Marked
+from service.store.audit import Trail, begin_head
+from service.store.integrity import Integrity
 from service.store.outbox import Address, no_recipients
 from service.store.port import StoreError
-from service.store.retention.sql import SqlRetention
-from service.store.spectra_port import SpectraLimits
-from service.store.sql_store import SqlStore
+from service.store.retention import RetentionStore
+from service.store.spectra import SpectraLimits
+from service.store.sqlite.checking import Scrubber
+from service.store.sqlite.connections import BUSY_TIMEOUT_S
 from service.store.sqlite.database import SqliteDatabase
-from service.store.sqlite.scrubbing import Scrubber
+from service.store.store import Store
 
 
-class SqliteStore(SqlStore):
-    """One database file; may be used from several threads, writes are taken one at a time.
+class SqliteStore(Store):
+    """Store in one database file; used from several threads, with one writer at a time.
 
     Parameters
     ----------
     path
-        Created, with its folder, if it does not exist.
+        Path of the file; created, with its folder, if missing.
     origin
-        What it is to hold; a file that holds the other is refused.
+        Origin of its data; a file with data of the other origin is refused.
     address
-        Who is to be told of events of alarms.
+        Function that returns the messages about an event of an alarm.
     spectra
-        How many spectra are kept.
+        Limits of stored spectra.
 
     Raises
     ------
@@ -51,12 +55,11 @@ class SqliteStore(SqlStore):
             if not database.had_trail:
                 begin_head(head_path(path))
             super().__init__(database, head_path(path), address, spectra)
-            self.retention = SqlRetention(self._writing, self._reader, database.give_back)
+            self.retention = RetentionStore(self._writing, self._reader, database.give_back)
             scrubber = Scrubber(database, database.seals, database.damage)
-            self.integrity = Marked(
-                database.marks,
-                self._writing,
+            self.integrity = Integrity(
                 self._chain,
+                database.marks,
                 database.damage,
                 scrubber.check_some,
                 database.file.require,
@@ -70,10 +73,33 @@ class SqliteStore(SqlStore):
 
     @property
     def _writer(self) -> sqlite3.Connection:
-        """The connection that writes now; another one after an error of the disk."""
+        """Current writing connection; replaced after an error of the disk."""
         return self._file.writer.connection
 
     @property
     def _lock(self) -> Lock:
-        """Held while somebody writes."""
+        """Lock of the writing connection."""
         return self._file.writer.lock
+
+
+def file_trail(database: Path) -> Trail:
+    """Return the audit trail of a database file; it is opened, but not changed, when it is read."""
+    return Trail(partial(_opened, database), head_path(database))
+
+
+@contextmanager
+def _opened(database: Path) -> Iterator[sqlite3.Connection]:
+    if not database.exists():
+        raise StoreError(f"{database.absolute()}: there is no database")
+    uri = f"{database.absolute().as_uri()}?mode=ro"
+    try:
+        with closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as reader:
+            reader.text_factory = _exact
+            yield reader
+    except (OSError, sqlite3.Error, UnicodeDecodeError) as error:
+        raise StoreError(f"{database}: {error}") from error
+
+
+def _exact(text: bytes) -> str:
+    """Decode text so that every byte stays distinguishable, also where it is not UTF-8."""
+    return text.decode("utf-8", "surrogateescape")

@@ -11,8 +11,8 @@ from core.monitor.assessment import Assessment
 from core.quality import GOOD, Reading, Reason, missing, uncertain
 from rigs.rolled_trends import require_same
 from service.store.port import Trend, TrendQuery
-from service.store.retention.limits import RetentionLimits
-from service.store.sql_store import SqlStore
+from service.store.retention import Ages
+from service.store.store import Store
 
 Build = Callable[..., Assessment]
 
@@ -22,13 +22,13 @@ T0 = 1_767_225_600_000_000_000
 HOURS = 9
 NOW_NS = T0 + HOURS * HOUR_NS
 NAMES = ("speed_rpm", "stiffness_xx_n_per_m", "oil_temperature_c")
-KEEP_NOTHING = RetentionLimits(readings_ns=0)
+KEEP_NOTHING = {"readings_days": 0}
 
 
 TIERS = (
-    (RetentionLimits(readings_ns=0), (2, 10, 60, 120)),
-    (RetentionLimits(readings_ns=0, minutes_ns=0), (10, 30, 60, 120)),
-    (RetentionLimits(readings_ns=0, minutes_ns=0, ten_minutes_ns=0), (60, 120)),
+    ({"readings_days": 0}, (2, 10, 60, 120)),
+    ({"readings_days": 0, "minutes_days": 0}, (10, 30, 60, 120)),
+    ({"readings_days": 0, "minutes_days": 0, "ten_minutes_days": 0}, (60, 120)),
 )
 """What is kept, and how wide buckets are out of it, in minutes."""
 
@@ -67,14 +67,14 @@ def result_at(
     return replace(build(at, **readings), condition=BearingCondition(state, True, None))
 
 
-def delete_all(store: SqlStore, limits: RetentionLimits = KEEP_NOTHING) -> None:
+def delete_all(store: Store, limits: Ages = KEEP_NOTHING) -> None:
     """Delete until nothing is due."""
     for series in series_of(store):
         while store.retention.delete(series, limits, NOW_NS):
             pass
 
 
-def series_of(store: SqlStore) -> list[int]:
+def series_of(store: Store) -> list[int]:
     """Numbers of all series."""
     return list(store.retention.series())
 

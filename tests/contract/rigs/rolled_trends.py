@@ -8,13 +8,13 @@ from pathlib import Path
 from core.monitor.assessment import Assessment
 from rigs.memory_folder import memory_folder
 from service.store.port import Trend
-from service.store.sql_store import SqlStore
 from service.store.sqlite import SqliteStore
+from service.store.store import Store
 
 LATER_NS = 1 << 62
 
 
-def gather_all(store: SqlStore, now_ns: int = LATER_NS) -> None:
+def gather_all(store: Store, now_ns: int = LATER_NS) -> None:
     """Gather until nothing is due."""
     while due := store.rollups.due(now_ns):
         for series in due:

@@ -43,7 +43,7 @@ from service.measuring.references import ReferencesInForce
 from service.measuring.simulated_sources import simulated_feed
 from service.notifications.sender import Deliveries
 from service.recordings.segment import CaptureFile
-from service.reports.keeper import EvidenceCollector
+from service.reports.collector import EvidenceCollector
 from service.reports.routes import EvidenceService
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.plant import PlantFile

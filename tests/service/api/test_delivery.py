@@ -5,7 +5,7 @@ from typing import Any
 from core.alarms.alarm import Alarm, AlarmIdentity, AlarmNews, AlarmRule
 from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
-from service.store.outbox import OutboxMessage, MessageState
+from service.store.outbox import MessageState, OutboxMessage
 from service.store.sqlite import SqliteStore
 
 ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
@@ -23,7 +23,9 @@ async def test_what_waits_for_somebody_who_has_left_the_plant_file_is_not_forgot
     assert (found["n_waiting"], found["n_failing"], found["receivers"]) == (0, 0, [])
     ids = iter(("a", "b", "c"))
     store._address = lambda *_: [
-        OutboxMessage("desk", next(ids), "{}", 10**18, is_urgent=False, is_active=True, closes=False)
+        OutboxMessage(
+            "desk", next(ids), "{}", 10**18, is_urgent=False, is_active=True, closes=False
+        )
     ]
     for subject in ("UJB", "LJB", "TJB"):
         store.append([], [], [news(subject)])

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from service.store.gap_reference import GapReference, ReferenceSource
+from service.store.references import GapReference, ReferenceSource
 
 UJB = "/api/v1/units/U1/bearings/UJB"
 T0 = 1_767_225_600_000_000_000

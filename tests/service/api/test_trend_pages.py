@@ -17,7 +17,7 @@ from core.monitor.assessment import Assessment
 from core.quality import Reading
 from service.api.tables import Column, csv_pieces, parquet_file
 from service.settings.plant import PlantFile
-from service.store.film_port import FilmHistory
+from service.store.film_readings import FilmHistory
 
 UJB = "/api/v1/units/U1/bearings/UJB"
 START_NS = 1_767_225_600_000_000_000

@@ -12,12 +12,12 @@ from rigs.tiers import fast_and_long
 
 from service.store.access.audit_entries import AuditAction
 from service.store.access.audit_verification import head_path
-from service.store.audit_chain import COLUMNS
+from service.store.audit import COLUMNS
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.trail import verify_trail
+from service.store.sqlite.store import file_trail
 
 N_ENTRIES = 9
-NAMES = COLUMNS.split(", ")
+NAMES = list(COLUMNS)
 
 
 class Bench:
@@ -123,7 +123,7 @@ KINDS = [flip, flip, flip, drop, swap, renumber, shift, double, cut]
 
 @pytest.mark.parametrize("n_corruptions", fast_and_long(150, 2000))
 def test_many_ways_to_damage_a_trail_are_all_noticed(bench: Bench, n_corruptions: int) -> None:
-    assert verify_trail(bench.path).is_whole
+    assert file_trail(bench.path).verify().is_whole
     unnoticed = []
     for seed in range(n_corruptions):
         chance = random.Random(seed)  # noqa: S311
@@ -132,11 +132,11 @@ def test_many_ways_to_damage_a_trail_are_all_noticed(bench: Bench, n_corruptions
         bench.run(kind, seed)
         if without_head:
             bench.head.unlink()
-        if verify_trail(bench.path).is_whole:
+        if file_trail(bench.path).verify().is_whole:
             unnoticed.append((seed, kind.__name__, without_head))
         bench.repair()
     assert unnoticed == []
-    assert verify_trail(bench.path).is_whole
+    assert file_trail(bench.path).verify().is_whole
 
 
 @pytest.mark.parametrize("n_bits", fast_and_long(1, 8))
@@ -146,13 +146,13 @@ def test_every_bit_of_the_head_counts(bench: Bench, n_bits: int) -> None:
         for bit in ((at + n) % 8 for n in range(n_bits)):
             changed = whole[:at] + bytes([whole[at] ^ (1 << bit)]) + whole[at + 1 :]
             bench.head.write_bytes(changed)
-            assert not verify_trail(bench.path).is_whole, changed
+            assert not file_trail(bench.path).verify().is_whole, changed
 
 
 def finding_after(bench: Bench, statement: str) -> str:
     with closing(bench.opened()) as database:
         database.executescript(statement)
-    found = verify_trail(bench.path).finding
+    found = file_trail(bench.path).verify().finding
     assert found is not None
     return found.detail
 
@@ -170,11 +170,11 @@ ALTERED: list[tuple[str, str]] = [
     ("DELETE FROM audit", "entries 1 to 9 are missing at the end: the head names 9"),
     (
         "DELETE FROM audit WHERE number = 3; UPDATE audit SET number = 3 WHERE number = 8",
-        "entry 3 is out of order: what stands there is entry 8",
+        "entry 3 is out of order: it holds entry 8",
     ),
     (
         "UPDATE audit SET number = 0 WHERE number = 3",
-        "entry 0 stands where entry 1 belongs",
+        "entry 0 is in the place of entry 1",
     ),
 ]
 
@@ -192,5 +192,5 @@ def test_a_whole_trail_of_another_database_is_not_taken_for_this_one(
         other.audit.record([deed(n, actor="somebody else") for n in range(N_ENTRIES)])
     bench.path.write_bytes((tmp_path / "other.sqlite3").read_bytes())
 
-    found: Any = verify_trail(bench.path).finding
+    found: Any = file_trail(bench.path).verify().finding
     assert found.detail == "entry 9 is not the one the head names"

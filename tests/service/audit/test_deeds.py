@@ -17,13 +17,12 @@ from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
 from service.app.service_audit import start_deeds, stop_deed
 from service.store.access.audit_entries import ActedNews, Acting, AuditEntry, Source, acting_as
-from service.store.audit_port import AuditQuery
-from service.store.film_port import BaselineStep, StoredStep
-from service.store.gap_reference import GapReference, ReferenceSource
+from service.store.audit import AuditQuery
+from service.store.baselines import BaselineStep, StoredStep
 from service.store.port import StoreError
+from service.store.references import GapReference, ReferenceSource, SetVectorReference
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.trail import verify_trail
-from service.store.vector_reference_port import SetVectorReference
+from service.store.sqlite.store import file_trail
 
 T0 = 1_767_225_600_000_000_000
 ALERT = Judgement(AlarmLevel.ALERT, value=160.25, limit=150.0, reason="above_limit")
@@ -163,7 +162,7 @@ def test_what_cannot_be_told_is_not_done_and_the_other_way_round(
     with pytest.raises(StoreError):
         store.films.add_steps([step(BaselineStep.FROZEN)])
     assert count(store) == 0
-    assert verify_trail(path).is_whole
+    assert file_trail(path).verify().is_whole
 
 
 def test_a_start_tells_whether_the_configuration_is_another(store: SqliteStore) -> None:

@@ -12,13 +12,12 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from core.samples.gaps import Gap
-from service.store.access.audit_entries import MAX_DOCUMENT, MAX_NAME, AuditEntry, AuditAction
+from service.store.access.audit_entries import MAX_DOCUMENT, MAX_NAME, AuditAction, AuditEntry
 from service.store.access.audit_verification import HEAD_DIFFERED, AuditHead, head_path, read_head
-from service.store.audit import Trail
-from service.store.audit_port import AuditQuery
+from service.store.audit import AuditQuery, Trail
 from service.store.port import StoreError, UnitGap
 from service.store.sqlite import SqliteStore
-from service.store.sqlite.trail import verify_trail
+from service.store.sqlite.store import file_trail
 
 Build = Callable[..., AuditAction]
 
@@ -70,7 +69,7 @@ def test_the_database_refuses_to_change_entries(
     ):
         with closing(sqlite3.connect(path)) as other, pytest.raises(sqlite3.IntegrityError):
             other.execute(statement)
-    assert verify_trail(path).is_whole
+    assert file_trail(path).verify().is_whole
 
 
 @settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -87,7 +86,7 @@ def test_any_name_and_any_reason_can_be_written(
     newest = store.audit.entries(AuditQuery(limit=1))[0]
     assert len(newest.actor) <= MAX_NAME
     assert newest.actor[:200] == actor.encode("utf-8", "replace").decode()[:200]
-    assert verify_trail(path).is_whole
+    assert file_trail(path).verify().is_whole
 
 
 def test_a_document_without_end_is_kept_as_its_beginning(store: SqliteStore, deed: Build) -> None:
@@ -102,7 +101,7 @@ def test_several_writers_leave_no_hole(store: SqliteStore, path: Path, deed: Bui
     with closing(SqliteStore(path)) as other, ThreadPoolExecutor(6) as pool:
         list(pool.map(lambda n: (store, other)[n % 2].audit.record([deed(n)] * 3), range(24)))
 
-    verdict = verify_trail(path)
+    verdict = file_trail(path).verify()
     assert (verdict.finding, verdict.n_entries, verdict.n_behind) == (None, 72, 0)
     assert read_head(head_path(path)) == AuditHead(72, verdict.hash)
 
@@ -129,25 +128,25 @@ def test_a_crash_before_the_head_was_written_is_no_tampering_and_is_repaired(
     store.audit.record([deed(1), deed(2)])
     head_path(path).write_bytes(before)  # as if the process had ended in between
 
-    after_crash = verify_trail(path)
+    after_crash = file_trail(path).verify()
     with closing(SqliteStore(path)) as again:
         again.audit.record([deed(3)])
-    repaired = verify_trail(path)
+    repaired = file_trail(path).verify()
 
-    assert (after_crash.finding, after_crash.n_behind, after_crash.told) == (None, 2, ())
-    assert (repaired.finding, repaired.n_behind, repaired.told) == (None, 0, ())
+    assert (after_crash.finding, after_crash.n_behind, after_crash.contradictions) == (None, 2, ())
+    assert (repaired.finding, repaired.n_behind, repaired.contradictions) == (None, 0, ())
     assert repaired.n_entries == 4
 
 
 def test_a_crash_before_the_very_first_entry_is_no_tampering(path: Path, deed: Build) -> None:
     SqliteStore(path).close()
-    empty = verify_trail(path)
+    empty = file_trail(path).verify()
     store = SqliteStore(path)
     store.audit.record([deed(0)])
     head_path(path).write_bytes(
         b'{"format": "padwatch-audit-head", "number": 0, "hash": "%s"}' % (b"0" * 64)
     )
-    after_crash = verify_trail(path)
+    after_crash = file_trail(path).verify()
     store.close()
 
     assert (empty.is_whole, empty.n_entries) == (True, 0)
@@ -166,9 +165,9 @@ def test_a_cut_trail_stays_noticed_after_the_service_has_gone_on(
     store.audit.record([deed(9)])
     store.audit.record([deed(10)])
 
-    verdict = verify_trail(path)
+    verdict = file_trail(path).verify()
     told = all_of(store)[2]
-    assert (verdict.is_whole, verdict.told) == (True, (3,))
+    assert (verdict.is_whole, verdict.contradictions) == (True, (3,))
     assert (told.actor, told.action) == ("padwatch", HEAD_DIFFERED)
     assert told.reason == (
         "the head names entry 4, the trail ended at 2" if with_head else "the head is not there"
@@ -180,7 +179,7 @@ def test_a_database_that_was_put_in_the_place_of_another_tells_so(path: Path, de
         path.unlink(missing_ok=True)
         with closing(SqliteStore(path)) as store:
             store.audit.record([deed(0)])
-    assert verify_trail(path).told == (1,)
+    assert file_trail(path).verify().contradictions == (1,)
 
 
 def test_a_head_that_cannot_be_written_stops_no_deed_and_is_written_later(
@@ -201,7 +200,7 @@ def test_a_head_that_cannot_be_written_stops_no_deed_and_is_written_later(
     assert str(head) in error
     assert store.audit.head_error is None
     assert [entry.action for entry in all_of(store)].count(HEAD_DIFFERED) == 1
-    assert verify_trail(path).is_whole
+    assert file_trail(path).verify().is_whole
 
 
 def test_results_leave_the_head_alone(store: SqliteStore, path: Path, deed: Build) -> None:
@@ -223,7 +222,7 @@ def test_a_transaction_that_fails_leaves_no_entry(
         store.audit.record([deed(1), deed(2, after={"value": float("nan")})])
     store.audit.record([deed(3)])
     assert [entry.number for entry in all_of(store)] == [1, 2]
-    assert verify_trail(path).is_whole
+    assert file_trail(path).verify().is_whole
 
 
 def test_a_trail_is_verified_while_others_write(
@@ -231,16 +230,16 @@ def test_a_trail_is_verified_while_others_write(
 ) -> None:
     with ThreadPoolExecutor(2) as pool:
         writing = pool.map(lambda n: store.audit.record([deed(n)]), range(100))
-        verdicts = [verify_trail(path) for _ in range(30)]
+        verdicts = [file_trail(path).verify() for _ in range(30)]
         list(writing)
-    assert [(v.finding, v.told) for v in verdicts] == [(None, ())] * 30
+    assert [(v.finding, v.contradictions) for v in verdicts] == [(None, ())] * 30
 
 
 def test_where_there_is_no_trail_that_is_said(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match="there is no database"):
-        verify_trail(tmp_path / "nothing.sqlite3")
+        file_trail(tmp_path / "nothing.sqlite3").verify()
     sqlite3.connect(tmp_path / "other.sqlite3").close()
     (tmp_path / "broken.sqlite3").write_bytes(b"no database at all" * 500)
     for name in ("other", "broken"):
         with pytest.raises(StoreError):
-            verify_trail(tmp_path / f"{name}.sqlite3")
+            file_trail(tmp_path / f"{name}.sqlite3").verify()

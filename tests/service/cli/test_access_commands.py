@@ -17,8 +17,8 @@ from service.api.auth.passwords import Hashing
 from service.cli.commands import app
 from service.runtime.process import made_by
 from service.store.access.identities import Identity, Role
-from service.store.access.port import AccessStore
-from service.store.audit_port import AuditQuery
+from service.store.access.tables import AccessStore
+from service.store.audit import AuditQuery
 from service.store.sqlite import SqliteStore
 
 PASSWORD = "rotor rope gauge"  # noqa: S105
@@ -109,7 +109,7 @@ def test_roles_and_passwords_change_and_accounts_go(
 @pytest.mark.parametrize(
     ("arguments", "password", "said"),
     [
-        (("add", "anna"), PASSWORD, "there is an account anna already"),
+        (("add", "anna"), PASSWORD, "account anna already exists"),
         (("add", "=anna"), PASSWORD, "a name has 1 to 64"),
         (("add", "berta"), "short", "a password has 12 to 256 characters"),
         (("add", "berta"), b"\xff" * 12, "no UTF-8 text"),

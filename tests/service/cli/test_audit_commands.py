@@ -27,7 +27,9 @@ def database(plant_path: Path) -> Path:
     """A plant's database with an entry for each hostile name."""
     path = plant_path.with_name("data") / "padwatch.sqlite3"
     store = SqliteStore(path)
-    store.audit.record([AuditAction(T0, name, "x", name, reason=name, after=name) for name in HOSTILE])
+    store.audit.record(
+        [AuditAction(T0, name, "x", name, reason=name, after=name) for name in HOSTILE]
+    )
     store.close()
     return path
 

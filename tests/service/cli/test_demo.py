@@ -13,7 +13,7 @@ from service.cli.daq import RunningDaq
 from service.measuring.simulated_sources import simulated_history
 from service.settings.plant import PlantFile
 from service.store.baselines import versions_after
-from service.store.film_port import FilmQuery
+from service.store.film_readings import FilmQuery
 from service.store.sqlite import SqliteStore
 
 PORTS = {"U1": 5021, "U2": 5022}

@@ -11,7 +11,7 @@ import pytest
 from rigs.command_line import padwatch
 
 from core.monitor.assessment import Assessment
-from service.store.highwater.comparison import MAX_BEHIND
+from service.store.highwater.commits import MAX_BEHIND
 from service.store.sqlite import SqliteStore, checking
 
 Build = Callable[..., Assessment]

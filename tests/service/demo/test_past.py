@@ -15,7 +15,7 @@ from service.measuring.simulated_sources import simulated_history
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.baselines import versions_after
-from service.store.film_port import FilmQuery
+from service.store.film_readings import FilmQuery
 from service.store.port import TrendQuery
 from service.store.sqlite import SqliteStore
 

@@ -17,7 +17,7 @@ from service.app.storage import captures_of, evidence_folders, evidence_of
 from service.live.live_view import LinkState, LiveView
 from service.measuring.films import FilmMonitor, film_monitor
 from service.reports.archive import EvidenceArchive
-from service.reports.capture_link import CapturePart, linked
+from service.reports.folders import CapturePart, linked
 from service.settings.core_values import machine_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile

@@ -15,7 +15,7 @@ from core.quality import Reading
 from service.recordings.around_alarms import Outcome
 from service.recordings.folders import ALARM
 from service.recordings.segment import write_alarms
-from service.reports import keeper as module
+from service.reports import collector as module
 from service.reports.archive import DamagedEvidenceError
 from service.reports.document import Evidence
 from service.reports.folders import INCOMPLETE, place_of
@@ -242,7 +242,7 @@ async def test_a_capture_that_was_finished_just_before_a_crash_is_linked_after_i
 
 
 async def test_samples_that_were_expected_and_never_came_are_lost(rig: Any, news: Make) -> None:
-    rig.keeper._camera = Expecting({u.id: u for u in rig.plant.unit}, rig.live, rig.films)
+    rig.keeper._taker = Expecting({u.id: u for u in rig.plant.unit}, rig.live, rig.films)
     await rig.write(news())
 
     assert samples(rig, frozenset({(SHAFT, 1)})) == "being_made"

@@ -11,7 +11,7 @@ from unittest.mock import Mock
 import pytest
 
 from service.reports.folders import Place, clear_leftovers, places, removed
-from service.reports.room import SURVEY_S, EvidenceLimits, EvidenceRetention
+from service.reports.retention import SURVEY_S, EvidenceLimits, EvidenceRetention
 
 RoomOf = Callable[..., EvidenceRetention]
 KB = b"x" * 1000

@@ -21,10 +21,10 @@ from core.change.shaft_response import learn_response
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel
 from core.machine.unit import Estimator
-from service.store.film_port import BaselineStep, FilmQuery, StoredStep
-from service.store.port import StoreError
+from service.store.baselines import BaselineStep, StoredStep
+from service.store.film_readings import FilmQuery
+from service.store.port import StoreError, ValueRange
 from service.store.sqlite import SqliteStore
-from service.store.value_range import ValueRange
 
 FilmLife = Callable[..., StiffnessHistory]
 Tell = Callable[..., list[FilmNews]]

@@ -26,7 +26,8 @@ from service.live.commands import (
 )
 from service.measuring.films import FilmMonitor
 from service.settings.films import FilmAlarmSettings
-from service.store.film_port import BaselineStep, FilmHistory, FilmQuery
+from service.store.baselines import BaselineStep
+from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.sqlite import SqliteStore
 
 DAY_NS = 86_400_000_000_000

@@ -8,7 +8,7 @@ from rigs.capturing import block, recorded_unit
 
 from acquisition.recordings.writer import RecordingWriter
 from service.recordings.library import RecordingLibrary
-from service.store.waveform_port import WaveformKind
+from service.store.waveforms import WaveformKind
 
 FIRST = "U1-20260101T000000.000Z-continuous"
 CAPTURE = "U1-20260101T000500.000Z-order1_shaft_x"

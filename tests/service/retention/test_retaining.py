@@ -8,13 +8,12 @@ from structlog.testing import capture_logs
 
 from acquisition.clock import Clock
 from core.units import DAY_NS
-from service.app.storage import retention_limits
 from service.settings.storage import RetentionSettings
 from service.store.loops import LOOK_S, RETENTION_PERIOD_S, RETENTION_REST_SHARE, RetentionLoop
 from service.store.port import StoreError
-from service.store.retention.limits import RetentionLimits
+from service.store.retention import Ages, ages_of
 
-LIMITS = RetentionLimits(readings_ns=DAY_NS)
+LIMITS = {"readings_days": DAY_NS}
 
 
 class OldStore:
@@ -39,7 +38,7 @@ class OldStore:
     def series(self) -> Sequence[int]:
         return list(self.left)
 
-    def delete(self, series: int, limits: RetentionLimits, now_ns: int) -> bool:
+    def delete(self, series: int, limits: Ages, now_ns: int) -> bool:
         assert (limits, now_ns <= self._clock.now_ns()) == (LIMITS, True)
         if self.refusal:
             raise StoreError(self.refusal)
@@ -73,7 +72,9 @@ async def test_bearings_take_turns_until_nothing_is_old(
     assert old.done == [1, 2] * 4
 
 
-async def test_it_rests_longer_than_it_works(retaining: RetentionLoop, stepped_clock: Clock) -> None:
+async def test_it_rests_longer_than_it_works(
+    retaining: RetentionLoop, stepped_clock: Clock
+) -> None:
     begun_s = stepped_clock.monotonic_s()
     await retaining.round()
 
@@ -95,7 +96,7 @@ async def test_what_cannot_be_deleted_is_told_once(old: OldStore, retaining: Ret
         for _ in range(3):
             await retaining.round()
 
-    assert [line["event"] for line in lines] == ["some of what is old cannot be deleted"]
+    assert [line["event"] for line in lines] == ["some old data cannot be deleted"]
 
 
 async def test_a_clock_that_is_years_ahead_or_less_than_a_day_of_results_makes_nothing_old(
@@ -119,5 +120,5 @@ def test_nothing_finer_is_kept_longer_than_what_is_coarser_and_zero_days_are_for
             RetentionSettings.model_validate(wrong)
     everything = dict.fromkeys(("readings_days", "minutes_days", "ten_minutes_days"), 0.0)
     RetentionSettings.model_validate(everything)
-    found = retention_limits(RetentionSettings(readings_days=1.5, films_days=0.0))
-    assert (found.readings_ns, found.films_ns) == (round(1.5 * DAY_NS), None)
+    found = ages_of(RetentionSettings(readings_days=1.5, films_days=0.0))
+    assert (found["readings_days"], found.get("films_days")) == (round(1.5 * DAY_NS), None)

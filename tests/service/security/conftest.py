@@ -12,8 +12,8 @@ from service.api.auth.authenticator import CredentialChecker
 from service.api.auth.backoff import Backoff
 from service.api.auth.passwords import Hashing
 from service.api.auth.people import AccountService
-from service.store.access.port import AccessStore
-from service.store.sql_store import SqlStore
+from service.store.access.tables import AccessStore
+from service.store.store import Store
 
 
 class CountingHasher(PasswordHasher):
@@ -35,13 +35,13 @@ def path(sqlite_place: SqlitePlace) -> Path:
 
 
 @pytest.fixture
-def store(store_place: Place) -> Iterator[SqlStore]:
+def store(store_place: Place) -> Iterator[Store]:
     with closing(store_place.open()) as opened:
         yield opened
 
 
 @pytest.fixture
-def access(store: SqlStore) -> AccessStore:
+def access(store: Store) -> AccessStore:
     return store.access
 
 

@@ -15,8 +15,7 @@ from service.api.auth.passwords import Hashing
 from service.api.auth.people import AccountService, create_key
 from service.settings.processes import why_closed
 from service.store.access.identities import Identity, Means, Permission, Role, SessionLimits, digest
-from service.store.access.port import AccessStore
-from service.store.access.tables import MAX_SESSIONS
+from service.store.access.tables import MAX_SESSIONS, AccessStore
 
 T0 = 1_767_225_600_000_000_000
 S = 1_000_000_000

@@ -23,9 +23,9 @@ from service.store.access.identities import (
     key_id,
     new_key,
 )
-from service.store.access.port import AccessRefusedError, AccessStore
-from service.store.audit_port import AuditQuery
-from service.store.sql_store import SqlStore
+from service.store.access.tables import AccessRefusedError, AccessStore
+from service.store.audit import AuditQuery
+from service.store.store import Store
 
 T0 = 1_767_225_600_000_000_000
 S = 1_000_000_000
@@ -51,7 +51,7 @@ def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(
 ) -> None:
     people.add("anna", Role.VIEWER, PASSWORD, T0)
     before = access.accounts.get("anna")
-    with pytest.raises(AccessRefusedError, match="an account anna already"):
+    with pytest.raises(AccessRefusedError, match="account anna already exists"):
         people.add("ANNA", Role.ADMIN, PASSWORD, T0)
     with pytest.raises(NameRefusedError):
         people.add("=anna", Role.VIEWER, PASSWORD, T0)
@@ -61,7 +61,7 @@ def test_an_account_of_a_name_in_use_or_not_accepted_changes_nothing(
 
 
 def test_neither_the_only_admin_nor_one_who_is_not_there_is_changed(
-    people: AccountService, access: AccessStore, store: SqlStore
+    people: AccountService, access: AccessStore, store: Store
 ) -> None:
     people.add("anna", Role.ADMIN, PASSWORD, T0)
     people.add("berta", Role.ENGINEER, PASSWORD, T0)
@@ -221,7 +221,7 @@ def test_a_revoked_key_opens_nothing_and_the_database_refuses_to_bring_it_back(
 
 
 def test_every_change_is_in_the_audit_trail_with_what_was_before_and_nothing_secret(
-    store: SqlStore, people: AccountService
+    store: Store, people: AccountService
 ) -> None:
     accounts = store.access.accounts
     token = people.offer_set_up(T0)

@@ -9,8 +9,8 @@ import pytest
 from harness.places import Place, SqlitePlace
 from rigs.memory_folder import path_in_memory  # noqa: F401 - a fixture
 
-from service.store.sql_store import SqlStore
 from service.store.sqlite import SqliteStore
+from service.store.store import Store
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def execute(path: Path) -> Callable[..., list[Any]]:
 
 
 @pytest.fixture
-def store(store_place: Place) -> Iterator[SqlStore]:
+def store(store_place: Place) -> Iterator[Store]:
     """An open, empty store."""
     opened = store_place.open()
     yield opened

@@ -9,13 +9,12 @@ from core.alarms.life_cycle import update
 from core.condition.operating_state import OperatingState
 from core.limits import AlarmLevel, Judgement
 from service.store.access.identities import ApiKey, Role
-from service.store.audit_port import AuditQuery
-from service.store.film_port import BaselineStep, StoredStep
-from service.store.gap_reference import GapReference, ReferenceSource
+from service.store.audit import AuditQuery
+from service.store.baselines import BaselineStep, StoredStep
 from service.store.outbox import MessageState
+from service.store.references import GapReference, ReferenceSource, SetVectorReference
 from service.store.sharing import Command, OpenCommand
-from service.store.sql_store import SqlStore
-from service.store.vector_reference_port import SetVectorReference
+from service.store.store import Store
 
 TOKEN, OTHER = b"t" * 32, b"o" * 32
 LATER = 10**18
@@ -26,7 +25,7 @@ VECTOR = SetVectorReference(
 )
 
 
-def test_what_is_written_again_because_nobody_could_tell_counts_once(store: SqlStore) -> None:
+def test_what_is_written_again_because_nobody_could_tell_counts_once(store: Store) -> None:
     step = StoredStep("U1", "UJB", None, BaselineStep.RENEWED, 7, "A", "overhaul", 7)
     key = ApiKey("k1", "wall", TOKEN, Role.VIEWER, ("U1",), 8, LATER)
     command = Command("c1", "U1", "alarm", "{}", "A", None, 9, LATER)
@@ -45,7 +44,7 @@ def test_what_is_written_again_because_nobody_could_tell_counts_once(store: SqlS
     assert len(store.audit.entries(AuditQuery())) == 5
 
 
-def test_nothing_waits_for_anybody_in_a_new_outbox(store: SqlStore) -> None:
+def test_nothing_waits_for_anybody_in_a_new_outbox(store: Store) -> None:
     assert list(store.outbox.backlogs()) == []
     assert not store.outbox.urgent("desk")
     assert store.outbox.expire("desk", 5, "too old", 6) == store.outbox.revive("desk", 7) == 0
@@ -55,7 +54,7 @@ def test_nothing_waits_for_anybody_in_a_new_outbox(store: SqlStore) -> None:
 
 @pytest.mark.parametrize("table", ["gap_reference", "vector_reference", "alarm_event", "audit"])
 def test_what_is_on_record_is_never_changed_or_taken_away(
-    store: SqlStore, store_place: Place, table: str
+    store: Store, store_place: Place, table: str
 ) -> None:
     store.add_reference(GAP)
     store.order1_references.add(VECTOR)

@@ -14,9 +14,8 @@ from core.alarms.operation import Acknowledge, Shelve, TakeOutOfService, operate
 from core.condition.cells import OperatingPoint
 from core.condition.operating_state import OperatingState
 from core.limits import INACTIVE, AlarmLevel, Judgement, unknown
-from service.store.port import AlarmQuery, StoreError
+from service.store.port import AlarmQuery, StoreError, ValueRange
 from service.store.sqlite import SqliteStore
-from service.store.value_range import ValueRange
 
 T0 = 1_767_225_600_000_000_000
 FULL, PART = OperatingState.FULL_LOAD, OperatingState.PART_LOAD

@@ -13,9 +13,11 @@ from rigs.store_fixtures import at
 
 from service.store.holds import OVER_A_NETWORK, FileSystem, file_system_of
 from service.store.port import StoreError
-from service.store.sqlite import SqliteStore, readers, writer
-from service.store.sqlite.readers import Readers
-from service.store.sqlite.trouble import leaves_in_doubt
+from service.store.sqlite import SqliteStore
+from service.store.sqlite import connections as readers
+from service.store.sqlite import connections as writer
+from service.store.sqlite.connections import Readers
+from service.store.sqlite.file import leaves_in_doubt
 
 
 @contextmanager
@@ -33,7 +35,9 @@ def test_a_limit_of_file_sizes_is_named_and_the_store_goes_on_when_it_is_raised(
     batch = [[assessment(at(10 * n + i), speed_rpm=1.0) for i in range(10)] for n in range(100)]
     with closing(SqliteStore(path)) as store:
         first = store._writer
-        refusal = pytest.raises(StoreError, match="no file may be larger than 1000000 bytes here")
+        refusal = pytest.raises(
+            StoreError, match="the limit of file sizes, 1000000 bytes, is reached"
+        )
         with files_up_to(1_000_000), refusal:
             for n_stored, some in enumerate(batch):  # noqa: B007 - the one that is refused
                 store.append(some, [])

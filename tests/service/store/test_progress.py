@@ -8,9 +8,10 @@ from rigs.assessments import assessment
 from rigs.store_fixtures import at
 
 from core.samples.gaps import Gap, Reach
-from service.store.port import Store, StoreError, UnitGap
+from service.store.port import StoreError, UnitGap
 from service.store.sharing import StreamPosition, UnitBeat, UnitReport
 from service.store.sqlite import SqliteStore
+from service.store.store import Store
 
 HERE = StreamPosition("U1", "plant of today", 10, 3, b'{"a": 0.1}')
 

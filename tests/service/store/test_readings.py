@@ -15,11 +15,12 @@ from core.monitor.assessment import Assessment
 from core.monitor.catalogue import CATALOGUE
 from core.quality import Level, Quality, Reading, Reason, missing, uncertain
 from service.runtime.asker import ASKER, Asker
-from service.store import sql_store, trends
-from service.store.port import QueryTooLargeError, RefusedRowError, StoreError
+from service.store import store as sql_store
+from service.store import trends
+from service.store.port import QueryTooLargeError, RefusedRowError, StoreError, ValueRange
 from service.store.series import Layout
-from service.store.sqlite import SqliteStore, readers
-from service.store.value_range import ValueRange
+from service.store.sqlite import SqliteStore
+from service.store.sqlite import connections as readers
 
 NAMES = tuple(quantity.name for quantity in CATALOGUE)
 

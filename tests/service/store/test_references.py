@@ -11,11 +11,10 @@ from rigs.store_fixtures import at
 from core.alarms.judgements import OrderVector, VectorReference
 from core.condition.operating_state import OperatingState
 from core.quality import Reading, Reason, missing, uncertain
-from service.store import sql_store
-from service.store.gap_reference import GapReference, ReferenceSource
+from service.store import store as sql_store
 from service.store.port import StoreError
+from service.store.references import GapReference, ReferenceSource, SetVectorReference
 from service.store.sqlite import SqliteStore
-from service.store.vector_reference_port import SetVectorReference
 
 T0 = 1_767_225_600_000_000_000
 

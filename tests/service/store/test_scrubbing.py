@@ -15,10 +15,11 @@ from service.measuring.integrity import IntegrityMonitor
 from service.runtime.heartbeats import PATIENCE_S, Heartbeats
 from service.runtime.periodic import LOOK_S
 from service.store.access.identities import Role, Session
-from service.store.audit_port import AuditQuery
+from service.store.audit import AuditQuery
 from service.store.loops import ScrubLoop
 from service.store.seals import Place
-from service.store.sqlite import SqliteStore, scrubbing
+from service.store.sqlite import SqliteStore
+from service.store.sqlite import checking as scrubbing
 from service.store.sqlite.checking import findings
 
 N = 40

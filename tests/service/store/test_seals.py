@@ -11,9 +11,9 @@ from rigs.rolled_trends import gather_all
 from rigs.store_fixtures import Execute, at, gap, query
 
 from service.store.access.identities import Role
-from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError, TrendQuery
-from service.store.seals import MAX_PLACES, DamageLog, Place, begun, seal_of
+from service.store.references import GapReference, ReferenceSource
+from service.store.seals import MAX_PLACES, DamageLog, Place, initial_crc, seal_of
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.checking import findings
 
@@ -31,8 +31,8 @@ def test_whatever_is_changed_in_a_row_changes_its_seal() -> None:
         (1, 2.5, b"text", b"\0\0", None),
     ]
 
-    assert len({seal_of(begun("t"), cells) for cells in (row, *others)}) == 1 + len(others)
-    assert seal_of(begun("t"), row) != seal_of(begun("u"), row)
+    assert len({seal_of(initial_crc("t"), cells) for cells in (row, *others)}) == 1 + len(others)
+    assert seal_of(initial_crc("t"), row) != seal_of(initial_crc("u"), row)
 
 
 def test_equal_rows_have_equal_seals_wherever_their_values_come_from() -> None:
@@ -40,9 +40,9 @@ def test_equal_rows_have_equal_seals_wherever_their_values_come_from() -> None:
     row = (1, 2**40, -(2**63), 2.5, -0.0, text, None, b"", text)
     same = (1, 2**40, -(2**63), 2.5, -0.0, bytes(bytearray(text)), None, b"", bytes([*text]))
 
-    assert seal_of(begun("t"), row) == seal_of(begun("t"), same)
+    assert seal_of(initial_crc("t"), row) == seal_of(initial_crc("t"), same)
     # as rows that were sealed before have it
-    assert seal_of(begun("t"), row) == 1_750_905_859
+    assert seal_of(initial_crc("t"), row) == 1_750_905_859
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ def test_a_schema_whose_names_are_no_text_is_refused_and_found(path: Path) -> No
             " WHERE name = 'strange'"
         )
 
-    with pytest.raises(StoreError, match="is damaged: names in it are no text"):
+    with pytest.raises(StoreError, match="is damaged: names in it are not text"):
         SqliteStore(path)
     assert [finding.kind for finding in findings(path)] == ["structure"]
 

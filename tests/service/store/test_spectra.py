@@ -18,8 +18,17 @@ from core.condition.operating_state import OperatingState
 from core.monitor.assessment import Assessment
 from core.quality import Level, Reason, missing
 from core.spectra.cross_spectrum import CrossSpectrum
-from service.store.spectra import HIGHEST_UM, LOWEST_UM, decode, encode
-from service.store.spectra_port import Spectra, SpectraLimits, SpectraQuery, Tier, TierLimits
+from service.store.spectra import (
+    HIGHEST_UM,
+    LOWEST_UM,
+    Spectra,
+    SpectraLimits,
+    SpectraQuery,
+    Tier,
+    TierLimits,
+    decode,
+    encode,
+)
 from service.store.sqlite import SqliteStore
 
 S = 1_000_000_000

@@ -39,18 +39,18 @@ def folder_that_cannot_be_made(data: Path) -> None:
     data.parent.chmod(0o555)
 
 
-GIVE_FILE = "may not read and write {data}/padwatch.sqlite3: give it to that user"
-GIVE_FOLDER = "may not look into or make the folder {data}: give it to that user"
+GIVE_FILE = "may not read and write {data}/padwatch.sqlite3: change its owner to that user"
+GIVE_FOLDER = "may not read or create the folder {data}: change its owner to that user"
 CASES: dict[str, tuple[Callable[[Path], object], str]] = {
     "read-only file": (lambda data: database_in(data).chmod(0o444), GIVE_FILE),
     "unreadable file": (lambda data: database_in(data).chmod(0), GIVE_FILE),
     "read-only folder": (
         lambda data: database_in(data).parent.chmod(0o555),
-        "may not make files in {data}: give it to that user",
+        "may not create files in {data}: change its owner to that user",
     ),
     "log of somebody else": (
         log_of_somebody_else,
-        "may not read and write {data}/padwatch.sqlite3-wal: give it to",
+        "may not read and write {data}/padwatch.sqlite3-wal: change its owner to",
     ),
     "folder without permission": (lambda data: data.chmod(0), GIVE_FOLDER),
     "directory in its place": (
@@ -59,7 +59,7 @@ CASES: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "file in place of the folder": (
         file_in_place_of_the_folder,
-        "{data} cannot be a folder, for a file is in its place: move it",
+        "{data} cannot be created because a file is in its place: move it",
     ),
     "folder that cannot be made": (folder_that_cannot_be_made, GIVE_FOLDER),
 }

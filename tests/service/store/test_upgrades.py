@@ -16,8 +16,8 @@ from core.alarms.life_cycle import update
 from core.limits import AlarmLevel, Judgement
 from service.settings.storage import Origin
 from service.store import schema
-from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
+from service.store.references import GapReference, ReferenceSource
 from service.store.schema import MIGRATIONS
 from service.store.sqlite import SqliteStore
 from service.store.sqlite.migrating import migrate
@@ -133,7 +133,7 @@ def test_a_database_of_a_newer_padwatch_is_refused_by_its_schema_number(store_pl
     store_place.open().close()
     store_place.execute(NEWER[store_place.kind])
 
-    said = f"schema {NEWEST + 1}, this padwatch knows up to {NEWEST}; run the padwatch"
+    said = f"schema {NEWEST + 1}, this padwatch supports up to {NEWEST}; run the padwatch"
     with pytest.raises(StoreError, match=said):
         store_place.open()
 
@@ -156,5 +156,5 @@ def test_a_truncated_database_and_what_is_none_are_refused(path: Path) -> None:
 def test_live_and_replayed_results_never_share_a_database(store_place: Place) -> None:
     for _ in range(2):
         store_place.open(Origin.LIVE).close()
-    with pytest.raises(StoreError, match="holds live results and is not opened for replay"):
+    with pytest.raises(StoreError, match="holds live results and cannot be used for replay"):
         store_place.open(Origin.REPLAY)

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from service.store.port import Store, StoreError
-from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
+from service.store.port import StoreError
+from service.store.store import Store
+from service.store.waveforms import WaveformFile, WaveformKind, WaveformState
 
 
 def file(name: str, start_ns: int = 1, place: str = "here") -> WaveformFile:

@@ -33,7 +33,7 @@ from service.cluster.session import consumer_name, stream_name, subject
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.store.port import StoreError
-from service.store.sql_store import SqlStore
+from service.store.store import Store
 
 N_BLOCKS = 60
 UNIT = "U1"
@@ -205,7 +205,7 @@ def dying(append: Append, died: list[bool], *, position_apart: bool) -> Append:
     n_results = 0
 
     def planted(
-        store: SqlStore,
+        store: Store,
         results: Sequence[Any],
         gaps: Sequence[Any],
         alarms: Sequence[Any] = (),
@@ -242,8 +242,8 @@ async def test_a_position_that_is_not_stored_with_its_results_is_caught(
     database = tmp_path / "plant" / "padwatch.sqlite3"
     with monkeypatch.context() as patched:
         died: list[bool] = []
-        planted = dying(SqlStore.append, died, position_apart=position_apart)
-        patched.setattr(SqlStore, "append", planted)
+        planted = dying(Store.append, died, position_apart=position_apart)
+        patched.setattr(Store, "append", planted)
         async with analysing(plant):
             await until(lambda: _is(bool(died)))
     async with analysing(plant):

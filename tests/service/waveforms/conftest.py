@@ -18,7 +18,7 @@ from service.recordings.keeper import RecordingIndexer, RecordingLock
 from service.recordings.retention import RecordingRetention, RetentionRules, RoomLimits, SpaceGauge
 from service.runtime.disk import DiskSpace, SpaceLimits
 from service.store.sqlite import SqliteStore
-from service.store.waveform_port import WaveformFile, WaveformKind
+from service.store.waveforms import WaveformFile, WaveformKind
 
 T0 = 1_767_225_600_000_000_000
 HOUR_NS = 3600 * 10**9

@@ -8,7 +8,7 @@ import pytest
 
 from service.recordings.folders import begin_removal, place_of
 from service.recordings.index import reinspected
-from service.store.waveform_port import WaveformKind, WaveformState
+from service.store.waveforms import WaveformKind, WaveformState
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
 T0 = 1_767_225_600_000_000_000

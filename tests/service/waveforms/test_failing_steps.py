@@ -13,8 +13,7 @@ from service.app.service_health import health_of
 from service.recordings.library import RecordingLibrary
 from service.runtime.disk import DiskSpace
 from service.store.port import StoreError
-from service.store.waveform_port import WaveformFile, WaveformKind, WaveformState
-from service.store.waveforms import StoredWaveforms
+from service.store.waveforms import WaveformFile, WaveformKind, WaveformState, WaveformStore
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
 FULL = DiskSpace(1, 10**12, 0)
@@ -24,14 +23,14 @@ DAY_S = 86_400.0
 @pytest.fixture
 def index(monkeypatch: pytest.MonkeyPatch) -> SimpleNamespace:
     """The index, which takes nothing while it is away."""
-    index, put = SimpleNamespace(is_away=False), StoredWaveforms.put
+    index, put = SimpleNamespace(is_away=False), WaveformStore.put
 
-    def refused(stored: StoredWaveforms, files: Sequence[WaveformFile]) -> None:
+    def refused(stored: WaveformStore, files: Sequence[WaveformFile]) -> None:
         if index.is_away:
             raise StoreError("database or disk is full")
         put(stored, files)
 
-    monkeypatch.setattr(StoredWaveforms, "put", refused)
+    monkeypatch.setattr(WaveformStore, "put", refused)
     return index
 
 

@@ -13,7 +13,7 @@ from acquisition.recordings.reader import open_recording
 from service.recordings import index as inspection
 from service.recordings.index import RETRY_S, RecordingCheck, RecordingState
 from service.recordings.library import RecordingLibrary
-from service.store.waveform_port import WaveformKind, WaveformState
+from service.store.waveforms import WaveformKind, WaveformState
 
 CONTINUOUS = WaveformKind.CONTINUOUS
 DAY_S = 86_400.0

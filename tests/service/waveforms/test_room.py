@@ -5,7 +5,7 @@ from typing import Any
 
 from service.recordings.retention import AgeLimit
 from service.runtime.disk import DiskSpace
-from service.store.waveform_port import WaveformFile, WaveformKind
+from service.store.waveforms import WaveformFile, WaveformKind
 
 CONTINUOUS, CAPTURE = WaveformKind.CONTINUOUS, WaveformKind.CAPTURE
 

@@ -12,7 +12,7 @@ from service.app.service_audit import ServiceTrail
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditEntry
-from service.store.audit_port import AuditQuery
+from service.store.audit import AuditQuery
 from service.store.sqlite import SqliteStore
 
 

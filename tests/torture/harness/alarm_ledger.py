@@ -9,7 +9,8 @@ from core.alarms.alarm import AlarmChange, AlarmEvent
 from harness.ledger_plant import RECEIVER, LedgerPlant
 from harness.lives import Rows
 from harness.truth import BEARINGS, Spell, Truth
-from service.store.port import AlarmQuery, Store
+from service.store.port import AlarmQuery
+from service.store.store import Store
 
 if TYPE_CHECKING:
     from harness.checker import Case, Findings

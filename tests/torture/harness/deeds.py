@@ -23,11 +23,12 @@ from core.monitor.catalogue import CATALOGUE
 from core.quality import Reason, missing
 from core.samples.gaps import Gap
 from core.spectra.cross_spectrum import average
-from service.store.audit_port import AuditQuery
-from service.store.film_port import FilmQuery
+from service.store.audit import AuditQuery
+from service.store.film_readings import FilmQuery
 from service.store.outbox import OutboxMessage
-from service.store.port import AlarmQuery, Store, TrendQuery, UnitGap
-from service.store.spectra_port import SpectraLimits, SpectraQuery
+from service.store.port import AlarmQuery, TrendQuery, UnitGap
+from service.store.spectra import SpectraLimits, SpectraQuery
+from service.store.store import Store
 
 RECEIVER = "R"
 T0_NS = 1_767_225_600_000_000_000

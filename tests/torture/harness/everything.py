@@ -7,8 +7,8 @@ from pathlib import Path
 from harness.deeds import T0_NS, Build, deed
 from service.store.access.audit_entries import AuditAction
 from service.store.access.identities import ApiKey, Role
-from service.store.gap_reference import GapReference, ReferenceSource
 from service.store.port import StoreError
+from service.store.references import GapReference, ReferenceSource
 from service.store.sqlite import SqliteStore
 
 Rows = Mapping[str, frozenset[tuple[object, ...]]]

@@ -18,7 +18,8 @@ from harness.ledger_plant import LedgerFeed, LedgerPlant
 from harness.truth import BEARINGS
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.plant import PlantFile
-from service.store.port import Store, TrendQuery
+from service.store.port import TrendQuery
+from service.store.store import Store
 
 NS_PER_S = 1_000_000_000
 ALWAYS = (0, 2**62)

@@ -9,9 +9,9 @@ import psycopg
 
 from harness.postgres_server import PostgresServer
 from service.store.postgres import PostgresStore
-from service.store.postgres.address import PostgresAddress
-from service.store.sql_store import SqlStore
+from service.store.postgres.connection import PostgresAddress
 from service.store.sqlite import SqliteStore
+from service.store.store import Store
 
 
 class SqlitePlace:
@@ -23,7 +23,7 @@ class SqlitePlace:
     def __init__(self, path: Path) -> None:
         self.path = path
 
-    def open(self, *how: Any, **more: Any) -> SqlStore:
+    def open(self, *how: Any, **more: Any) -> Store:
         """Open a store there."""
         return SqliteStore(self.path, *how, **more)
 
@@ -48,7 +48,7 @@ class PostgresPlace:
         self.head = folder / "postgresql.audit-head.json"
         self.address = PostgresAddress(server.conninfo(database))
 
-    def open(self, *how: Any, **more: Any) -> SqlStore:
+    def open(self, *how: Any, **more: Any) -> Store:
         """Open a store there."""
         return PostgresStore(self.address, self.head, *how, **more)
 

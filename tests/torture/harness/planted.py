@@ -28,7 +28,7 @@ from service.recordings import continuous_recorder as tape
 from service.recordings import continuous_recorder as unit_tape
 from service.recordings import segment as joining
 from service.recordings.segment import Segment
-from service.store import sql_store
+from service.store import store as sql_store
 
 SLOW_S = 1.5
 """How long a promise that is given too early is not kept yet."""
@@ -71,7 +71,7 @@ def stale_shown_as_current() -> None:
 
 def promised_before_commit() -> None:
     """Answer operators before what they did is on the disk."""
-    append = sql_store.SqlStore.append
+    append = sql_store.Store.append
 
     def late(self: Any, *args: Any, **options: Any) -> None:
         time.sleep(SLOW_S)
@@ -80,7 +80,7 @@ def promised_before_commit() -> None:
     async def at_once(self: Recorder) -> None:  # noqa: ARG001
         await asyncio.sleep(0)
 
-    sql_store.SqlStore.append = late  # type: ignore[method-assign]
+    sql_store.Store.append = late  # type: ignore[method-assign]
     Recorder.stored = at_once  # type: ignore[method-assign]
 
 
@@ -98,7 +98,7 @@ def finding_dropped() -> None:
 
 def value_altered() -> None:
     """Store a number otherwise than it was found, now and then, in its last bits."""
-    append, number = sql_store.SqlStore.append, [0]
+    append, number = sql_store.Store.append, [0]
 
     def rounded(self: Any, assessments: Sequence[Assessment], *args: Any, **options: Any) -> None:
         number[0] += 1
@@ -109,7 +109,7 @@ def value_altered() -> None:
                     object.__setattr__(reading, "value", reading.value * (1.0 + 1e-12))
         append(self, assessments, *args, **options)
 
-    sql_store.SqlStore.append = rounded  # type: ignore[method-assign]
+    sql_store.Store.append = rounded  # type: ignore[method-assign]
 
 
 def letter_forgotten() -> None:

@@ -36,8 +36,8 @@ from service.runtime.heartbeats import Heartbeats
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 from service.settings.storage import Origin
-from service.store.port import Store
 from service.store.sqlite import SqliteStore
+from service.store.store import Store
 
 LEDGER = LedgerPlant(n_units=2, load=1.0, segment_samples=8192, n_segments=2)
 T0 = 1_767_225_600 * NS_PER_S

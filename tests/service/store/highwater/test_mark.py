@@ -7,10 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from service.store.highwater.comparison import MAX_BEHIND, Kind, MarkFinding, compared
-from service.store.highwater.file import SLOTS, MarkError, MarkFile, NoMarkError
-from service.store.highwater.host import host_id
-from service.store.highwater.mark import SLOT_BYTES, Mark, decoded, encoded
+from service.store.highwater.commits import MAX_BEHIND, Kind, MarkFinding, compared, host_id
+from service.store.highwater.mark import (
+    SLOT_BYTES,
+    SLOTS,
+    Mark,
+    MarkError,
+    MarkFile,
+    NoMarkError,
+    decoded,
+    encoded,
+)
 
 MARK = Mark("5f" * 16, "host", 150, "c0ffee", 1_767_225_600_000_000_000)
 
@@ -53,7 +60,7 @@ def test_an_older_database_is_told_with_what_is_missing_and_since_when() -> None
 @pytest.mark.parametrize(
     ("changes", "kind", "said"),
     [
-        ({"nonce": "another"}, Kind.ROLLED_BACK, "transaction 150 is another one"),
+        ({"nonce": "another"}, Kind.ROLLED_BACK, "transaction 150 differs from"),
         (
             {"store": "00" * 16, "n_commits": 7},
             Kind.REPLACED,

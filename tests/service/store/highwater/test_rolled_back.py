@@ -11,10 +11,10 @@ import pytest
 from rigs.assessments import assessment
 from rigs.tiers import covering
 
-from service.store.audit_port import AuditQuery
+from service.store.audit import AuditQuery
 from service.store.backup import back_up, restore
-from service.store.highwater.comparison import Kind, MarkFinding
-from service.store.highwater.file import MarkFile, mark_path
+from service.store.highwater.commits import Kind, MarkFinding
+from service.store.highwater.mark import MarkFile, mark_path
 from service.store.port import StoreError, TrendQuery
 from service.store.sqlite import SqliteStore
 
@@ -149,7 +149,7 @@ def test_two_databases_that_came_from_one_are_told_apart(path: Path, tmp_path: P
     (finding,), _ = opened(path)
 
     assert finding.kind is Kind.ROLLED_BACK
-    assert "another one" in finding.detail
+    assert "differs from" in finding.detail
 
 
 @pytest.mark.parametrize("content", [None, b"", b"\0" * 8192])

@@ -11,7 +11,7 @@ from harness.places import PostgresPlace
 from harness.postgres_server import PostgresServer
 
 from service.store.postgres import PostgresStore
-from service.store.postgres.address import PostgresAddress
+from service.store.postgres.connection import PostgresAddress
 
 NUMBERS = count()
 

@@ -7,7 +7,7 @@ from rigs.assessments import assessment
 from rigs.store_fixtures import at, query
 
 from service.store.access.audit_entries import AuditAction
-from service.store.postgres.trail import server_trail
+from service.store.postgres.store import server_trail
 
 
 def test_a_dump_of_a_live_database_is_put_back_with_all_that_it_guards(

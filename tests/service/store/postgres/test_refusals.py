@@ -10,7 +10,7 @@ from rigs.memory_folder import memory_folder
 
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore, connection
-from service.store.postgres.address import PostgresAddress
+from service.store.postgres.connection import PostgresAddress
 
 
 def refused(address: PostgresAddress) -> str:
@@ -27,15 +27,15 @@ def test_a_server_that_does_not_run_is_named(tmp_path: Path) -> None:
     said = refused(PostgresAddress(f"host={tmp_path} dbname=padwatch user=p"))
 
     assert said.startswith(f"PostgreSQL database padwatch at {tmp_path}: ")
-    assert said.endswith("see whether PostgreSQL runs and can be reached; it is tried again")
+    assert said.endswith("check that PostgreSQL runs and can be reached; padwatch retries")
 
 
 def test_a_database_or_a_role_that_is_not_there_is_said(postgres_server: PostgresServer) -> None:
     there = postgres_server.conninfo("nothing_like_it")
 
-    assert "does not exist; create it, as the how-to" in refused(PostgresAddress(there))
+    assert "does not exist; create it (see the how-to" in refused(PostgresAddress(there))
     there = there.replace("user=postgres", "user=nobody_here")
-    assert "does not exist; create it, as the how-to" in refused(PostgresAddress(there))
+    assert "does not exist; create it (see the how-to" in refused(PostgresAddress(there))
 
 
 @pytest.mark.parametrize(
@@ -43,7 +43,7 @@ def test_a_database_or_a_role_that_is_not_there_is_said(postgres_server: Postgre
     [
         (b"wrong", 0o600, "password authentication failed"),
         (b"", 0o600, "password_file"),
-        (b"x", 0o640, "can be read by others: chmod 600 it"),
+        (b"x", 0o640, "is readable by others: chmod 600 it"),
     ],
 )
 def test_a_wrong_password_is_refused_and_not_shown(
@@ -105,7 +105,7 @@ def test_a_role_that_may_not_write_is_refused(postgres_place: PostgresPlace) -> 
     said = refused(PostgresAddress(there))
 
     assert "permission denied" in said
-    assert "give it the rights" in said
+    assert "grant the rights" in said
 
 
 def test_a_standby_is_refused(own_place: PostgresPlace) -> None:
@@ -121,7 +121,7 @@ def test_a_standby_is_refused(own_place: PostgresPlace) -> None:
         (server.data / "standby.signal").unlink()
         server.start()
 
-    assert "is a standby, which only reads: name the primary" in said
+    assert "is a read-only standby: name the primary" in said
 
 
 def test_a_reader_can_write_nothing(postgres_store: PostgresStore) -> None:
@@ -136,10 +136,10 @@ def test_a_query_that_takes_too_long_ends_with_a_sentence(
     postgres_store: PostgresStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "service.store.postgres.readers.SETTINGS", "SET statement_timeout = '20ms';"
+        "service.store.postgres.database.READER_SETTINGS", "SET statement_timeout = '20ms';"
     )
     with (
-        pytest.raises(StoreError, match="it took too long: the database is too slow"),
+        pytest.raises(StoreError, match="the query timed out: the database is too slow"),
         postgres_store.database.reading() as reader,
     ):
         reader.execute("SELECT pg_sleep(10)")
@@ -156,7 +156,7 @@ def test_a_full_disk_is_named_as_such(
         "CREATE TRIGGER full_disk BEFORE INSERT ON assessment"
         " FOR EACH ROW EXECUTE FUNCTION full_disk()"
     )
-    with pytest.raises(StoreError, match="the disk of the database is full: make room there"):
+    with pytest.raises(StoreError, match="the disk of the database is full: free space there"):
         postgres_store.append([assessment()], [])
     postgres_place.unguard("full_disk", "assessment")
     postgres_store.append([assessment()], [])

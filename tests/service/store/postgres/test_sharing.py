@@ -16,14 +16,12 @@ from rigs.store_fixtures import Build
 from core.monitor.assessment import Assessment
 from service.settings.storage import Origin
 from service.store.access.audit_entries import AuditAction
-from service.store.audit_port import AuditQuery
+from service.store.audit import AuditQuery
 from service.store.port import StoreError
 from service.store.postgres import PostgresStore
-from service.store.postgres.address import PostgresAddress
-from service.store.postgres.database import PostgresDatabase
-from service.store.postgres.holding import PostgresHold
-from service.store.postgres.store import HEAD_BEGUN
-from service.store.postgres.trail import server_trail
+from service.store.postgres.connection import PostgresAddress
+from service.store.postgres.database import PostgresDatabase, PostgresHold
+from service.store.postgres.store import HEAD_BEGUN, server_trail
 
 N_PROCESSES = 2
 N_WRITES = 20
@@ -70,7 +68,7 @@ def test_processes_write_at_the_same_time_and_the_trail_is_one_chain(
         verdict = server_trail(postgres_place.address, head).verify()
         assert verdict.is_whole
         assert verdict.n_entries >= N_PROCESSES * N_WRITES
-        assert not verdict.told
+        assert not verdict.contradictions
 
 
 def test_a_database_is_brought_up_to_date_by_one_of_two_that_open_it(

@@ -8,7 +8,8 @@ import pytest
 from harness.places import PostgresPlace
 
 from service.store import schema
-from service.store.postgres.statements import for_postgres, translated
+from service.store.postgres.connection import translated
+from service.store.postgres.schema import for_postgres
 
 
 @pytest.mark.parametrize(
@@ -25,7 +26,7 @@ def test_parameters_are_found_and_what_is_quoted_is_left_alone(written: str, wan
 
 
 def test_a_trigger_of_an_unknown_shape_is_no_silent_loss() -> None:
-    with pytest.raises(ValueError, match="cannot be written"):
+    with pytest.raises(ValueError, match="cannot be translated"):
         for_postgres("CREATE TRIGGER t INSTEAD OF DELETE ON v BEGIN SELECT 1; END;")
 
 

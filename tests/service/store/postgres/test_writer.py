@@ -71,9 +71,9 @@ def test_a_store_goes_on_after_the_server_was_started_anew(
     own_store.append([assessment(at(1))], [])
     own_place.server.stop()
     try:
-        with pytest.raises(StoreError, match="see whether PostgreSQL runs"):
+        with pytest.raises(StoreError, match="check that PostgreSQL runs"):
             own_store.append([assessment(at(2))], [])
-        with pytest.raises(StoreError, match="see whether PostgreSQL runs"):
+        with pytest.raises(StoreError, match="check that PostgreSQL runs"):
             own_store.trend(query())
     finally:
         own_place.server.start()
@@ -85,7 +85,7 @@ def test_a_stop_in_the_middle_of_a_transaction_leaves_nothing_of_it(
     own_store: PostgresStore, own_place: PostgresPlace
 ) -> None:
     with (  # noqa: PT012
-        pytest.raises(StoreError, match="it is tried again"),
+        pytest.raises(StoreError, match="padwatch retries"),
         own_store.database.writing() as w,
     ):
         w.execute("INSERT INTO series (unit, bearing) VALUES (?, ?)", ("U1", "UJB"))
@@ -106,7 +106,7 @@ def test_what_an_error_has_undone_is_never_taken_for_written(
     postgres_store: PostgresStore, postgres_place: PostgresPlace
 ) -> None:
     with (
-        pytest.raises(StoreError, match="undone by an error"),
+        pytest.raises(StoreError, match="an error rolled the transaction back"),
         postgres_store.database.writing() as writer,
         suppress(psycopg.Error),
     ):

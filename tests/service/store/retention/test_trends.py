@@ -30,11 +30,11 @@ from rigs.store_fixtures import Execute
 from rigs.tiers import fast_and_long
 
 from core.condition.operating_state import OperatingState
-from service.store.retention import deleting
-from service.store.retention.limits import RetentionLimits
-from service.store.rollups import rolling
+from service.store import retention as deleting
+from service.store.port import ValueRange
+from service.store.retention import Ages
+from service.store.rollups import gathering as rolling
 from service.store.sqlite import SqliteStore
-from service.store.value_range import ValueRange
 
 
 @pytest.mark.parametrize(("limits", "widths"), TIERS)
@@ -42,7 +42,7 @@ def test_late_readings_are_added_to_what_is_left_of_their_hour(
     rolled: SqliteStore,
     plain: SqliteStore,
     path: Path,
-    limits: RetentionLimits,
+    limits: Ages,
     widths: tuple[int, ...],
 ) -> None:
     delete_all(rolled, limits)
@@ -109,12 +109,12 @@ def require_same_through(
 
 def _delete_until(store: SqliteStore, what: str, hour: int) -> None:
     age_ns = (HOURS - hour) * HOUR_NS
-    limits = RetentionLimits(
-        readings_ns=age_ns,
-        minutes_ns=None if what == "single" else age_ns,
-        ten_minutes_ns=age_ns if what == "ten" else None,
-    )
-    delete_all(store, limits)
+    limits = {
+        "readings_days": age_ns,
+        "minutes_days": None if what == "single" else age_ns,
+        "ten_minutes_days": age_ns if what == "ten" else None,
+    }
+    delete_all(store, {name: age for name, age in limits.items() if age is not None})
 
 
 def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
@@ -165,7 +165,7 @@ def test_trends_of_a_state_say_the_same_before_and_after(
     rolled: SqliteStore,
     plain: SqliteStore,
     path: Path,
-    limits: RetentionLimits,
+    limits: Ages,
     widths: tuple[int, ...],
 ) -> None:
     delete_all(rolled, limits)
@@ -180,7 +180,7 @@ def test_trends_of_a_state_say_the_same_before_and_after(
     ("limits", "width_s"), [(TIERS[0][0], 60), (TIERS[1][0], 600), (TIERS[2][0], 3600)]
 )
 def test_a_trend_over_what_is_gone_says_how_fine_it_is(
-    rolled: SqliteStore, limits: RetentionLimits, width_s: int
+    rolled: SqliteStore, limits: Ages, width_s: int
 ) -> None:
     before = rolled.trend(asked(1, max_points=5000))
     assert (before.bucket_ns, before.coarse_until_ns) == (None, None)
@@ -227,7 +227,7 @@ def test_both_databases_say_the_same_before_and_after(store_place: Place) -> Non
         store.append(life(assessment, 150), [])
         gather_all(store)
         before = store.trend(asked(60))
-        assert not store.retention.prune(RetentionLimits(letters_ns=HOUR_NS), NOW_NS)
+        assert not store.retention.prune({"messages_days": HOUR_NS}, NOW_NS)
         for limits, _ in TIERS:
             delete_all(store, limits)
             require_same_hours(store.trend(asked(60)), before)

@@ -13,10 +13,9 @@ from rigs.varied_results import HOUR_NS, MINUTE_NS, NAMES, SECOND_NS, T0, WHOLE,
 from core.condition.operating_state import OperatingState
 from core.quality import Level
 from service.store import trends
-from service.store.port import QueryTooLargeError, TrendQuery
+from service.store.port import QueryTooLargeError, TrendQuery, ValueRange
 from service.store.rollups import coverage as cover
 from service.store.sqlite import SqliteStore
-from service.store.value_range import ValueRange
 
 BOUNDS = st.one_of(st.none(), st.sampled_from([0.3, 0.35, 0.4]), st.floats(0.25, 0.45))
 DEGREES = st.one_of(st.none(), st.sampled_from([45.0, 47.5]), st.floats(44.0, 49.0))

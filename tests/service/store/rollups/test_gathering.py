@@ -14,7 +14,7 @@ from rigs.varied_results import HOUR_NS, MINUTE_NS, T0, WHOLE, N, dump
 
 from core.monitor.assessment import Assessment
 from service.store.port import StoreError
-from service.store.rollups import rolling
+from service.store.rollups import gathering as rolling
 from service.store.rollups.rows import bins
 from service.store.sqlite import SqliteStore
 

@@ -1,4 +1,4 @@
-"""`EvidenceCollector`: a bundle for every occurrence of an alarm, without ever being in the way."""
+"""Collector of evidence: writes a bundle for every occurrence of an alarm in the background."""
 
 import asyncio
 import os
@@ -15,10 +15,16 @@ from acquisition.clock import Clock
 from core.alarms.alarm import ANNOUNCED, AlarmEvent, AlarmNews
 from service.live.alarm_list import EvidenceStatus
 from service.recordings.around_alarms import Captures, Outcome
-from service.reports.capture_link import link, link_all, note_lost
-from service.reports.folders import clear_leftovers, note_beginning, place_of
-from service.reports.room import EvidenceRetention
-from service.reports.snapshot import SnapshotTaker, Snapshot
+from service.reports.folders import (
+    clear_leftovers,
+    link,
+    link_all,
+    note_beginning,
+    note_lost,
+    place_of,
+)
+from service.reports.retention import EvidenceRetention
+from service.reports.snapshot import Snapshot, SnapshotTaker
 from service.reports.writer import EvidenceWriter
 from service.runtime.files import write_whole
 from service.runtime.heartbeats import UNHEARD, Pulse
@@ -30,18 +36,18 @@ log = structlog.get_logger()
 RETRY_S = 10.0
 
 MAX_BUSY_S = 300.0
-"""Longest that one bundle may take, or to look through all of them."""
+"""Maximum time to write one bundle, or to survey all of them."""
 
 MAX_PENDING = 200
-"""Snapshots that wait for the disk; one holds a few hundred kilobytes of results alive."""
+"""Maximum number of waiting snapshots; each keeps a few hundred kilobytes in memory."""
 
 STORE_ATTEMPTS = 5
-"""After so many a bundle is written without what the store does not give."""
+"""Number of attempts after which a bundle is written without data from the store."""
 
 
 @dataclass(frozen=True)
 class EvidenceFolders:
-    """Where bundles, captures and configurations are, each below the data folder."""
+    """Folders of bundles, captures and configurations, below the data folder."""
 
     evidence: Path
     captures: Path
@@ -49,27 +55,27 @@ class EvidenceFolders:
 
 
 class EvidenceCollector:
-    """Takes snapshots on the event loop, and writes them in a thread of its own, oldest first.
+    """Takes snapshots on the event loop, and writes them in its own thread, oldest first.
 
     Attributes
     ----------
     error
-        Why the last attempt to write failed; None since one did not.
+        Error of the last attempt to write; None if it succeeded.
     n_written, n_failed, n_lost
-        Bundles written, attempts that failed, and occurrences given up since the start.
+        Numbers of bundles written, failed attempts, and occurrences given up since the start.
     """
 
     def __init__(
         self,
         folders: EvidenceFolders,
-        camera: SnapshotTaker,
+        taker: SnapshotTaker,
         writer: EvidenceWriter,
         room: EvidenceRetention,
         configuration: Configuration,
         captures: Captures,
         clock: Clock,
     ) -> None:
-        self._folders, self._camera, self._writer, self._room = folders, camera, writer, room
+        self._folders, self._taker, self._writer, self._room = folders, taker, writer, room
         self.configuration, self._captures, self._clock = configuration, captures, clock
         self._pending: deque[Snapshot] = deque()
         self._outcomes: deque[Outcome] = deque()
@@ -81,23 +87,23 @@ class EvidenceCollector:
 
     @property
     def status(self) -> EvidenceStatus:
-        """How the evidence is kept, for people."""
+        """Status of the evidence, for display."""
         return EvidenceStatus(self.error, self.n_pending, self.n_written, self.n_lost)
 
     @property
     def n_pending(self) -> int:
-        """Occurrences whose bundles are still to be written."""
+        """Number of occurrences whose bundles are still to be written."""
         return len(self._pending)
 
     def see(self, news: Sequence[AlarmNews]) -> None:
-        """Note what is known when alarms are raised or rise in level."""
+        """Take snapshots of alarms that are raised or rise in level."""
         for told in news:
             for event in told.events:
                 if event.change in ANNOUNCED:
                     self._take(event)
 
     def captured(self, outcome: Outcome) -> None:
-        """Note that samples around alarms are complete, or lost."""
+        """Queue the result of recording samples around alarms."""
         self._outcomes.append(outcome)
         self._news.set()
 
@@ -108,13 +114,13 @@ class EvidenceCollector:
 
     @property
     def capturing(self) -> frozenset[tuple[str, int]]:
-        """Those around which samples are still to be written, or to be linked."""
+        """Alarms and occurrences whose samples are still to be recorded or linked."""
         ended = (event for outcome in self._outcomes for event in outcome.alarms)
         linking = frozenset((event.identity.id, event.occurrence) for event in ended)
         return self._captures.being_made | linking
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Write what is to be written, for ever; afterwards `close`."""
+        """Write bundles forever; call `close` afterwards."""
         pulse.beat(MAX_BUSY_S)
         await self._trying(self._begin)
         await self._trying(self._make_room)
@@ -130,7 +136,7 @@ class EvidenceCollector:
             await self._trying(self._make_room)
 
     async def close(self) -> None:
-        """Write what there is, once, and let go of the thread."""
+        """Write pending bundles with one attempt each, and end the thread."""
         while self._pending or self._outcomes:
             if not await self._write_one():
                 break
@@ -140,7 +146,7 @@ class EvidenceCollector:
 
     def _take(self, event: AlarmEvent) -> None:
         expected = self._captures.expects(event)
-        self._pending.append(self._camera.take(event, self._clock.now_ns(), expected))
+        self._pending.append(self._taker.take(event, self._clock.now_ns(), expected))
         if len(self._pending) > MAX_PENDING:
             lost = self._pending.popleft()
             self.n_lost += 1
@@ -148,7 +154,7 @@ class EvidenceCollector:
         self._news.set()
 
     async def _write_one(self) -> bool:
-        """Write the oldest; what has become of captures follows bundles, which it is noted in."""
+        """Write the oldest bundle; links to samples follow, since they are written to bundles."""
         if self._pending:
             snapshot = self._pending[0]
             with_history = self._n_store_attempts < STORE_ATTEMPTS
@@ -170,7 +176,7 @@ class EvidenceCollector:
         self.n_written += 1
 
     def _link(self, outcome: Outcome) -> None:
-        """In the thread: tell all bundles of what was captured where to find it."""
+        """Link all bundles of a capture to it; runs in the thread."""
         for event in outcome.alarms:
             place = place_of(self._folders.evidence, event)
             if not place.folder.is_dir():
@@ -182,7 +188,7 @@ class EvidenceCollector:
             self._room.note(place)
 
     def _begin(self) -> None:
-        """In the thread: keep the configuration, remove and link what a crash has left."""
+        """Write the configuration, remove and link what a crash left; runs in the thread."""
         keep_configuration(self._folders.configurations, self.configuration)
         note_beginning(self._folders.evidence, self._clock.now_ns())
         for folder in clear_leftovers(self._folders.evidence):
@@ -191,10 +197,10 @@ class EvidenceCollector:
 
     def _make_room(self) -> None:
         for name in self._room.make():
-            log.info("evidence is removed to make room", folder=name)
+            log.info("evidence is removed to free space", folder=name)
 
     async def _trying(self, do: Callable[[], None]) -> bool:
-        """Do something in the thread; return whether the disk and the store let it."""
+        """Run a function in the thread; return whether the disk and the store permitted it."""
         try:
             await asyncio.get_running_loop().run_in_executor(self._thread, do)
         except StoreError as error:
@@ -217,7 +223,7 @@ class EvidenceCollector:
 
 
 def keep_configuration(folder: Path, configuration: Configuration) -> None:
-    """Write a configuration under its name, unless it is there already.
+    """Write a configuration to a file named by its version, unless it exists.
 
     Raises
     ------

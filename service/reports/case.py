@@ -1,4 +1,4 @@
-"""`Case`: all that a report tells of."""
+"""Data of a report: a bundle, and later events and readings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,21 +10,21 @@ from service.reports.archive import EvidenceArchive, Occurrence, SamplesState
 from service.reports.document import Evidence
 from service.reports.parts import AXES, BearingPart, ComparisonPart, Direction
 from service.reports.tables import ORBITS, SPECTRA, TREND, Columns, read_table, trend_columns
-from service.store.film_port import FilmQuery
+from service.store.film_readings import FilmQuery
 
 
 @dataclass(frozen=True)
 class Case:
-    """An occurrence with its bundle, and what has come after.
+    """Occurrence with its bundle, and later data.
 
     Parameters
     ----------
     spectra, orbits, before
-        Tables of the bundle; empty where there are none.
+        Tables of the bundle; empty if missing.
     after
-        Readings of the film since, as the store has them now.
+        Later readings of the film, from the store.
     events
-        What has happened to the occurrence, oldest first.
+        Events of the occurrence, oldest first.
     """
 
     evidence: Evidence
@@ -37,18 +37,18 @@ class Case:
 
     @property
     def bearing(self) -> BearingPart | None:
-        """The bearing that the alarm is about."""
+        """Bearing of the alarm."""
         found = (b for b in self.evidence.bearings if b.bearing == self.evidence.bearing)
         return next(found, None)
 
     @property
     def direction(self) -> Direction:
-        """The direction that the alarm is about; x if it is about none."""
+        """Direction of the alarm; x if it has none."""
         return self.evidence.direction or AXES[0]
 
     @property
     def comparison(self) -> ComparisonPart | None:
-        """The film in that direction."""
+        """Film in that direction."""
         found = (c for c in self.evidence.comparisons if c.direction == self.direction)
         return next(found, None)
 
@@ -56,7 +56,7 @@ class Case:
 def read_case(
     archive: EvidenceArchive, found: Occurrence, samples: SamplesState, trend_days: float
 ) -> Case:
-    """Read what a report tells of.
+    """Read the data of a report.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def read_case(
         If the store cannot be read.
     """
     if found.place is None:
-        raise LookupError("there is no bundle")
+        raise LookupError("the bundle does not exist")
     evidence = archive.document(found.place)
     tables = {
         name: read_table(found.place.folder / name) if name in evidence.files else {}
@@ -86,7 +86,7 @@ def read_case(
 
 
 def _of_occurrence(archive: EvidenceArchive, found: Occurrence) -> Sequence[AlarmEvent]:
-    """Its events, newest first."""
+    """Return the events of an occurrence, newest first."""
     events = []
     for event in archive.events(found.event.identity.id):
         if event.occurrence < found.event.occurrence:

@@ -1,4 +1,4 @@
-"""`EvidenceRetention`: what bundles take of the disk, and which of them go when it is too much."""
+"""Retention of bundles: their size on the disk, and removal of the oldest."""
 
 import shutil
 from collections.abc import Iterable
@@ -12,27 +12,28 @@ from service.runtime.files import sync_folder, write_whole
 from service.runtime.times import compact
 
 MAX_REMOVED = 10_000
-"""Names that are remembered of each unit."""
+"""Maximum number of remembered names per unit."""
 
 
 SURVEY_S = 3600.0
-"""After so long all folders are looked at again: others may have taken some away by hand."""
+"""Interval after which all folders are surveyed again, as some may have been removed by hand."""
 
 
 @dataclass(frozen=True)
 class EvidenceLimits:
-    """How much space bundles may take.
+    """Limits of the space for bundles.
 
     Parameters
     ----------
     max_bytes
-        Beyond it the oldest go that are older than `keep_days`.
+        Size above which the oldest bundles are removed that are older than `keep_days`.
     hard_max_bytes
-        Beyond it the oldest go, however young.
+        Size above which the oldest bundles are removed, whatever their age.
     max_per_alarm
-        Beyond it the oldest of that alarm go: one that chatters must not push out all others.
+        Number per alarm above which its oldest are removed, so that a chattering alarm does not
+        displace all others.
     trend_days
-        How long before an alarm the readings of its film go with it.
+        Time before an alarm for which readings of its film are included.
     """
 
     max_bytes: int = 2_000_000_000
@@ -44,29 +45,29 @@ class EvidenceLimits:
 
 @dataclass(frozen=True, order=True)
 class _Held:
-    """A bundle; the name of a folder begins with its moment, so the oldest come first."""
+    """Bundle; the name of a folder begins with its time, so that the oldest sort first."""
 
     name: str
     unit: str
 
 
 class EvidenceRetention:
-    """Knows the size of every bundle, so that in a flood of alarms none costs a look at all.
+    """Removes the oldest bundles; used in the thread that writes them.
 
-    Lives in the thread that writes.
+    The sizes of all bundles are remembered, so that a flood of alarms does not read all folders.
     """
 
     def __init__(self, root: Path, limits: EvidenceLimits, clock: Clock) -> None:
         self._root, self._limits, self._clock = root, limits, clock
         self._sizes: dict[str, dict[_Held, int]] = {}
-        """By alarm."""
+        """Sizes by alarm."""
         self._n_bytes = 0
         self._crowded: set[str] = set()
-        """Alarms that may have more bundles than they may."""
+        """Alarms with too many bundles."""
         self._surveyed_s: float | None = None
 
     def note(self, place: Place) -> None:
-        """Take in that a bundle was written, or has become larger."""
+        """Record that a bundle was written, or has grown."""
         own = self._sizes.setdefault(place.alarm, {})
         held, size = _Held(place.folder.name, place.unit), _size(place.folder)
         self._n_bytes += size - own.get(held, 0)
@@ -75,17 +76,17 @@ class EvidenceRetention:
             self._crowded.add(place.alarm)
 
     def make(self) -> list[str]:
-        """Remove the oldest bundles until all together fit; the newest always stays.
+        """Remove the oldest bundles until the others fit; the newest always stays.
 
         Returns
         -------
         list of str
-            Names of the folders that are gone, oldest first.
+            Names of the removed folders, oldest first.
 
         Raises
         ------
         OSError
-            If the disk refuses; then all is looked at again the next time.
+            If the disk refuses; all folders are then surveyed the next time.
         """
         surveyed_s, self._surveyed_s = self._surveyed(), None
         going = self._surplus()
@@ -95,7 +96,7 @@ class EvidenceRetention:
         return [held.name for held in sorted(going)]
 
     def _surveyed(self) -> float:
-        """When all folders were looked at; now, if that was too long ago."""
+        """Return the time of the last survey; survey all folders if it is too old."""
         now_s = self._clock.monotonic_s()
         if self._surveyed_s is not None and now_s - self._surveyed_s <= SURVEY_S:
             return self._surveyed_s
@@ -106,14 +107,14 @@ class EvidenceRetention:
         return now_s
 
     def _surplus(self) -> dict[_Held, str]:
-        """What alarms have too many of, and which alarm each belongs to."""
+        """Return the surplus bundles of alarms, with their alarms."""
         most = self._limits.max_per_alarm
         return {
             held: alarm for alarm in self._crowded for held in sorted(self._sizes[alarm])[:-most]
         }
 
     def _beyond_the_limits(self, going: dict[_Held, str]) -> dict[_Held, str]:
-        """What must go besides, so that all others fit."""
+        """Return further bundles to remove so that the others fit."""
         n_bytes = self._n_bytes - sum(self._sizes[alarm][held] for held, alarm in going.items())
         if n_bytes <= min(self._limits.max_bytes, self._limits.hard_max_bytes):
             return {}
@@ -142,14 +143,14 @@ class EvidenceRetention:
 
 
 def _remember(root: Path, unit: str, names: Iterable[str]) -> None:
-    """Remember what is about to go, once: what is there all the same is found before its name."""
+    """Write the names of bundles before they are removed; existing bundles take precedence."""
     all_names = list(dict.fromkeys((*removed(root, unit), *names)))[-MAX_REMOVED:]
     write_whole(root / unit / REMOVED, "".join(f"{name}\n" for name in all_names).encode())
 
 
 def _remove(folder: Path) -> None:
     aside = folder.with_name(folder.name + INCOMPLETE)
-    folder.rename(aside)  # never half a bundle under its name
+    folder.rename(aside)  # so that no partial bundle has a final name
     shutil.rmtree(aside)
 
 

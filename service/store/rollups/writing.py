@@ -1,4 +1,7 @@
-"""Roll-ups as they are written: readings gathered by the minute, cells in their tables."""
+"""Roll-ups in their tables, and the time up to which finer data were deleted."""
+
+from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -28,7 +31,7 @@ INSERT_NUMBERS = "INSERT INTO rollup_numbers VALUES (?,?,?,?,?,?)"
 
 
 def select_mark(reader: Connection, series: int) -> int:
-    """Up to when the readings of a bearing have been gathered; 0 if none have."""
+    """Return the end of the aggregated readings of a bearing; 0 if there are none."""
     found = reader.execute(
         "SELECT until_ns FROM rollup_mark WHERE series = ?", (series,)
     ).fetchone()
@@ -36,7 +39,7 @@ def select_mark(reader: Connection, series: int) -> int:
 
 
 def minutes_of(writer: Connection, series: int, span: Span) -> Cells | None:
-    """Single readings of a span of time, gathered by the minute; None if there are none."""
+    """Aggregate the single readings of a span by the minute; None if there are none."""
     rows = writer.execute(SELECT_WHOLE, (series, *span)).fetchall()
     if not rows:
         return None
@@ -47,7 +50,7 @@ def minutes_of(writer: Connection, series: int, span: Span) -> Cells | None:
 
 
 def insert_cells(writer: Connection, series: int, width_ns: int, cells: Cells) -> None:
-    """Write roll-ups of one width, within a transaction."""
+    """Write roll-ups of one width."""
     width_s, slots = width_ns // NS_PER_S, cells.slots().tolist()
     start_ns = cells.summaries.time_ns.tolist()
     writer.executemany(INSERT_CELL, _cell_rows(series, width_s, start_ns, slots, cells.conditions))
@@ -76,7 +79,7 @@ def _cell_rows(
 
 
 def forget_width(writer: Connection, series: int, width_ns: int, span: Span) -> None:
-    """Delete the roll-ups of one width in a span of time."""
+    """Delete the roll-ups of one width in a span."""
     layouts = [row[0] for row in writer.execute("SELECT id FROM layout").fetchall()]
     its = (series, width_ns // NS_PER_S)
     writer.execute(
@@ -92,5 +95,62 @@ def forget_width(writer: Connection, series: int, width_ns: int, span: Span) -> 
 
 
 def rolled_columns() -> tuple[str, ...]:
-    """What is kept of readings in roll-ups."""
+    """Return the columns that roll-ups contain."""
     return columns_of(CATALOGUE)
+
+
+SINGLE_S = 0
+"""Width of single readings."""
+
+SELECT_DELETED = "SELECT width_s, until_ns FROM retention_mark WHERE series = ?"
+SET_DELETED = """
+    INSERT INTO retention_mark VALUES (?, ?, ?)
+    ON CONFLICT (series, width_s) DO UPDATE SET until_ns = excluded.until_ns
+"""
+
+
+@dataclass(frozen=True)
+class DeletedUntil:
+    """Times up to which data of a bearing were deleted.
+
+    Parameters
+    ----------
+    until_ns
+        Time by width, 0 for single readings: all earlier data were deleted or never existed.
+    """
+
+    until_ns: dict[int, int]
+
+    @property
+    def readings_ns(self) -> int:
+        """Time up to which single readings were deleted; 0 if none were."""
+        return self.of(SINGLE_S)
+
+    def of(self, width_s: int) -> int:
+        """Return the time up to which roll-ups of a width were deleted."""
+        return self.until_ns.get(width_s, 0)
+
+    def kept_ns(self, time_ns: int) -> tuple[int, ...]:
+        """Return the widths of the roll-ups that exist at a time, finest first."""
+        return tuple(width for width in WIDTHS_NS if self.of(width // NS_PER_S) <= time_ns)
+
+    def finest_ns(self, start_ns: int) -> int | None:
+        """Return the width available for all time since a start; None for single readings."""
+        return self.kept_ns(start_ns)[0] if start_ns < self.readings_ns else None
+
+    def stretches(self, span: tuple[int, int]) -> list[tuple[int, int]]:
+        """Split a span at the times at which the available widths change."""
+        cuts = sorted({*span, *(t for t in self.until_ns.values() if span[0] < t < span[1])})
+        return list(pairwise(cuts))
+
+
+def select_deleted(reader: Connection, series: int) -> DeletedUntil:
+    """Return the times up to which data of a bearing were deleted."""
+    return DeletedUntil(
+        {int(width): int(until) for width, until in reader.execute(SELECT_DELETED, (series,))}
+    )
+
+
+def set_deleted(writer: Connection, series: int, width_s: int, until_ns: int) -> None:
+    """Record a deletion in its transaction."""
+    writer.execute(SET_DELETED, (series, width_s, until_ns))

@@ -1,0 +1,380 @@
+"""Report of an alarm: self-contained HTML without scripts, for one sheet of A4."""
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+
+from core.alarms.alarm import AlarmChange, AlarmEvent
+from core.alarms.kinds import FILM_KINDS
+from core.stiffness.estimators import ESTIMATORS
+from service.reports.case import Case
+from service.reports.document import Evidence
+from service.reports.figures import figures
+from service.reports.parts import AXES, BearingPart, EstimatorPart, FindingPart, ReadingPart
+from service.runtime.times import day_and_time
+from service.settings.alarm_kinds import kind_words
+
+STYLE = """
+@page { size: A4 portrait; margin: 9mm 10mm; }
+* { box-sizing: border-box; }
+html { background: #fff; }
+body { margin: 0 auto; max-width: 190mm; font: 8.2pt/1.3 "Liberation Sans", Arial, sans-serif;
+  color: #222; }
+header { display: flex; justify-content: space-between; align-items: baseline;
+  border-bottom: 1.2pt solid #222; padding-bottom: 1mm; gap: 4mm; }
+h1 { font-size: 13pt; margin: 0; overflow-wrap: anywhere; }
+h2 { font-size: 8.6pt; margin: 1.6mm 0 .4mm; }
+p { margin: .6mm 0; overflow-wrap: anywhere; }
+.badge { font-weight: bold; padding: .4mm 2mm; border: 1.2pt solid #222; white-space: nowrap; }
+.badge.alert { background: #ffd23f; }
+.badge.danger { background: #c1121f; color: #fff; border-color: #c1121f; }
+dl { display: grid; grid-template-columns: 18mm 1fr 18mm 1fr; gap: .3mm 2mm; margin: 1.4mm 0; }
+dt { color: #666; }
+dd { margin: 0; overflow-wrap: anywhere; }
+.story { font-size: 9.2pt; }
+.row { display: flex; gap: 3mm; align-items: flex-start; }
+figure { margin: .8mm 0 0; flex: 1; min-width: 0; }
+figcaption { font-size: 7.2pt; color: #444; line-height: 1.2; }
+svg { display: block; width: 100%; height: auto; font: 9px "Liberation Sans", Arial, sans-serif;
+  fill: #333; }
+svg path { fill: none; }
+.frame { stroke: #666; stroke-width: .8; }
+.grid { stroke: #e3e3e3; stroke-width: .6; }
+.mid { text-anchor: middle; }
+.end { text-anchor: end; }
+.note { font-size: 8px; fill: #555; }
+svg .band { fill: #dcdcdc; stroke: none; }
+.expected { stroke: #777; stroke-width: 1; stroke-dasharray: 4 2; }
+.dots { stroke-linecap: round; stroke-width: 2; }
+.member { stroke: #aaa; }
+.unsettled { stroke: #ccc; stroke-width: 1.4; }
+.today { stroke: #1f5fa8; fill: #1f5fa8; stroke-width: 1; }
+.alarm { stroke: #c1121f; fill: #c1121f; stroke-width: 1.2; }
+svg path.bar, svg path.at { fill: none; }
+.at { stroke: #c1121f; stroke-width: 1; }
+.marked { stroke: #888; stroke-width: .7; stroke-dasharray: 2 2; }
+.shaft { stroke: #1f5fa8; stroke-width: .9; }
+.bearing { stroke: #d07a00; stroke-width: .9; }
+svg .known { fill: #1f5fa8; stroke: #fff; stroke-width: .5; }
+svg .borrowed { fill: #1f5fa8; stroke: #555; stroke-width: .5; stroke-dasharray: 2 1.5; }
+svg .unknown { fill: #fff; stroke: #bbb; stroke-width: .5; }
+svg .own { stroke: #c1121f; stroke-width: 1.6; }
+svg .strip { fill: #f3dcdc; stroke: none; }
+table { border-collapse: collapse; width: 100%; font-size: 7.4pt; }
+th, td { text-align: left; padding: .2mm 1.4mm .2mm 0; border-bottom: .4pt solid #ddd;
+  vertical-align: top; overflow-wrap: anywhere; }
+th { color: #555; font-weight: normal; }
+td.n { font-variant-numeric: tabular-nums; }
+footer { border-top: .6pt solid #888; margin-top: 1.4mm; padding-top: .8mm; font-size: 6.6pt;
+  color: #555; overflow-wrap: anywhere; line-height: 1.25; }
+@media screen { body { padding: 6mm; } }
+"""
+
+
+SURE_95 = 1.96
+
+CAUSES = {
+    "film": "the oil film itself",
+    "oil": "the oil or its cooling, in all films",
+    "bracket_or_transducer": "the bracket or a transducer, not the film",
+    "unknown": "not told apart",
+}
+
+SAMPLES = {
+    "complete": "kept, in the bundle",
+    "being_made": "being recorded",
+    "lost": "lost",
+    "removed": "removed to make room",
+    "none": "not kept for this alarm",
+}
+
+CONDITION = ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
+
+LONGEST = 160
+"""Maximum length of free text in a report."""
+
+
+def plain(name: str) -> str:
+    """Return a name as words."""
+    return name.replace("_", " ")
+
+
+def shortened(text: str, longest: int = LONGEST) -> str:
+    """Shorten a text so that the report fits on one page."""
+    return text if len(text) <= longest else text[: longest - 1] + "…"
+
+
+def headline(evidence: Evidence) -> str:
+    """Return unit, subject and kind of the alarm."""
+    alarm = evidence.alarm
+    return f"{alarm.unit} {alarm.subject}: {kind_words(alarm.kind)}"
+
+
+def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
+    """Yield the name and text of each fact."""
+    evidence, alarm = case.evidence, case.evidence.alarm
+    unit = evidence.unit
+    where = [evidence.plant, unit.name if unit and unit.name else alarm.unit, alarm.subject]
+    yield "Where", ", ".join(where)
+    yield "Level", f"{(alarm.level or '').upper()}, {alarm.change}, occurrence {alarm.occurrence}"
+    yield "Since", alarm.time.replace("T", " ").replace("Z", " UTC")
+    yield "Value", value_words(case)
+    if alarm.reason and alarm.reason != "ok" and not story(case):
+        yield "Reason", plain(alarm.reason)
+    if case.bearing is not None:
+        yield "Condition", condition_words(case.bearing)
+    yield "Samples", SAMPLES[case.samples.value]
+    yield "State now", f"{state_words(case)}; as of {now}"
+    yield "Seen by", seen_words(case)
+
+
+def value_words(case: Case) -> str:
+    """Return value and limit; of a change of a film, in percent with its interval."""
+    alarm, found = case.evidence.alarm, finding(case)
+    if alarm.kind in FILM_KINDS and found is not None and found.change is not None:
+        limit = (
+            ""
+            if alarm.limit is None
+            else f"; limit {percent(-alarm.limit)} or {percent(alarm.limit)}"
+        )
+        return f"{change_words(found)} of the expected stiffness{limit}"
+    if alarm.value is None:
+        return "no number"
+    unit = "" if alarm.value_unit in (None, "1") else f" {alarm.value_unit}"
+    limit = "" if alarm.limit is None else f"; limit {alarm.limit:.4g}{unit}"
+    return f"{alarm.value:.4g}{unit}{limit}"
+
+
+def change_words(found: FindingPart) -> str:
+    """Return a change in ln as percent, with its interval."""
+    if found.change is None:
+        return "–"
+    if found.change_std is None:
+        return percent(found.change)
+    half = SURE_95 * found.change_std
+    low, high = percent(found.change - half), percent(found.change + half)
+    return f"{percent(found.change)} (95 %: {low} to {high})"
+
+
+def percent(change: float) -> str:
+    """Return a change in ln as percent."""
+    return f"{100.0 * math.expm1(change):+.1f} %".replace("-", "−")
+
+
+def condition_words(bearing: BearingPart) -> str:
+    """Return the operating condition of the bearing."""
+    words = []
+    if bearing.condition is not None:
+        settled = "" if bearing.condition.is_settled else ", not settled"
+        words.append(plain(bearing.condition.state) + settled)
+    for name in CONDITION:
+        reading = bearing.readings.get(name)
+        if reading is not None and reading.value is not None:
+            label = "e = " if name == "eccentricity_ratio" else ""
+            words.append(f"{label}{number_words(reading)}")
+    return ", ".join(words)
+
+
+def number_words(reading: ReadingPart) -> str:
+    """Return a number with its unit."""
+    unit = "" if reading.unit == "1" else f" {reading.unit}"
+    return "–" if reading.value is None else f"{reading.value:.4g}{unit}"
+
+
+def state_words(case: Case) -> str:
+    """Return the state after the newest event."""
+    if not case.events:
+        return "its events are not in the store"
+    return plain(case.events[-1].state_after.value)
+
+
+def seen_words(case: Case) -> str:
+    """Return who acknowledged the occurrence, and when."""
+    seen = [each for each in case.events if each.change is AlarmChange.ACKNOWLEDGED]
+    if not seen:
+        return "not acknowledged"
+    return f"{seen[-1].actor}, {day_and_time(seen[-1].time_ns)}"
+
+
+def finding(case: Case) -> FindingPart | None:
+    """Return the finding about the alarm's film."""
+    film = None if case.bearing is None else case.bearing.film
+    if film is None:
+        return None
+    return next((each for each in film.findings if each.direction == case.direction), None)
+
+
+def story(case: Case) -> str:
+    """Describe the change in one or two sentences."""
+    found = finding(case)
+    if case.evidence.alarm.kind not in FILM_KINDS or found is None or found.change is None:
+        return ""
+    hours = (
+        ""
+        if found.time_scale_h is None
+        else f", averaged over {found.time_scale_h:g} running hours"
+    )
+    sentence = (
+        f"The stiffness of the film in {case.direction} has changed by {change_words(found)}"
+        f" against what it was under this condition{hours}."
+    )
+    cause = found.attribution
+    if cause is None:
+        return sentence
+    if cause.cause == "unknown":
+        return f"{sentence} What changed is not told apart: {cause.reason}."
+    return f"{sentence} Put down to {CAUSES.get(cause.cause, plain(cause.cause))}: {cause.reason}."
+
+
+GN_PER_M = 1e9
+
+MAX_EVENTS, MAX_ACTOR, MAX_NOTE = 6, 32, 84
+"""Limits of the table of events: rows, and characters per cell."""
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return an HTML table of escaped text."""
+    head = "".join(f"<th>{escape(each)}</th>" for each in heads)
+    body = "".join(
+        "<tr>" + "".join(f'<td class="n">{escape(cell)}</td>' for cell in row) + "</tr>"
+        for row in rows
+    )
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def estimators_table(bearing: BearingPart) -> str:
+    """Return the table of all estimators."""
+    heads = ["Estimator"]
+    for axis in AXES:
+        heads += [f"k {axis}, GN/m (± random ± systematic, std)", f"coherence {axis}"]
+    rows = []
+    for name in ESTIMATORS:
+        own = [each for each in bearing.estimators if each.estimator == name]
+        row = [ESTIMATORS[name].label + (", watched" if any(e.is_watched for e in own) else "")]
+        for axis in AXES:
+            row += [cell for each in own if each.direction == axis for cell in _estimate(each)]
+        rows.append(row)
+    words = f"Estimates of {bearing.bearing}, evidence: {plain(bearing.evidence)}"
+    return f"<h2>{escape(words)}</h2>" + table(heads, rows)
+
+
+def films_table(evidence: Evidence) -> str:
+    """Return the table of the films of all bearings at the time of the alarm."""
+    found = [each for each in evidence.bearings if each.film is not None]
+    if not found:
+        return ""
+    heads = ("Film", "x", "y", "Baseline", "Put down to")
+    title = "All films of the unit at that moment"
+    return f"<h2>{title}</h2>" + table(heads, (_films(each) for each in found))
+
+
+def events_table(case: Case) -> str:
+    """Return the table of the events of the occurrence."""
+    shown = list(case.events)[-MAX_EVENTS:]
+    n_more = len(case.events) - len(shown)
+    title = "What has happened" + (f" ({n_more} earlier not shown)" if n_more else "")
+    heads = ("Time", "Event", "By", "Reason or note")
+    return f"<h2>{title}</h2>" + table(heads, (_event(each) for each in shown))
+
+
+def footer(case: Case) -> str:
+    """Return versions and hashes."""
+    evidence, found = case.evidence, case.comparison
+    baseline = None if found is None else found.baseline
+    words = [f"configuration {evidence.configuration}"]
+    if baseline is not None:
+        words.append(
+            f"baseline version {baseline.version} by {baseline.author}, learned"
+            f" {baseline.learned_from[:10]} to {baseline.learned_until[:10]}"
+        )
+    words += [f"evidence {evidence.sha256}", evidence.made_by, f"noted {evidence.taken}"]
+    if evidence.origin == "replay":
+        words.append("REPLAY of a recording")
+    words += [f"missing: {each}" for each in evidence.missing]
+    safe = " · ".join(escape(shortened(each)) for each in words)
+    note = "padwatch is a condition-monitoring service and no protection system."
+    return f"<footer>{safe} · {note}</footer>"
+
+
+def _films(bearing: BearingPart) -> list[str]:
+    findings = bearing.film.findings if bearing.film else []
+    versions = {each.baseline_version for each in findings}
+    causes = {
+        CAUSES.get(each.attribution.cause, plain(each.attribution.cause))
+        for each in findings
+        if each.attribution is not None
+    }
+    version = ", ".join("none" if each is None else str(each) for each in versions)
+    return [bearing.bearing, *map(_said, findings), version, "; ".join(sorted(causes))]
+
+
+def _said(found: FindingPart) -> str:
+    verdict = plain(found.verdict)
+    return verdict if found.change is None else f"{verdict}, {change_words(found)}"
+
+
+def _estimate(found: EstimatorPart) -> tuple[str, str]:
+    coherence = "–" if found.coherence is None else f"{found.coherence:.3f}"
+    return _stiffness(found.stiffness), coherence
+
+
+def _stiffness(reading: ReadingPart) -> str:
+    if reading.value is None:
+        return plain(reading.reason)
+    parts = [f"{reading.value / GN_PER_M:.4f}"]
+    for u in (reading.u_random, reading.u_systematic):
+        parts.append("±?" if u is None else f"±{u / GN_PER_M:.4f}")
+    doubt = "" if reading.level == "good" else f" ({plain(reading.reason)})"
+    return " ".join(parts) + doubt
+
+
+def _event(event: AlarmEvent) -> tuple[str, str, str, str]:
+    reason = event.reason if event.actor else plain(str(event.reason))
+    return (
+        day_and_time(event.time_ns),
+        plain(event.change.value),
+        shortened(event.actor, MAX_ACTOR),
+        shortened(reason, MAX_NOTE),
+    )
+
+
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
+"""Content security policy of the response, and of the page opened from a bundle."""
+
+
+def report_page(case: Case, now_ns: int) -> str:
+    """Return the report of an occurrence.
+
+    Parameters
+    ----------
+    now_ns
+        Time of the report; later data are shown up to it.
+    """
+    evidence = case.evidence
+    title, level = escape(headline(evidence)), evidence.alarm.level or "alert"
+    bearing = case.bearing
+    body = [
+        f'<header><h1>{title}</h1><span class="badge {level}">{level.upper()}</span></header>',
+        _facts(case, now_ns),
+        f'<p class="story">{escape(story(case))}</p>',
+        *figures(case),
+        estimators_table(bearing) if bearing is not None else "",
+        films_table(evidence),
+        events_table(case),
+        footer(case),
+    ]
+    return (
+        '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
+        '<meta name="viewport" content="width=device-width">'
+        f"<title>{title}, {escape(evidence.alarm.time)}</title><style>{STYLE}</style></head>"
+        f"<body>{''.join(body)}</body></html>\n"
+    )
+
+
+def _facts(case: Case, now_ns: int) -> str:
+    pairs = "".join(
+        f"<dt>{escape(name)}</dt><dd>{escape(shortened(words))}</dd>"
+        for name, words in facts(case, day_and_time(now_ns))
+    )
+    return f"<dl>{pairs}</dl>"

@@ -1,0 +1,308 @@
+"""Retention: rules by which old results are deleted, or kept as roll-ups only.
+
+A new rule is a setting in `RetentionSettings` and an entry in `BEARING_RULES` or `PLANT_RULES`.
+
+Readings and roll-ups are deleted in bounded steps, and only if all wider roll-ups have been
+recomputed and agree with them. An hour that disagrees is aggregated again while its readings exist.
+"""
+
+from collections.abc import Callable, Mapping
+from enum import Enum
+from functools import partial
+from itertools import pairwise
+
+import numpy as np
+
+from core.units import DAY_NS
+from service.settings.storage import RetentionSettings
+from service.store.database import Connect, Connection, Reading, Tables
+from service.store.rollups.rows import HOUR_NS, NS_PER_S, WIDTHS_NS, Cells, select_cells
+from service.store.rollups.writing import (
+    SINGLE_S,
+    forget_width,
+    minutes_of,
+    rolled_columns,
+    select_deleted,
+    select_mark,
+    set_deleted,
+)
+from service.store.trends import Span
+
+MAX_READINGS = 1000
+"""Readings per step, which blocks other writers for some tens of milliseconds."""
+
+MAX_HOURS = 6
+"""Hours of roll-ups per step."""
+
+MAX_FILM_READINGS = 5000
+MAX_MESSAGES = 500
+
+MEAN_TOLERANCE = 1e-9
+"""Relative to the extremes: sums depend on the order of their terms."""
+
+NEXT_READINGS = """
+    SELECT time_ns FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?
+    ORDER BY time_ns LIMIT ?
+"""
+NEXT_CELL = """
+    SELECT start_ns FROM rollup_cell
+    WHERE series = ? AND width_s = ? AND start_ns >= ? AND start_ns < ?
+    ORDER BY start_ns LIMIT 1
+"""
+DELETE_READINGS = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?"
+REDONE = "SELECT start_ns FROM rollup_redo WHERE series = ? AND start_ns >= ? AND start_ns < ?"
+REDO = "INSERT INTO rollup_redo VALUES (?, ?) ON CONFLICT DO NOTHING"
+OLD_FILM_READINGS = """
+    SELECT estimator, time_ns FROM film_reading WHERE series = ? AND time_ns < ? LIMIT ?
+"""
+DELETE_FILM_READING = "DELETE FROM film_reading WHERE series = ? AND estimator = ? AND time_ns = ?"
+OLD_MESSAGES = """
+    SELECT id FROM outbox AS old WHERE state <> 'waiting' AND done_ns < ? AND EXISTS (
+        SELECT 1 FROM outbox AS newer WHERE newer.receiver = old.receiver
+        AND newer.alarm = old.alarm AND newer.state = old.state AND newer.id > old.id
+    ) AND NOT EXISTS (
+        SELECT 1 FROM alarm_event WHERE alarm_event.alarm = old.alarm
+        AND alarm_event.number = old.number AND alarm_event.time_ns >= ?
+    ) ORDER BY id LIMIT ?
+"""
+"""The last message about each alarm stays, since later messages depend on it. Messages about recent
+events stay as well: a host whose clock began in 1970 has recorded an early time of sending."""
+
+DELETE_MESSAGE = "DELETE FROM outbox WHERE id = ?"
+BELIEVED = """
+    SELECT max(start_ns) FROM (SELECT (
+        SELECT start_ns FROM rollup_cell
+        WHERE rollup_cell.series = series.id AND width_s = ?
+        GROUP BY start_ns ORDER BY start_ns DESC LIMIT 1 OFFSET ?
+    ) AS start_ns FROM series) AS believed
+"""
+BELIEVED_HOURS = (HOUR_NS // NS_PER_S, 23)
+"""The 24th newest hour with results of any bearing; each is found at the end of an index.
+Not by DISTINCT, for which SQLite 3.40 returns the oldest hour if there are fewer."""
+
+
+class Step(Enum):
+    """Result of a step of deletion."""
+
+    NONE = "none"
+    """Nothing is due."""
+
+    DONE = "done"
+    """Rows were deleted."""
+
+    BLOCKED = "blocked"
+    """Rows are due but cannot be deleted."""
+
+
+def _delete_readings(writer: Connection, series: int, before_ns: int) -> Step:
+    """Delete the next old single readings of a bearing."""
+    deleted = select_deleted(writer, series)
+    limit_ns = _floor(min(before_ns, select_mark(writer, series)))
+    span = _next_readings(writer, series, (deleted.readings_ns, limit_ns))
+    end_ns = _verified_until(writer, series, span)
+    if end_ns <= span[0]:
+        return Step.NONE
+    writer.execute(DELETE_READINGS, (series, span[0], end_ns))
+    set_deleted(writer, series, SINGLE_S, end_ns)
+    return Step.DONE
+
+
+def _delete_rollups(width_s: int, writer: Connection, series: int, before_ns: int) -> Step:
+    """Delete the next old roll-ups of a width.
+
+    Roll-ups that disagree with wider ones stay and block later ones: finer data are gone, so they
+    cannot be aggregated again, and one time marks the end of what was deleted.
+    """
+    width_ns, deleted = width_s * NS_PER_S, select_deleted(writer, series)
+    finer_s = {wider // NS_PER_S: finer // NS_PER_S for finer, wider in pairwise((0, *WIDTHS_NS))}
+    limit_ns = _floor(min(before_ns, deleted.of(finer_s[width_s])))
+    span = _next_cells(writer, series, width_s, (deleted.of(width_s), limit_ns))
+    if span[0] >= span[1] or writer.execute(REDONE, (series, *span)).fetchone():
+        return Step.NONE  # late readings are merged first
+    fine = select_cells(writer, series, width_ns, span, rolled_columns())
+    wider_ns = [wider for wider in WIDTHS_NS if wider > width_ns]
+    if fine is None or not all(_agrees(writer, series, fine, w, span) for w in wider_ns):
+        return Step.BLOCKED
+    forget_width(writer, series, width_ns, span)
+    set_deleted(writer, series, width_s, span[1])
+    return Step.DONE
+
+
+def _delete_films(writer: Connection, series: int, before_ns: int) -> Step:
+    old = writer.execute(OLD_FILM_READINGS, (series, before_ns, MAX_FILM_READINGS)).fetchall()
+    writer.executemany(DELETE_FILM_READING, [(series, *row) for row in old])
+    return Step.DONE if old else Step.NONE
+
+
+def _delete_messages(writer: Connection, before_ns: int) -> Step:
+    old = writer.execute(OLD_MESSAGES, (before_ns, before_ns, MAX_MESSAGES)).fetchall()
+    writer.executemany(DELETE_MESSAGE, old)
+    return Step.DONE if len(old) == MAX_MESSAGES else Step.NONE
+
+
+BEARING_RULES: Mapping[str, Callable[[Connection, int, int], Step]] = {
+    "readings_days": _delete_readings,
+    "minutes_days": partial(_delete_rollups, 60),
+    "ten_minutes_days": partial(_delete_rollups, 600),
+    "films_days": _delete_films,
+}
+"""Deletion of the data of a bearing before a time, by the setting of their age; finest first."""
+
+PLANT_RULES: Mapping[str, Callable[[Connection, int], Step]] = {"messages_days": _delete_messages}
+"""Deletion of other data before a time, by the setting of their age."""
+
+Ages = Mapping[str, int]
+"""Age in ns beyond which data are deleted, by setting; data without an entry are kept for ever."""
+
+
+def ages_of(settings: RetentionSettings) -> Ages:
+    """Return the ages of the settings that limit one."""
+    return {name: round(days * DAY_NS) for name, days in settings if days > 0.0}
+
+
+class RetentionStore(Tables):
+    """Deletion of old data in bounded, atomic steps.
+
+    Parameters
+    ----------
+    give_back
+        Returns some free space to the disk; the result is whether there is more.
+    """
+
+    def __init__(
+        self, writing: Connect, reading: Reading, give_back: Callable[[], bool] = lambda: False
+    ) -> None:
+        super().__init__(writing, reading)
+        self.give_back = give_back
+        self._blocked: set[tuple[str, int]] = set()
+
+    @property
+    def trouble(self) -> str | None:
+        """Reason why some old data cannot be deleted; None if all can."""
+        if not self._blocked:
+            return None
+        setting, series = min(self._blocked)
+        return (
+            f"roll-ups of bearing {series} are damaged or disagree with wider ones, so data beyond"
+            f" {setting} are kept ({len(self._blocked)} such cases)"
+        )
+
+    def series(self) -> list[int]:
+        """Return the numbers of all bearings."""
+        with self._reading() as reader:
+            return [int(row[0]) for row in reader.execute("SELECT id FROM series ORDER BY id")]
+
+    def believed_ns(self) -> int | None:
+        """Return the newest time with a day of results up to it; None if there are fewer."""
+        with self._reading() as reader:
+            found: int | None = reader.execute(BELIEVED, BELIEVED_HOURS).fetchone()[0]
+        return found
+
+    def delete(self, series: int, ages: Ages, now_ns: int) -> bool:
+        """Delete some old data of a bearing; return whether any were due.
+
+        Raises
+        ------
+        StoreError
+            If nothing was deleted.
+        """
+        found = False
+        for setting, rule in BEARING_RULES.items():
+            if setting in ages:
+                with self._writing() as writer:
+                    step = rule(writer, series, now_ns - ages[setting])
+                found |= step is Step.DONE
+                self._blocked.discard((setting, series))
+                if step is Step.BLOCKED:
+                    self._blocked.add((setting, series))
+        return found
+
+    def prune(self, ages: Ages, now_ns: int) -> bool:
+        """Delete some old data that belong to no bearing; return whether more are due."""
+        found = False
+        for setting, rule in PLANT_RULES.items():
+            if setting in ages:
+                with self._writing() as writer:
+                    found |= rule(writer, now_ns - ages[setting]) is Step.DONE
+        return found
+
+
+def _next_readings(writer: Connection, series: int, within: Span) -> Span:
+    """Return the next whole hours with readings; an empty span if there are none."""
+    rows = writer.execute(NEXT_READINGS, (series, *within, MAX_READINGS)).fetchall()
+    if not rows:
+        return within[0], within[0]
+    first_ns, last_ns = _floor(rows[0][0]), _floor(rows[-1][0])
+    is_cut = len(rows) == MAX_READINGS and last_ns > first_ns
+    return first_ns, last_ns if is_cut else last_ns + HOUR_NS
+
+
+def _next_cells(writer: Connection, series: int, width_s: int, within: Span) -> Span:
+    row = writer.execute(NEXT_CELL, (series, width_s, *within)).fetchone()
+    if row is None:
+        return within[0], within[0]
+    return _floor(row[0]), min(_floor(row[0]) + MAX_HOURS * HOUR_NS, within[1])
+
+
+def _verified_until(writer: Connection, series: int, span: Span) -> int:
+    """Return the end of the hours that agree with roll-ups; schedule the next hour to be redone."""
+    redone = {row[0] for row in writer.execute(REDONE, (series, *span))}
+    for hour_ns in range(span[0], span[1], HOUR_NS):
+        if hour_ns in redone:
+            return hour_ns
+        hour = (hour_ns, hour_ns + HOUR_NS)
+        minutes = minutes_of(writer, series, hour)
+        if minutes is not None and not all(
+            _agrees(writer, series, minutes, width, hour) for width in WIDTHS_NS
+        ):
+            writer.execute(REDO, (series, hour_ns))
+            return hour_ns
+    return span[1]
+
+
+def _agrees(writer: Connection, series: int, fine: Cells, width_ns: int, span: Span) -> bool:
+    """Return whether the roll-ups of a width equal the aggregate of finer ones."""
+    wanted = fine.gathered(width_ns)
+    found = select_cells(writer, series, width_ns, span, rolled_columns())
+    return found is not None and _is_same(found, wanted)
+
+
+def _is_same(found: Cells, wanted: Cells) -> bool:
+    ours, theirs = found.summaries, wanted.summaries
+    if not np.array_equal(ours.time_ns, theirs.time_ns):
+        return False
+    exact = (
+        (found.conditions.n_readings, wanted.conditions.n_readings),
+        (found.conditions.state, wanted.conditions.state),
+        (ours.count, theirs.count),
+        (ours.level, theirs.level),
+        (ours.minimum, theirs.minimum),
+        (ours.maximum, theirs.maximum),
+    )
+    if not all(np.array_equal(a, b, equal_nan=a.dtype.kind == "f") for a, b in exact):
+        return False
+    largest = np.fmax(np.abs(theirs.minimum), np.abs(theirs.maximum))
+    with np.errstate(invalid="ignore"):
+        is_off = np.abs(ours.mean - theirs.mean) > MEAN_TOLERANCE * largest
+    return not bool(is_off.any())
+
+
+def _floor(time_ns: int) -> int:
+    return time_ns - time_ns % HOUR_NS
+
+
+RETENTION_TABLES = """
+    CREATE TABLE retention_mark (
+        series INTEGER NOT NULL REFERENCES series (id),
+        width_s INTEGER NOT NULL,
+        until_ns INTEGER NOT NULL,
+        PRIMARY KEY (series, width_s)
+    ) STRICT, WITHOUT ROWID;
+    DROP TRIGGER outbox_kept;
+    CREATE TRIGGER outbox_kept BEFORE DELETE ON outbox WHEN OLD.state = 'waiting'
+    BEGIN SELECT RAISE(ABORT, 'waiting messages are kept'); END;
+"""
+"""Migration that creates the table of deleted data.
+
+``until_ns``, a whole hour, ends the single readings (width 0) or narrow roll-ups that were deleted.
+"""

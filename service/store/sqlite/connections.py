@@ -1,0 +1,217 @@
+"""Connections to a SQLite database: several readers and one writer."""
+
+import sqlite3
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from threading import Lock
+
+from acquisition.clock import SystemClock
+from service.runtime.asker import ASKER
+from service.store.highwater.commits import CommitMarks
+from service.store.sqlite.file import leaves_in_doubt
+
+BUSY_TIMEOUT_S = 5.0
+N_KEPT = 4
+LOOK_AFTER_STEPS = 20_000
+"""Instructions of SQLite, some tens of microseconds, after which a read checks whether its client
+still waits."""
+
+CLOCK = SystemClock()
+LONGEST_S = 120.0
+"""Maximum duration of a read, during which the log beside the file only grows."""
+
+
+class Readers:
+    """Read-only connections to one database; each is used by one thread at a time.
+
+    Parameters
+    ----------
+    now_s
+        Monotonic clock.
+    prepare
+        Prepares a new connection for reading.
+    require
+        Raises an error if the file is no longer the one that was opened.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        now_s: Callable[[], float] = CLOCK.monotonic_s,
+        prepare: Callable[[sqlite3.Connection], None] = lambda _: None,
+        require: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._prepare, self._now_s, self._require = prepare, now_s, require
+        self._uri = f"{path.absolute().as_uri()}?mode=ro"
+        self._lock = Lock()
+        self._idle: list[sqlite3.Connection] = []
+        self._is_closed = False
+
+    @contextmanager
+    def reading(self) -> Iterator[sqlite3.Connection]:
+        """Borrow a connection; one that raised an error is not used again."""
+        reader = self._taken()
+        try:
+            reader.set_progress_handler(self._should_end(), LOOK_AFTER_STEPS)
+            reader.execute("BEGIN")  # one state of the database for the whole read
+            yield reader
+            reader.set_progress_handler(None, 0)
+            if reader.in_transaction:
+                reader.execute("ROLLBACK")
+        except BaseException:
+            reader.close()
+            raise
+        self._put_back(reader)
+
+    def close(self) -> None:
+        """Close idle connections now, and the others when they are returned."""
+        with self._lock:
+            self._is_closed = True
+            idle, self._idle = self._idle, []
+        for reader in idle:
+            reader.close()
+
+    def _should_end(self) -> Callable[[], bool]:
+        """Return a callback that ends a read after a timeout or when the client has gone."""
+        asker, end_s = ASKER.get(), self._now_s() + LONGEST_S
+        return lambda: self._now_s() > end_s or (asker is not None and asker.has_gone)
+
+    def _taken(self) -> sqlite3.Connection:
+        self._require()
+        with self._lock:
+            if self._idle:
+                return self._idle.pop()
+        return self._opened()
+
+    def _opened(self) -> sqlite3.Connection:
+        reader = sqlite3.connect(
+            self._uri, uri=True, timeout=BUSY_TIMEOUT_S, check_same_thread=False
+        )
+        try:
+            self._prepare(reader)
+        except BaseException:
+            reader.close()
+            raise
+        return reader
+
+    def _put_back(self, reader: sqlite3.Connection) -> None:
+        with self._lock:
+            if not self._is_closed and len(self._idle) < N_KEPT:
+                self._idle.append(reader)
+                return
+        reader.close()
+
+
+MAX_LOG_BYTES = 67_108_864
+"""Size to which the ``-wal`` file is cut after a long read let it grow."""
+
+MIN_FREE_PAGES = 2000
+MIN_FREE_SHARE = 0.1
+"""Less free space than this is soon used again."""
+
+PAGES_AT_ONCE = 200
+
+ONLY_THEN = 2
+"""``auto_vacuum = INCREMENTAL``."""
+
+
+class Writer:
+    """Writing connection to an upgraded file; used by one thread at a time, under `lock`.
+
+    A failed sync is not repeated: the system may have dropped the data and report success. The
+    connection is closed, and before the next transaction the file is opened again and compared with
+    the high-water mark beside it.
+
+    Parameters
+    ----------
+    connection
+        Open connection.
+    marks
+        High-water mark.
+    prepare
+        Prepares a connection for writing, within a transaction.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        connection: sqlite3.Connection,
+        marks: CommitMarks,
+        prepare: Callable[[sqlite3.Connection], None],
+    ) -> None:
+        self._path, self._marks, self._prepare = path, marks, prepare
+        self.connection = connection
+        self.lock = Lock()
+        self._is_in_doubt = False
+        set_up(connection)
+
+    def close(self) -> None:
+        """Close the connection; closing twice has no effect."""
+        self.connection.close()
+
+    @contextmanager
+    def transaction(self) -> Iterator[sqlite3.Connection]:
+        """Open a transaction; durable when left."""
+        if self._is_in_doubt:
+            self._reopen()
+        try:
+            with _begun(self.connection):
+                yield self.connection
+        except sqlite3.Error as error:
+            self._is_in_doubt = leaves_in_doubt(error)
+            raise
+
+    def give_back(self) -> bool:
+        """Cut some free pages off the end of the file; return whether there are more.
+
+        A file created by an older padwatch keeps its free pages for reuse.
+        """
+        if self._number("auto_vacuum") != ONLY_THEN:
+            return False
+        n_free = self._number("freelist_count")
+        if n_free < max(MIN_FREE_PAGES, MIN_FREE_SHARE * self._number("page_count")):
+            return False
+        self.connection.execute(f"PRAGMA incremental_vacuum({PAGES_AT_ONCE})").fetchall()
+        return True
+
+    def _number(self, setting: str) -> int:
+        return int(self.connection.execute(f"PRAGMA {setting}").fetchone()[0])
+
+    def _reopen(self) -> None:
+        self.connection.close()
+        in_file = self._marks.in_file()
+        self.connection = opened(self._path)
+        set_up(self.connection)
+        with _begun(self.connection):
+            self._marks.open(self.connection, in_file)
+            self._prepare(self.connection)
+        self._is_in_doubt = False
+
+
+def opened(path: Path) -> sqlite3.Connection:
+    """Return a connection that may write and can be used by any thread."""
+    return sqlite3.connect(
+        path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False
+    )
+
+
+def set_up(connection: sqlite3.Connection) -> None:
+    """Make every transaction durable."""
+    for setting in (
+        *("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"),
+        f"journal_size_limit = {MAX_LOG_BYTES}",
+    ):
+        connection.execute(f"PRAGMA {setting}")
+
+
+@contextmanager
+def _begun(connection: sqlite3.Connection) -> Iterator[None]:
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    finally:
+        # a full disk rolls back by itself; a refused commit leaves the transaction open
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")

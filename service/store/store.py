@@ -1,0 +1,272 @@
+"""Store over one of two databases."""
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from core.alarms.alarm import Alarm, AlarmNews
+from core.change.film_judge import FilmNews
+from core.monitor.assessment import Assessment
+from core.monitor.catalogue import CATALOGUE
+from core.samples.gaps import Gap, Reach
+from service.store.access.tables import AccessStore
+from service.store.alarms import insert_alarms, select_alarms, select_events
+from service.store.audit import AuditChain, AuditStore
+from service.store.database import Connection, Database, Hold
+from service.store.film_readings import insert_film_news
+from service.store.films import FilmStore
+from service.store.integrity import Integrity
+from service.store.outbox import Address, Outbox, no_recipients
+from service.store.port import (
+    AlarmQuery,
+    QueryTooLargeError,
+    StoredEvent,
+    StoredReadings,
+    Trend,
+    TrendQuery,
+    UnitGap,
+)
+from service.store.references import GapReference, GapReferenceStore, VectorReferenceStore
+from service.store.retention import RetentionStore
+from service.store.rollups.coverage import read_trend
+from service.store.rollups.gathering import RollupStore
+from service.store.series import Layout, columns_of, remember_layout, series_of, unique_time_ns
+from service.store.sharing import (
+    Commands,
+    StreamPosition,
+    UnitStates,
+    select_position,
+    write_positions,
+)
+from service.store.spectra import SpectraLimits, SpectraStore, insert_spectra
+from service.store.trends import storable
+from service.store.waveforms import WaveformStore
+
+MAX_GAPS = 5000
+"""Maximum number of gaps that are returned."""
+
+INSERT_ASSESSMENT = """
+    INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)
+    ON CONFLICT (series, time_ns) DO NOTHING
+"""
+MEASURED_THEN = """
+    SELECT epoch, first_index, stop_index FROM assessment WHERE series = ? AND time_ns = ?
+"""
+INSERT_GAP = """
+    INSERT INTO gap (unit, epoch, first_index, n_samples, stop_ns, start_ns, is_estimated)
+    VALUES (?,?,?,?,?,?,?) ON CONFLICT DO NOTHING
+"""
+"""Not OR IGNORE, which would silently drop rows that violate any other constraint."""
+
+SELECT_GAPS = """
+    SELECT epoch, first_index, n_samples, stop_ns, start_ns, is_estimated FROM gap WHERE unit = ?
+"""
+SELECT_NEWEST = """
+    SELECT time_ns, quantities, reasons, reading_values, reading_qualities
+    FROM assessment JOIN layout ON layout.id = assessment.layout
+    WHERE series = (SELECT id FROM series WHERE unit = ? AND bearing = ?)
+    ORDER BY time_ns DESC LIMIT 1
+"""
+SELECT_LAST = """
+    SELECT time_ns, epoch, stop_index FROM assessment
+    WHERE series = ? ORDER BY time_ns DESC LIMIT 1
+"""
+
+
+class Store:
+    """Durable results in one database; may be used from several threads.
+
+    Data is on the disk when the method that writes it returns.
+
+    Parameters
+    ----------
+    database
+        Open database; closed with the store.
+    head
+        File that names the newest entry of the audit trail.
+    address
+        Function that returns the messages about an event of an alarm.
+    spectra
+        Limits of stored spectra.
+    """
+
+    def __init__(
+        self,
+        database: Database,
+        head: Path,
+        address: Address = no_recipients,
+        spectra: SpectraLimits | None = None,
+    ) -> None:
+        self.database, self._address = database, address
+        self._spectra_limits = spectra or SpectraLimits()
+        self._chain = AuditChain(head, database)
+        self._writing, self._reader = self._chain.writing, database.reading
+        audited = (self._chain, self._reader)
+        self.audit = AuditStore(*audited)
+        self.films = FilmStore(*audited)
+        self.gap_references = GapReferenceStore(*audited)
+        self.order1_references = VectorReferenceStore(*audited)
+        self.access = AccessStore(*audited)
+        self.outbox = Outbox(self._writing, self._reader)
+        self.spectra = SpectraStore(self._writing, self._reader)
+        self.rollups = RollupStore(self._writing, self._reader)
+        self.retention = RetentionStore(self._writing, self._reader)
+        self.unit_states = UnitStates(database.writing, self._reader)
+        self.waveforms = WaveformStore(database.writing, self._reader)
+        self.commands = Commands(database.writing, self._reader)
+        self.integrity = Integrity(self._chain)
+        self._layout = Layout.of(columns_of(CATALOGUE))
+        with database.writing() as writer:
+            self._layout_id = remember_layout(writer, self._layout)
+
+    @property
+    def kind(self) -> str:
+        """``sqlite`` or ``postgresql``."""
+        return self.database.kind
+
+    def hold(self, name: str) -> AbstractContextManager[Hold]:
+        """Hold a name among all processes that use the database; see `Database.hold`."""
+        return self.database.hold(name)
+
+    def close(self) -> None:
+        """Release the database; closing twice has no effect."""
+        self.database.close()
+
+    def append(
+        self,
+        assessments: Sequence[Assessment],
+        gaps: Sequence[UnitGap],
+        alarms: Sequence[AlarmNews] = (),
+        films: Sequence[FilmNews] = (),
+        positions: Sequence[StreamPosition] = (),
+    ) -> None:
+        """Write results in one transaction; writing the same results again has no effect.
+
+        Parameters
+        ----------
+        positions
+            Positions in a stream up to which the results of units reach with these.
+
+        Raises
+        ------
+        StoreError
+            If nothing was written.
+        """
+        with self._writing() as writer:
+            for assessment in assessments:
+                writer.execute(INSERT_ASSESSMENT, self._row(writer, assessment))
+            insert_spectra(writer, assessments, self._spectra_limits)
+            writer.executemany(INSERT_GAP, [_gap_row(gap) for gap in gaps])
+            insert_alarms(writer, alarms, self._chain, self._address)
+            insert_film_news(writer, films)
+            write_positions(writer, positions)
+
+    def trend(self, query: TrendQuery) -> Trend:
+        """Return trends of one bearing, aggregated into buckets if they are many.
+
+        Raises
+        ------
+        QueryTooLargeError
+            If too many single readings would have to be read.
+        """
+        with self._reader() as reader:
+            return read_trend(reader, query)
+
+    def gaps(self, unit: str, start_ns: int, end_ns: int) -> list[Gap]:
+        """Return the gaps that end within a time range, oldest first.
+
+        Raises
+        ------
+        QueryTooLargeError
+            If there are more than `MAX_GAPS`.
+        """
+        in_range = "AND stop_ns >= ? AND stop_ns < ? ORDER BY stop_ns, first_index LIMIT ?"
+        bounds = (unit, storable(start_ns), storable(end_ns), MAX_GAPS + 1)
+        with self._reader() as reader:
+            found = [_gap(row) for row in reader.execute(f"{SELECT_GAPS} {in_range}", bounds)]
+        if len(found) > MAX_GAPS:
+            raise QueryTooLargeError(f"more than {MAX_GAPS} gaps: ask for a shorter time")
+        return found
+
+    def reach(self, unit: str) -> Reach | None:
+        """Return where the results of a unit end, with the gaps beyond; None without results."""
+        with self._reader() as reader:
+            series = reader.execute("SELECT id FROM series WHERE unit = ?", (unit,)).fetchall()
+            rows = [reader.execute(SELECT_LAST, row).fetchone() for row in series]
+            newest = (tuple(row) for row in rows if row is not None)
+            time_ns, epoch, stop_index = max(newest, default=(0, 0, 0))
+            if not stop_index:  # a simulated past has no samples
+                return None
+            beyond = "AND epoch = ? AND first_index >= ? ORDER BY first_index"
+            gaps = reader.execute(f"{SELECT_GAPS} {beyond}", (unit, epoch, stop_index))
+            return Reach(epoch, stop_index, time_ns, tuple(_gap(row) for row in gaps))
+
+    def newest(self, unit: str, bearing: str) -> StoredReadings | None:
+        """Return the newest readings of a bearing; None if there are none."""
+        with self._reader() as reader:
+            row = reader.execute(SELECT_NEWEST, (unit, bearing)).fetchone()
+        if row is None:
+            return None
+        time_ns, quantities, reasons, values, qualities = row
+        readings = Layout.loads(quantities, reasons).readings(values, qualities)
+        return StoredReadings(int(time_ns), readings)
+
+    def add_reference(self, reference: GapReference) -> None:
+        """Write a gap reference, which is in force for its bearing from then on."""
+        self.gap_references.add(reference)
+
+    def references(self) -> list[GapReference]:
+        """Return the gap references in force."""
+        return self.gap_references.in_force()
+
+    def reference_history(self, unit: str, bearing: str) -> list[GapReference]:
+        """Return the gap references of a bearing, newest first; at most the newest thousand."""
+        return self.gap_references.history(unit, bearing)
+
+    def position(self, unit: str) -> StreamPosition | None:
+        """Return the stream position of a unit; None if its results never came from a stream."""
+        with self._reader() as reader:
+            return select_position(reader, unit)
+
+    def alarms(self) -> list[Alarm]:
+        """Return every alarm that ever had an event, in its current state."""
+        with self._reader() as reader:
+            return select_alarms(reader)
+
+    def alarm_events(self, query: AlarmQuery) -> list[StoredEvent]:
+        """Return events of alarms, newest first."""
+        with self._reader() as reader:
+            return select_events(reader, query)
+
+    def _row(self, writer: Connection, assessment: Assessment) -> tuple[object, ...]:
+        values, qualities = self._layout.encode(assessment.readings)
+        condition, window = assessment.condition, assessment.window
+        series = series_of(writer, assessment.unit, assessment.bearing)
+        measured = (window.epoch, window.first_index, window.stop_index)
+        return (
+            series,
+            unique_time_ns(writer, MEASURED_THEN, (series,), assessment.time_ns, measured),
+            *measured,
+            window.n_segments,
+            window.coverage,
+            assessment.speed_source.value,
+            assessment.readings["eccentricity_ratio"].value,
+            assessment.readings["oil_temperature_c"].value,
+            self._layout_id,
+            values,
+            qualities,
+            assessment.estimators["xx"],
+            assessment.estimators["yy"],
+            None if condition is None else int(condition.state),
+            None if condition is None else int(condition.is_settled),
+        )
+
+
+def _gap_row(found: UnitGap) -> tuple[object, ...]:
+    gap = found.gap
+    counted = (found.unit, gap.epoch, gap.first_index, gap.n_samples, gap.stop_ns)
+    return (*counted, gap.start_ns, int(gap.is_estimated))
+
+
+def _gap(row: tuple[int, int, int, int, int | None, int]) -> Gap:
+    return Gap(*row[:-1], is_estimated=bool(row[-1]))
