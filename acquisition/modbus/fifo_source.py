@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from acquisition.clock import Clock
 from acquisition.delivery.arrival import Arrival, HostStamps
-from acquisition.delivery.blocks import MIN_BLOCK_S, BlockAssembler, RawBlock
+from acquisition.delivery.blocks import BlockAssembler, RawBlock
 from acquisition.delivery.polling import Freshness
 from acquisition.errors import LinkError
 from acquisition.modbus.client import ModbusClient
@@ -60,7 +60,7 @@ class FifoSource:
         self._settings, self._layout = settings, layout
         self._calibration, self._clock = calibration, clock
         self._client = ModbusClient(settings)
-        self._delivery = BlockAssembler(calibration, stamped=False, min_block_s=MIN_BLOCK_S)
+        self._delivery = BlockAssembler(calibration, stamped=False)
         self._stamps = HostStamps(calibration.rate_hz)
         self._freshness = Freshness("the newest sample", settings.stale_after_s)
         self._newest = (0, 0)
@@ -109,7 +109,7 @@ class FifoSource:
                 reading_s = 0.0 if drained else reading_s + arrived.steady_s - begun_s
                 self._require_in_time(reading_s)
             except LinkError:
-                for block in self._saved(waiting, arrived) + self._delivery.release():
+                for block in self._saved(waiting, arrived):
                     yield block
                 raise
             if not drained:
@@ -118,8 +118,7 @@ class FifoSource:
             if not self._layout.has_counter and self._uncounted.has_lost(arrived.steady_s):
                 waiting.clear()  # where among these the loss is remains unknown
                 self._uncounted.begin()
-            blocks = self._delivered(waiting, arrived) if waiting else self._delivery.release()
-            for block in blocks:
+            for block in self._delivered(waiting, arrived):
                 yield block
             waiting.clear()
             self._freshness.note(repr(self._newest).encode(), arrived.steady_s)
