@@ -14,7 +14,7 @@ from acquisition.can.plan import SECONDS
 from acquisition.can.reader import FrameReader
 from acquisition.can.settings import CanLinkSettings, CanSettings
 from acquisition.clock import Clock
-from acquisition.delivery.blocks import BlockAssembler, RawBlock
+from acquisition.delivery.blocks import MIN_BLOCK_S, BlockAssembler, RawBlock
 from acquisition.errors import LinkError
 from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
@@ -24,6 +24,9 @@ BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
 """Opens a bus that delivers frames of these ids; `acquisition.can.bus.open_bus`."""
 
 _LOOK_S = 0.2
+
+_PAUSE_S = 0.1
+"""Samples that are held for a longer block are delivered if no others follow for so long."""
 
 _MAX_DOUBT_S = 2 * MAX_UNSURE_S
 """Time in which the clock has to place samples; it observes them for half of that at a time."""
@@ -61,10 +64,12 @@ class CanSource:
         self._plan = compile_plan(settings, calibration)
         instant_s = self._plan.samples_per_frame / calibration.rate_hz
         self._stale_after_s = max(settings.stale_after_s, _MIN_STALE_INSTANTS * instant_s)
-        self._delivery = BlockAssembler(calibration, stamped=SECONDS in self._plan.quantities)
+        stamped = SECONDS in self._plan.quantities
+        self._delivery = BlockAssembler(calibration, stamped=stamped, min_block_s=MIN_BLOCK_S)
         self._assembler = FrameAssembler(
             self._plan, clock.now_ns(), device_waits=settings.when_full == "wait"
         )
+        self._silent_s = self._doubtful_s = 0.0
 
     @property
     def refused_frames(self) -> Mapping[str, int]:
@@ -95,29 +100,44 @@ class CanSource:
             await reader.stop()
 
     async def _blocks(self, reader: FrameReader) -> AsyncGenerator[SampleBlock, None]:
-        silent_s = doubtful_s = 0.0
+        self._silent_s = self._doubtful_s = 0.0
         while True:
-            looked_s = self._clock.monotonic_s()
-            batch = await reader.next_batch(min(_LOOK_S, self._stale_after_s - silent_s))
-            raw_blocks: list[RawBlock] = []
-            n_complete = self._assembler.n_complete
-            if batch:
-                if batch.stamp_fault:
-                    self._delivery.note_fault(batch.stamp_fault)
-                arrived = batch.arrived
-                steady_ns = ns_from_s(arrived.steady_s)
-                raw_blocks = self._assembler.take(batch.frames, arrived.host_ns, steady_ns)
-                if self._assembler.trouble:
-                    raw_blocks = []
-                for block in self._delivery.take_together(raw_blocks, arrived):
+            try:
+                blocks = await self._next_blocks(reader)
+            except LinkError:
+                for block in self._delivery.release():
                     yield block
-            # a process that stood still has not listened for all that time
-            passed_s = min(self._clock.monotonic_s() - looked_s, 2 * _LOOK_S)
-            has_come = self._assembler.n_complete > n_complete and not self._assembler.trouble
-            silent_s = 0.0 if raw_blocks or has_come else silent_s + passed_s
-            doubtful_s = 0.0 if raw_blocks else doubtful_s + passed_s
-            self._require_fresh(silent_s, doubtful_s)
+                raise
+            for block in blocks:
+                yield block
             await asyncio.sleep(0)
+
+    async def _next_blocks(self, reader: FrameReader) -> list[SampleBlock]:
+        """Blocks that the next frames complete; those that are held, if no samples follow."""
+        looked_s = self._clock.monotonic_s()
+        look_s = _PAUSE_S if self._delivery.holds_whole_cells else _LOOK_S
+        batch = await reader.next_batch(min(look_s, self._stale_after_s - self._silent_s))
+        raw_blocks: list[RawBlock] = []
+        blocks: list[SampleBlock] = []
+        n_complete = self._assembler.n_complete
+        if batch:
+            if batch.stamp_fault:
+                self._delivery.note_fault(batch.stamp_fault)
+            arrived = batch.arrived
+            steady_ns = ns_from_s(arrived.steady_s)
+            raw_blocks = self._assembler.take(batch.frames, arrived.host_ns, steady_ns)
+            if self._assembler.trouble:
+                raw_blocks = []
+            blocks = self._delivery.take_together(raw_blocks, arrived)
+        # a process that stood still has not listened for all that time
+        passed_s = min(self._clock.monotonic_s() - looked_s, 2 * _LOOK_S)
+        has_come = self._assembler.n_complete > n_complete and not self._assembler.trouble
+        self._silent_s = 0.0 if raw_blocks or has_come else self._silent_s + passed_s
+        self._doubtful_s = 0.0 if raw_blocks else self._doubtful_s + passed_s
+        self._require_fresh(self._silent_s, self._doubtful_s)
+        if batch is None or self._doubtful_s > _PAUSE_S:
+            blocks += self._delivery.release()
+        return blocks
 
     def _require_fresh(self, silent_s: float, doubtful_s: float) -> None:
         """Give up a bus that brings no samples, or only samples that the clock contradicts."""

@@ -23,7 +23,7 @@ from core.samples.calibration import UnitCalibration
 from core.units import NS_PER_S, ns_from_s
 
 MIN_BLOCK_S = 0.25
-"""Shortest blocks of what has no reason to be shorter: alarms of channels come no sooner."""
+"""Length of blocks where no sample is missing and no pause ends them."""
 
 _STAMP_NS = 1000
 """Resolution of a stamp. Every profile can carry it, and slow values in single precision, so that a
@@ -119,26 +119,37 @@ class BlockJoiner:
     ----------
     cell_samples
         Samples of each channel in a cell.
+    min_samples
+        Whole cells of fewer samples are held until others follow, or until `release`.
     """
 
-    def __init__(self, cell_samples: int) -> None:
-        self._cell = cell_samples
+    def __init__(self, cell_samples: int, min_samples: float = 0.0) -> None:
+        self._cell, self._min_samples = cell_samples, min_samples
         self._parts: list[SampleBlock] = []
 
     def put(self, block: SampleBlock) -> list[SampleBlock]:
         """Take what a device delivered; return the blocks that this completes, in order."""
         done = [] if self._continued_by(block) else self.flush()
         self._parts.append(block)
-        n_rest = block.stop_index % self._cell
-        n_whole = block.stop_index - n_rest - self._parts[0].first_index
-        if n_whole <= 0:
-            return done
+        return done if self.n_whole < self._min_samples else done + self.release()
+
+    @property
+    def n_whole(self) -> int:
+        """Samples in the whole cells that are held."""
+        if not self._parts:
+            return 0
+        stop_index = self._parts[-1].stop_index
+        return max(0, stop_index - stop_index % self._cell - self._parts[0].first_index)
+
+    def release(self) -> list[SampleBlock]:
+        """Return the whole cells that are held, when nothing follows on them for a while."""
+        n_whole = self.n_whole
+        if not n_whole:
+            return []
         whole = joined(self._parts)
-        done.append(_in_cells(whole.from_sample(0, n_whole), self._cell))
-        self._parts = []
-        if n_rest:
-            self._parts.append(replace(whole.from_sample(n_whole), stamp_fault=None))
-        return done
+        has_rest = n_whole < whole.n_samples
+        self._parts = [replace(whole.from_sample(n_whole), stamp_fault=None)] if has_rest else []
+        return [_in_cells(whole.from_sample(0, n_whole), self._cell)]
 
     def flush(self) -> list[SampleBlock]:
         """Return the block that is not complete, when nothing follows on it."""
@@ -286,6 +297,9 @@ class BlockAssembler:
         Whether ``start_ns`` of the raw blocks comes from the device rather than from the host.
     samples_when_asked
         Whether the device samples when the host polls it: it then has no rate that could drift.
+    min_block_s
+        Shorter blocks of a device that sends all the time are held until more has come, or until
+        `release`.
     """
 
     def __init__(
@@ -294,11 +308,13 @@ class BlockAssembler:
         *,
         stamped: bool = True,
         samples_when_asked: bool = False,
+        min_block_s: float = 0.0,
     ) -> None:
         self._calibration = calibration
         self._stamped = stamped
         self._samples_when_asked = samples_when_asked
-        self._joiner = BlockJoiner(calibration.block_samples)
+        min_samples = min_block_s * calibration.rate_hz
+        self._joiner = BlockJoiner(calibration.block_samples, min_samples)
         self._stamps = StampCheck()
         self._arrivals = ArrivalModel(calibration.rate_hz)
         self._fault: StampFault | None = None
@@ -351,6 +367,15 @@ class BlockAssembler:
         """Take a recorded block, as `take` does."""
         return self._joined([self._marked(*self._stamps.check(block))])
 
+    @property
+    def holds_whole_cells(self) -> bool:
+        """Whether `release` would return anything."""
+        return self._joiner.n_whole > 0
+
+    def release(self) -> list[SampleBlock]:
+        """Return the whole cells that are held, when the device has paused or its link is lost."""
+        return self._with_clock(self._joiner.release())
+
     def flush(self) -> list[SampleBlock]:
         """Return what is left at the end, as of a recording."""
         return self._joiner.flush()
@@ -374,6 +399,9 @@ class BlockAssembler:
         cuts = [n for n in range(1, len(blocks)) if not _follows(blocks[n - 1], blocks[n])]
         runs = itertools.pairwise([0, *cuts, len(blocks)])
         done = [b for run in runs if blocks for b in self._joiner.put(joined(blocks[slice(*run)]))]
+        return self._with_clock(done)
+
+    def _with_clock(self, done: Sequence[SampleBlock]) -> list[SampleBlock]:
         return [b if b.sampled_s is None else replace(b, clock=self._clock()) for b in done]
 
     def _clock(self) -> DeviceClock:

@@ -124,6 +124,54 @@ def test_what_has_waited_in_the_device_is_older_than_the_newest(delivery, counti
     assert [block.sampled_s for block in blocks] == pytest.approx([4999.65, 4999.65, 4999.75])
 
 
+def held(calibration) -> BlockAssembler:
+    return BlockAssembler(calibration, min_block_s=0.25)
+
+
+def shape_of(blocks: list[SampleBlock]) -> list[tuple[int, int]]:
+    return [(block.first_index, block.n_samples) for block in blocks]
+
+
+def test_cells_are_held_until_they_last_a_quarter_of_a_second(counting_feed, counts_calibration):
+    feed, delivery = counting_feed(), held(counts_calibration(2))
+    arrivals = [Arrival(ARRIVED.host_ns, 5000.0 + 0.05 * n) for n in range(20)]
+    taken = [delivery.take(feed.advance(30), arrived) for arrived in arrivals]
+    assert [shape_of(blocks) for blocks in taken if blocks] == [
+        [(0, 150)],
+        [(150, 150)],
+        [(300, 150)],
+        [(450, 150)],
+    ]
+    assert [block.side.starts.tolist() for [block] in filter(None, taken)] == [[0, 50, 100]] * 4
+    assert [block.sampled_s for [block] in filter(None, taken)] == [
+        5000.2,
+        5000.45,
+        5000.7,
+        5000.95,
+    ]
+
+
+def test_a_pause_releases_whole_cells_and_keeps_the_rest(counting_feed, counts_calibration):
+    feed, delivery = counting_feed(), held(counts_calibration(2))
+    assert delivery.release() == []
+    assert delivery.take(feed.advance(40), ARRIVED) == []
+    assert (delivery.holds_whole_cells, delivery.release()) == (False, [])
+    assert delivery.take(feed.advance(70), ARRIVED) == []
+    assert delivery.holds_whole_cells
+    [block] = delivery.release()
+    assert (block.first_index, block.n_samples, block.clock is None) == (0, 100, False)
+    assert delivery.release() == []
+    assert shape_of(delivery.take(feed.advance(140), ARRIVED)) == [(100, 150)]
+
+
+def test_a_gap_ends_what_is_held(counting_feed, counts_calibration):
+    feed, delivery = counting_feed(), held(counts_calibration(2))
+    assert delivery.take(feed.advance(110), ARRIVED) == []
+    feed.advance(30)
+    assert shape_of(delivery.take(feed.advance(60), ARRIVED)) == [(0, 110)]
+    assert shape_of(delivery.release()) == [(140, 60)]
+
+
 def test_what_comes_from_no_device_has_no_age(delivery, counting_feed):
     [block] = delivery.take(counting_feed().advance(160))
     assert block.sampled_s is None

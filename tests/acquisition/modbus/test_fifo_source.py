@@ -336,6 +336,6 @@ async def test_what_was_read_over_too_slow_a_link_is_kept_too(queues) -> None:
 
         p.device.read_fifo = slowly
         before = await until_lost(stream, "too slow for 600 samples per second")
-    assert len(before) > 1
+    assert sum(block.n_samples for block in before) > STEP
     assert gaps([*first, *before]) == []
     assert_right([*first, *before])

@@ -79,6 +79,29 @@ def test_a_child_that_the_system_has_ended_is_no_fault_of_the_recording(
     assert len(list(recording.heads())) == 1
 
 
+CRASHES = """
+import os, select, signal
+select.select([0], [], [])
+os.kill(os.getpid(), signal.SIGSEGV)
+"""
+
+
+def test_a_crash_that_leaves_the_request_unread_is_a_refusal_too(
+    record: Record, numbered: Numbered, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The parent's next read is then a reset of the connection, no end of the stream."""
+    recording = open_recording(record([numbered(0, 50)]))
+    (tmp_path / "crashes.py").write_text(CRASHES)
+    monkeypatch.syspath_prepend(tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(reading, "_idle_or_new", partial(ConfinedProcess, "crashes"))
+        words = "recording: not readable as recording: reading it was ended by SIGSEGV"
+        with pytest.raises(ConfigError, match=words) as error:
+            list(recording.heads())
+    assert isinstance(error.value.__cause__, EOFError)  # of the file, not of the system
+    assert len(list(recording.heads())) == 1
+
+
 def test_what_is_not_read_to_its_end_is_never_taken_for_the_next(
     record: Record, numbered: Numbered
 ) -> None:

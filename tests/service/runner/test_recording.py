@@ -30,6 +30,7 @@ from service.measuring.commands import LocalCommands
 from service.measuring.recorder import FILE, Findings, NotStoredError, ParkedRows, Recorder
 from service.measuring.references import ReferencesInForce
 from service.notifications.sender import Deliveries
+from service.store.access.audit_entries import ActedNews
 from service.store.port import TrendQuery, UnitGap
 
 K = "order1_k_eff_xx_n_per_m"
@@ -225,7 +226,9 @@ async def test_a_row_that_cannot_be_stored_is_parked_and_everything_else_is_stor
 ) -> None:
     results = [assessment(at(n), order1_k_eff_xx_n_per_m=float(n)) for n in range(5)]
     plant.recorder.put(Findings([*results[:2], spoil(results[2])], [gap()], [news_of("sx")]))
-    plant.recorder.put(Findings(results[3:], alarms=[news_of("\ud800"), news_of("sy")]))
+    nameless, of_a_person = news_of("\ud800"), news_of("\ud801")
+    acted = ActedNews(of_a_person.alarm, of_a_person.events, peer="192.0.2.7")
+    plant.recorder.put(Findings(results[3:], alarms=[nameless, acted, news_of("sy")]))
 
     await plant.recorder.flush()
 
@@ -233,12 +236,14 @@ async def test_a_row_that_cannot_be_stored_is_parked_and_everything_else_is_stor
     assert plant.store.gaps("U1", 0, 2**62) == [gap().gap]
     assert changes(plant, PROBE) == changes(plant, "U1:sy:channel_not_ok") == ["raised"]
     assert (plant.recorder.n_waiting, plant.live.store_error) == (0, None)
-    alarm, result = map(json.loads, plant.path.with_name(FILE).read_text().splitlines())
-    assert (alarm["kind"], result["kind"]) == ("AlarmNews", "Assessment")
+    rows = list(map(json.loads, plant.path.with_name(FILE).read_text().splitlines()))
+    assert [row["kind"] for row in rows] == ["AlarmNews", "ActedNews", "Assessment"]
+    alarm, person, result = rows
+    assert person["row"]["peer"] == "192.0.2.7"
     assert alarm["row"]["events"][0]["identity"]["subject"] == "\ud800"
     assert why in result["reason"]
     assert result["row"]["readings"]["order1_k_eff_xx_n_per_m"]["value"] == 2.0
-    assert plant.live.n_unstored == 2
+    assert plant.live.n_unstored == 3
     assert FILE in plant.live.unstored_reason
 
 

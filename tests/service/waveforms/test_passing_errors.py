@@ -123,4 +123,13 @@ def test_every_damage_is_noticed_when_the_recording_is_read_once_more(rig: Any) 
             path.write_bytes(corrupted(whole, damage, rng))
             assert rig.caretaker.check(entry).state is WaveformState.DAMAGED, (path.name, damage)
         path.write_bytes(whole)
+    manifest = folder / "manifest.json"
+    whole = manifest.read_bytes()
+    manifest.write_bytes(whole + b" " * 1_000_001)  # too long to be read: no error of the disk
+    checked = rig.caretaker.check(entry)
+    assert (checked.state, "larger than 1000000 bytes" in checked.reason) == (
+        WaveformState.DAMAGED,
+        True,
+    )
+    manifest.write_bytes(whole)
     assert rig.caretaker.check(entry).state is WaveformState.PRESENT

@@ -139,6 +139,52 @@ def test_hdf5_links_to_elsewhere_are_not_followed(
     assert "'shaft x' is a link to elsewhere" in refusal(read, tmp_path / "soft", hdf5_job)
 
 
+def test_hdf5_that_is_no_column_of_numbers_is_refused(
+    tmp_path: Path, read: Read, hdf5_job: ImportJob
+) -> None:
+    path = tmp_path / "run"
+    write_hdf5(path, shaft_x=np.zeros((10, 10)))
+    says = "dataset 'shaft x' has shape (10, 10) of float64; needed is one dimension of numbers"
+    assert says in refusal(read, path, hdf5_job)
+    write_hdf5(path, shaft_x=np.array([b"one"] * 100))
+    assert "needed is one dimension of numbers" in refusal(read, path, hdf5_job)
+    with h5py.File(path, "w") as file:
+        file.create_group("shaft x")
+    assert "'shaft x' is no dataset" in refusal(read, path, hdf5_job)
+    absent = replace(hdf5_job.channels[0], place=ColumnName("shaft x/y"))
+    says = refusal(read, path, replace(hdf5_job, channels=(absent,)))
+    assert "dataset 'shaft x/y' is not there" in says
+
+
+def test_a_file_without_times_of_its_own_says_what_to_name(
+    tmp_path: Path, read: Read, hdf5_job: ImportJob
+) -> None:
+    own_times = replace(hdf5_job, time=TimeAxis("file", 0))
+    says = "column 'shaft x' has no time of its own: name a time column or a start"
+    write_hdf5(tmp_path / "run.h5")
+    assert says in refusal(read, tmp_path / "run.h5", own_times)
+    with nptdms.TdmsWriter(tmp_path / "run.tdms") as file:
+        for name in ("shaft x", "shaft y"):
+            file.write_segment([nptdms.ChannelObject("a", name, np.zeros(5))])
+    assert says in refusal(read, tmp_path / "run.tdms", replace(own_times, format="tdms"))
+
+
+def test_tdms_that_is_unfinished_or_no_tdms_is_refused(
+    tmp_path: Path, read: Read, job: ImportJob
+) -> None:
+    tdms_job, path = replace(job, format="tdms", slow=()), tmp_path / "run"
+    path.write_bytes(b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 2**64 - 1, 0))
+    assert "has not finished its last segment" in refusal(read, path, tdms_job)
+    path.write_bytes(b"RIFF" + bytes(40))
+    assert "no TDMS file, or damaged: there is no segment at 0" in refusal(read, path, tdms_job)
+    path.write_bytes(b"TDSm" + struct.pack("<IIQQ", 0x2, 4713, 100, 0))
+    says = "cut off: its last segment ends at 128, the file at 28"
+    assert says in refusal(read, path, tdms_job)
+    with nptdms.TdmsWriter(path) as file:
+        file.write_segment([nptdms.ChannelObject("a", "shaft y", np.zeros(5))])
+    assert "'shaft x' is not there; the file has a/shaft y" in refusal(read, path, tdms_job)
+
+
 def test_hdf5_values_in_other_files_are_not_read(
     tmp_path: Path, read: Read, hdf5_job: ImportJob
 ) -> None:
