@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
 
 from core.alarms.alarm import AlarmRule
 from core.condition.cells import OperatingPoint
@@ -30,24 +29,12 @@ class Region:
     ----------
     attitude_deg
         Within 0 to 360.
-
-    Raises
-    ------
-    ValueError
-        If there is no state, or a range ends where it begins or before.
     """
 
     states: States = EVERY_STATE
     eccentricity_ratio: Range | None = None
     oil_temperature_c: Range | None = None
     attitude_deg: Range | None = None
-
-    def __post_init__(self) -> None:
-        if not self.states:
-            raise ValueError("limits that count in no operating state")
-        for low, high in filter(None, self.ranges):
-            if low >= high:
-                raise ValueError(f"a range from {low:g} to {high:g} must rise")
 
     def holds(self, point: OperatingPoint) -> bool | None:
         """Whether a point lies in it; None where that is not known."""
@@ -92,26 +79,13 @@ class LimitRule:
     states
         Operating states in which `limits` count.
     tables
-        Regions of the condition in which other limits hold instead.
-
-    Raises
-    ------
-    ValueError
-        If there are no limits at all, no states, or two tables overlap.
+        Regions of the condition in which other limits hold instead; no two overlap.
     """
 
     limits: Limits | None
     rule: AlarmRule
     states: States = EVERY_STATE
     tables: tuple[tuple[Region, Limits], ...] = ()
-
-    def __post_init__(self) -> None:
-        if not (self.states and (self.tables or self.limits)):
-            raise ValueError("no limits for any operating state")
-        for (one, _), (other, _) in combinations(self.tables, 2):
-            if one.overlaps(other):
-                states = ", ".join(s.name.lower() for s in sorted(one.states & other.states))
-                raise ValueError(f"two limits for the operating state {states}")
 
     def at(self, point: OperatingPoint) -> Sequence[Limits]:
         """The limits that hold at a point, or may hold; empty where none do."""

@@ -33,7 +33,7 @@ def locate_shaft(
     Parameters
     ----------
     clearance_um
-        Radial clearance; must be positive.
+        Radial clearance, above zero.
     accuracy
         Limits of error; by default those of :class:`GapAccuracy`.
     last_growth
@@ -44,14 +44,7 @@ def locate_shaft(
     By quantity: widening of all gaps since their references were read (measured by opposite probes
     only), displacement along the bearing axes, eccentricity ratio, and attitude angle from the
     positive x axis towards the positive y axis.
-
-    Raises
-    ------
-    ValueError
-        If the clearance is not positive.
     """
-    if not clearance_um > 0.0:
-        raise ValueError(f"clearance must be positive, got {clearance_um} µm")
     accuracy = accuracy or GapAccuracy()
     axes = ProbeAxes(x, y, accuracy, last_growth)
     position_um = axes.weights @ axes.values_um

@@ -51,10 +51,6 @@ class BracketDynamics:
     mass_kg: float | None = None
     damping_n_s_per_m: float = 0.0
 
-    def __post_init__(self) -> None:
-        if not self.stiffness_n_per_m > 0.0:
-            raise ValueError(f"bracket stiffness must be above 0 N/m, got {self.stiffness_n_per_m}")
-
     @property
     def max_mass_kg(self) -> float:
         """The mass, or the largest that a bracket of that stiffness can have."""

@@ -234,7 +234,7 @@ def _zones(found: ZoneSettings | None) -> LimitRule | None:
 
 def _table(table: ZoneTableSettings) -> ZoneLimits:
     deadband = ZONE_DEADBAND * table.a_b if table.deadband is None else table.deadband
-    return ZoneLimits.between(table.a_b, table.b_c, table.c_d, deadband)
+    return ZoneLimits(table.b_c, table.c_d, deadband, zone_b=table.a_b)
 
 
 def _clock_limit(limit: float, delay_s: float) -> LimitRule:
