@@ -1,7 +1,8 @@
 """Rules of alarms: limits by operating condition, delays, and what is watched on a unit."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from core.alarms.alarm import AlarmRule
 from core.condition.cells import OperatingPoint
@@ -124,42 +125,8 @@ def point_of(assessment: Assessment) -> OperatingPoint:
     return OperatingPoint(state, *(readings.get(name, NOT_MEASURED).value for name in names))
 
 
-@dataclass(frozen=True)
-class BearingRules:
-    """Rules of one bearing; None where nothing is watched.
-
-    Parameters
-    ----------
-    shaft_order1
-        Relative shaft vibration at 1× in each direction, µm zero-to-peak.
-    oil_temperature
-        °C.
-    shaft_overall
-        Relative shaft vibration in each direction, broad-band, µm peak-to-peak.
-    bearing_overall
-        Absolute bearing vibration in each direction, broad-band, mm/s rms.
-    eccentricity
-        Distance of the shaft's centre from that of the bearing, as a share of the clearance.
-    gap
-        Mean of each probe's gap, µm.
-    shaft_change, bearing_change
-        How far the 1× vector has moved from its reference, µm zero-to-peak.
-    shaft_zones, orbit_zones, bearing_zones
-        Zones of the broad-band peak-to-peak values, of the farthest excursion, and of the bearing
-        velocity.
-    """
-
-    shaft_order1: LimitRule | None = None
-    oil_temperature: LimitRule | None = None
-    shaft_overall: LimitRule | None = None
-    bearing_overall: LimitRule | None = None
-    eccentricity: LimitRule | None = None
-    gap: LimitRule | None = None
-    shaft_change: LimitRule | None = None
-    bearing_change: LimitRule | None = None
-    shaft_zones: LimitRule | None = None
-    orbit_zones: LimitRule | None = None
-    bearing_zones: LimitRule | None = None
+BearingRules: TypeAlias = Mapping[str, LimitRule | None]
+"""Limits of one bearing, by the `rule` of the kinds of alarms that they make; None makes none."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +140,7 @@ class UnitRules:
     slow_channel
         Of slow channels that a limit needs; another device may deliver them, and later.
     bearings
-        By bearing; one that is not there has no limits.
+        By bearing.
     films
         Of changes of each film's stiffness, which `core.change` decides.
     clock_offset
@@ -188,7 +155,7 @@ class UnitRules:
 
     channel: AlarmRule = field(default_factory=lambda: rule_of(0.5, 10.0))
     slow_channel: AlarmRule = field(default_factory=lambda: rule_of(5.0, 10.0))
-    bearings: dict[str, BearingRules] = field(default_factory=dict)
+    bearings: Mapping[str, BearingRules] = field(default_factory=dict)
     films: AlarmRule | None = None
     clock_offset: LimitRule | None = field(
         default_factory=lambda: LimitRule(Limits(2.0), rule_of(30.0, 30.0))

@@ -1,6 +1,6 @@
 """Figures of an alarm list (ISA-18.2, clause 16): rates, standing and chattering alarms."""
 
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.arrays import TimeArray
 from core.limits import AlarmLevel
-from core.units import NS_PER_S
+from core.units import DAY_NS, NS_PER_S
 
 SHOWN_NS = 600 * NS_PER_S
 """For how long after its last activation an alarm still counts as chattering."""
@@ -63,7 +63,6 @@ class ChatterWatch:
 
 
 TEN_MINUTES_NS = 600 * NS_PER_S
-DAY_NS = 86_400 * NS_PER_S
 
 STALE_NS = DAY_NS
 """An alarm that is active for longer is stale."""
@@ -186,16 +185,15 @@ def _n_before(times: TimeArray, window_ns: int) -> npt.NDArray[np.int64]:
 
 def _chattering(events: Iterable[AlarmEvent], rule: ChatterRule) -> dict[str, int]:
     """Activations of each alarm that lie, with enough others, within one window."""
-    raised: dict[str, list[int]] = {}
+    raised: defaultdict[str, list[int]] = defaultdict(list)
     for event in events:
         if event.change in ANNOUNCED:
-            raised.setdefault(event.identity.id, []).append(event.time_ns)
-    counts: dict[str, int] = {}
+            raised[event.identity.id].append(event.time_ns)
+    counts, n = {}, rule.n_activations
     for alarm, times in raised.items():
-        last = np.flatnonzero(_n_before(np.sort(times), rule.window_ns) >= rule.n_activations)
-        if last.size:
-            counts[alarm] = np.unique(last[:, np.newaxis] - np.arange(rule.n_activations)).size
-    return counts
+        last = np.flatnonzero(_n_before(np.sort(times), rule.window_ns) >= n)
+        counts[alarm] = np.unique(last[:, np.newaxis] - np.arange(n)).size
+    return {alarm: count for alarm, count in counts.items() if count}
 
 
 def _n_fleeting(events: Iterable[AlarmEvent], rule: ChatterRule) -> int:

@@ -8,9 +8,7 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
 from core.condition.cells import CellGrid, FilmConditions
-from core.units import NS_PER_S
-
-DAY_NS = 86_400 * NS_PER_S
+from core.units import DAY_NS
 
 
 @dataclass(frozen=True, eq=False)

@@ -86,12 +86,10 @@ class StiffnessHistory:
 
     def rows(self, start: int, stop: int) -> "StiffnessHistory":
         """The readings from row `start` up to, not including, row `stop`."""
-        return StiffnessHistory(
-            **{f.name: getattr(self, f.name)[..., start:stop] for f in fields(self)}
-        )
+        return self.where(slice(start, stop))
 
-    def where(self, wanted: npt.NDArray[np.bool_]) -> "StiffnessHistory":
-        """The readings that a mask of shape (n,) picks."""
+    def where(self, wanted: npt.NDArray[np.bool_] | slice) -> "StiffnessHistory":
+        """The readings that a mask of shape (n,) or a slice picks."""
         return StiffnessHistory(
             **{f.name: getattr(self, f.name)[..., wanted] for f in fields(self)}
         )

@@ -6,13 +6,14 @@ import numpy.typing as npt
 from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.cell_table import CellTable
-from core.baseline.grouping import DAY_NS, Groups, group_readings
+from core.baseline.grouping import Groups, group_readings
 from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.baseline.scatter import time_scatter, with_scatter
 from core.baseline.settings import BaselineSettings
 from core.baseline.surface_fit import MIN_SCATTER, Fit, fit_surface, refit, surface_shape
 from core.baseline.tabulate import tabulate
 from core.condition.cells import FilmConditions
+from core.units import DAY_NS
 
 FOLDS = 5
 LONGEST_SPELL_DAYS = 10

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import QuantityBaseline
-from core.baseline.history import CodeArray, StiffnessHistory
-from core.change.decision import INITIAL_DECISION, Decision, WatchedReadings, step
+from core.baseline.history import DIRECTIONS, CodeArray, StiffnessHistory
+from core.change.decision import INITIAL_DECISION, Decision, outcomes, step
 from core.change.settings import ChangeLimits, FilmRules
 from core.condition.operating_state import (
     NOT_AT_SPEED,
@@ -125,7 +125,11 @@ class DecisionHistory:
 
 
 def decide_all(
-    readings: WatchedReadings, baseline: QuantityBaseline | None, limits: ChangeLimits
+    history: StiffnessHistory,
+    is_settled: npt.NDArray[np.bool_],
+    direction: str,
+    baseline: QuantityBaseline | None,
+    limits: ChangeLimits,
 ) -> DecisionHistory:
     """Decide over stored readings, oldest first, from the initial decision on."""
     nothing = (np.nan, np.nan, np.nan)
@@ -134,7 +138,7 @@ def decide_all(
             *(decision.verdict, decision.level or 0),
             *((f.change, f.significance, f.time_scale_h) if (f := decision.finding) else nothing),
         )
-        for decision in _decisions(readings, baseline, limits)
+        for decision in _decisions(history, is_settled, direction, baseline, limits)
     ]
     verdict, level, *finding = np.array(rows, np.float64).reshape(-1, 5).T.copy()
     return DecisionHistory(verdict.astype(np.int8), level.astype(np.int8), *finding)
@@ -152,18 +156,22 @@ def last_decision(
     ----------
     is_settled : (n,)
     """
-    readings = WatchedReadings.of(history, is_settled, baseline.direction)
-    found = deque(_decisions(readings, baseline, rules.change, rules.lapsed_ns), maxlen=1)
+    watched = (history, is_settled, baseline.direction, baseline)
+    found = deque(_decisions(*watched, rules.change, rules.lapsed_ns), maxlen=1)
     return found[0] if found else INITIAL_DECISION
 
 
 def _decisions(
-    readings: WatchedReadings,
+    history: StiffnessHistory,
+    is_settled: npt.NDArray[np.bool_],
+    direction: str,
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,
     lapsed_ns: Callable[[int], int] = int,
 ) -> Iterator[Decision]:
-    decision = INITIAL_DECISION
-    for time_ns, outcome in readings.compared(baseline):
+    decision, row = INITIAL_DECISION, DIRECTIONS.index(direction)
+    columns = (history.conditions, history.ln_k[row], history.u_random[row], history.outcome[row])
+    found = outcomes(*columns, is_settled, baseline)
+    for time_ns, outcome in zip(history.time_ns.tolist(), found, strict=True):
         decision = step(decision, lapsed_ns(time_ns), outcome, baseline, limits)
         yield decision

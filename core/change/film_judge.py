@@ -11,7 +11,7 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.history import DIRECTIONS
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
-from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, WatchedReadings, step
+from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, outcomes, step
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
@@ -200,18 +200,11 @@ class FilmJudge:
 
     def _decide(self, reading: FilmReading, direction: str) -> FilmFinding:
         film, value = (reading.bearing, direction), reading.values[DIRECTIONS.index(direction)]
-        watched = WatchedReadings(
-            np.array([reading.time_ns]),
-            np.array([reading.condition.is_settled]),
-            reading.conditions,
-            np.array([value.ln_k]),
-            np.array([value.u_random]),
-            np.array([value.outcome]),
-        )
-        learned = self._learned(*film)
-        [(time_ns, outcome)] = watched.compared(learned)
-        before, now_ns = self._decisions.get(film, INITIAL_DECISION), self._rules.lapsed_ns(time_ns)
-        decision = step(before, now_ns, outcome, learned, self._rules.change)
+        learned, before = self._learned(*film), self._decisions.get(film, INITIAL_DECISION)
+        columns = (value.ln_k, value.u_random, value.outcome, reading.condition.is_settled)
+        found = outcomes(reading.conditions, *(np.array([x]) for x in columns), learned)
+        now_ns = self._rules.lapsed_ns(reading.time_ns)
+        decision = step(before, now_ns, next(found), learned, self._rules.change)
         self._decisions[film] = decision
         finding, is_compared = decision.finding, decision.last_counted_ns == decision.last_ns
         return FilmFinding(
