@@ -138,16 +138,11 @@ class Limits:
 
 
 def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Judgement:
-    """Compare a reading with limits.
+    """Compare a reading with limits, after a judgement with the level `held`.
 
     A reading at an implausible speed may be too low: it can raise an alarm but not clear it. A
     shaft at standstill has no vibration: its alarms are suppressed and do not return, since the
     speed itself may be wrong.
-
-    Parameters
-    ----------
-    held
-        Level of the judgement before.
     """
     value = reading.value
     if value is None:
@@ -166,13 +161,7 @@ ZONES = {AlarmLevel.ALERT: "zone_c", AlarmLevel.DANGER: "zone_d"}
 
 @dataclass(frozen=True)
 class ZoneLimits(Limits):
-    """Zones as limits: C is an alert, D a danger; A and B are within limits.
-
-    Parameters
-    ----------
-    zone_b
-        Where zone B begins.
-    """
+    """Zones as limits: C is an alert, D a danger; A and B, from `zone_b` on, are within limits."""
 
     zone_b: float = 0.0
 
@@ -189,8 +178,6 @@ class DelayTimer:
 
     Parameters
     ----------
-    is_on
-        Whether the level counts.
     opposed_ns
         Known time for which the condition has contradicted `is_on` without interruption.
     last_ns
@@ -211,11 +198,8 @@ class DelayTimer:
     ) -> "DelayTimer":
         """Update with the condition of now.
 
-        Parameters
-        ----------
-        elapsed_ns
-            Known time that a contradiction stands for. By default the time since the one before;
-            a clock that was put back adds nothing.
+        A contradiction stands for the known time since the one before, unless it is given; a clock
+        that was put back adds nothing.
         """
         if wanted == self.is_on:
             return ON if wanted else INACTIVE

@@ -180,8 +180,6 @@ class Watch:
         What is judged: a channel, a reading, the place of a vector, or the subject itself.
     group
         Name of its rule, by which alarms are judged together.
-    limits
-        Limits that a value is compared with; None if it has none.
     """
 
     identity: AlarmIdentity

@@ -24,12 +24,7 @@ Range = tuple[float, float]
 class Region:
     """Operating states and ranges of the other conditions; None where any value will do.
 
-    A condition cell is a region whose ranges are the cell's bounds.
-
-    Parameters
-    ----------
-    attitude_deg
-        Within 0 to 360.
+    A condition cell is a region whose ranges are the cell's bounds. Attitudes are within 0 to 360.
     """
 
     states: States = EVERY_STATE
@@ -103,8 +98,7 @@ class LimitRule:
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
         """Worst judgement by all limits that may hold; of equal ones, by the strictest limit.
 
-        Where no limits hold, the alarm is suppressed and its condition unknown, so that it does not
-        return to normal by being suppressed.
+        Where none hold, the condition is unknown: an alarm does not return by being suppressed.
         """
         found = [judge(reading, limits, held) for limits in self.at(point)]
         if not found:
@@ -135,18 +129,14 @@ class UnitRules:
 
     Parameters
     ----------
-    channel
-        Of each waveform channel.
     slow_channel
         Of slow channels that a limit needs; another device may deliver them, and later.
     bearings
         By bearing.
     films
         Of changes of each film's stiffness, which `core.change` decides.
-    clock_offset
-        Of the device's stamps against the host, s.
-    clock_drift
-        Of the device's sampling against the host, parts per million.
+    clock_offset, clock_drift
+        Of the device's stamps against the host, s; of its sampling, parts per million.
     time_stamps
         That the device's stamps fit the sample index.
     link

@@ -18,14 +18,9 @@ SHOWN_NS = 600 * NS_PER_S
 
 @dataclass(frozen=True)
 class ChatterRule:
-    """When an alarm is chattering or fleeting.
+    """Activations within a window that make an alarm chattering.
 
-    Parameters
-    ----------
-    n_activations
-        Activations within the window that make an alarm chattering.
-    window_ns
-        Length of the window; an alarm that is active for less is fleeting.
+    An alarm that is active for less than the window is fleeting.
     """
 
     n_activations: int = 3
@@ -41,13 +36,7 @@ class ChatterWatch:
         self._chattered: dict[str, int] = {}
 
     def note(self, event: AlarmEvent, seen_ns: int) -> None:
-        """Count an event.
-
-        Parameters
-        ----------
-        seen_ns
-            Host time at which it was seen; its own time may be that of samples long past.
-        """
+        """Count an event, seen at a host time; its own time may be that of samples long past."""
         if event.change not in ANNOUNCED:
             return
         n_wanted = self._rule.n_activations
@@ -92,14 +81,10 @@ class AlarmFigures:
     ----------
     n_alarms
         Announcements: alarms that were raised, rose to danger, or came back from being hidden.
-    per_day, per_10_min
-        On average.
     most_in_10_min
         In the worst ten minutes.
     share_in_flood
         Of the ten-minute periods, those with more than `N_FLOOD`.
-    n_by_level
-        By priority.
     most_frequent
         At most `N_MOST_FREQUENT`, the most frequent first.
     chattering
@@ -129,14 +114,7 @@ def is_announced(event: AlarmEvent) -> bool:
 def figures_of(
     events: Iterable[AlarmEvent], start_ns: int, end_ns: int, rule: ChatterRule
 ) -> AlarmFigures:
-    """Figures of the events of some time.
-
-    Parameters
-    ----------
-    events
-        In the order in which they happened; events of other times are left out.
-    start_ns, end_ns
-        From the first, up to but not including the second.
+    """Figures of the events from a start up to, not including, an end; other events are left out.
 
     Raises
     ------

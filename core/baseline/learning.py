@@ -28,11 +28,9 @@ def held_out_deviations(
     table: CellTable,
     settings: BaselineSettings,
 ) -> FloatArray:
-    """Cross-validated deviations: each reading against a surface fitted without its spell of days.
+    """Deviations (n,) of each reading from a surface fitted without its spell of days.
 
-    Returns
-    -------
-    (n,) NaN where the cell has no support without the spell.
+    NaN where the cell has no support without the spell.
     """
     n_days = np.unique(groups.day).size
     spell_days = int(np.clip(n_days // (2 * FOLDS), 1, LONGEST_SPELL_DAYS))
@@ -77,14 +75,7 @@ def learn(
     origin: Origin,
     settings: BaselineSettings,
 ) -> BearingBaseline:
-    """Learn the baseline of a bearing.
-
-    Parameters
-    ----------
-    history
-        Readings of the learning period, for the most part of a healthy machine.
-    is_settled : (n,)
-        Whether the unit had settled in a steady state.
+    """Learn the baseline of a bearing from readings that are mostly of a healthy machine.
 
     Raises
     ------

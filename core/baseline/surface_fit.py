@@ -24,12 +24,7 @@ MIN_SCATTER = 1e-6
 class SlopeScatter:
     """Variance of a deviation, given the slope.
 
-    Parameters
-    ----------
-    flat
-        Variance where the squared slope is at most `flat_square`.
-    per_slope
-        Variance per squared slope beyond `flat_square`.
+    It is `flat` up to a squared slope, and rises by `per_slope` with the squared slope beyond.
     """
 
     flat: float
@@ -46,12 +41,7 @@ class SlopeScatter:
 
 
 def slope_scatter(slope: FloatArray, deviation: FloatArray) -> SlopeScatter:
-    """Fit variance to squared deviations, each weighted by its expected value.
-
-    Parameters
-    ----------
-    slope, deviation : (n,)
-    """
+    """Fit variance to squared deviations (n,), each weighted by its expected value."""
     from scipy.optimize import nnls  # slow to load, and not needed to begin
 
     flat_square = float(np.quantile(slope**2, FLAT_SHARE))

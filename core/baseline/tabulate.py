@@ -44,13 +44,7 @@ def tabulate(
     fit: Fit,
     settings: BaselineSettings,
 ) -> CellTable:
-    """Statistics and support of every cell with readings, and of those between them.
-
-    Parameters
-    ----------
-    value : (n,)
-        ln of the readings.
-    """
+    """Statistics and support of cells with readings, given in ln, and of those between."""
     contents = _seen(conditions, value, groups, fit, settings.grid)
     enough = {
         cell

@@ -27,14 +27,7 @@ from core.condition.operating_state import (
 
 @dataclass(frozen=True, eq=False)
 class OperationHistory:
-    """Operating state of every reading.
-
-    Parameters
-    ----------
-    state : (n,)
-        Members of `OperatingState`.
-    is_settled : (n,)
-    """
+    """`OperatingState` of every reading (n,), and whether it had settled."""
 
     state: CodeArray
     is_settled: npt.NDArray[np.bool_]
@@ -50,14 +43,8 @@ def operation_history(
 ) -> OperationHistory:
     """Operating states from speed and power, or those that a file gives, and their settling.
 
-    Parameters
-    ----------
-    time_ns, speed_rpm, power_mw : (n,)
-        Strictly increasing; NaN where there is no number.
-    oil_temperature_c : (n,), optional
-        Of the bearing; without it a film warms up for the longest time.
-    state : (n,), optional
-        Given members of `OperatingState`.
+    Times increase; columns are (n,) with NaN where there is no number. Without an oil temperature
+    a film warms up for the longest time.
     """
     columns = (speed_rpm, power_mw, oil_temperature_c, state)
     rows = [
@@ -101,16 +88,10 @@ def _operations(
 
 @dataclass(frozen=True, eq=False)
 class DecisionHistory:
-    """The decision after every reading.
+    """The decision after every reading, (n,) each.
 
-    Parameters
-    ----------
-    verdict : (n,)
-        Members of `Verdict`.
-    level : (n,)
-        Level that is held: 0 for none, or a member of `AlarmLevel`.
-    change, significance, time_scale_h : (n,)
-        The most significant mean deviation; NaN before there is one.
+    Members of `Verdict`; level 0 or a member of `AlarmLevel`; and the most significant mean
+    deviation, NaN before there is one.
     """
 
     verdict: CodeArray
@@ -150,12 +131,7 @@ def last_decision(
     baseline: QuantityBaseline,
     rules: FilmRules,
 ) -> Decision:
-    """Decision after stored readings, as if the baseline had been in force.
-
-    Parameters
-    ----------
-    is_settled : (n,)
-    """
+    """Decision after stored readings, as if the baseline had been in force."""
     watched = (history, is_settled, baseline.direction, baseline)
     found = deque(_decisions(*watched, rules.change, rules.lapsed_ns), maxlen=1)
     return found[0] if found else INITIAL_DECISION

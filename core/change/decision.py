@@ -54,16 +54,9 @@ def outcomes(
     is_settled: npt.NDArray[np.bool_],
     baseline: QuantityBaseline | None,
 ) -> Iterator[Outcome]:
-    """Outcome of each reading of one film in one direction.
+    """Outcome of each reading of one film in one direction, from columns (n,).
 
-    Parameters
-    ----------
-    value, u_random : (n,)
-        ln of the stiffness and its random standard uncertainty; NaN where there is no number.
-    codes : (n,)
-        Members of `ReadingOutcome`.
-    is_settled : (n,)
-        Whether the unit had settled in a steady state.
+    The value is ln of the stiffness, NaN where there is no number; codes are of `ReadingOutcome`.
     """
     unusable = np.full(value.size, -1)
     columns: tuple[FloatArray, ...] = (np.zeros(value.size),) * 4
@@ -94,11 +87,9 @@ class Decision:
     finding
         The most significant mean deviation, as of the newest reading that counted.
     deviation, deviation_std
-        Deviation of the newest reading that counted, in ln, and its standard uncertainty.
+        Of the newest reading that counted, in ln, and its standard uncertainty.
     alert, danger
         Levels with their delays.
-    last_ns, last_counted_ns
-        Newest reading, and newest that counted.
     """
 
     verdict: Verdict = Verdict.GATHERING_EVIDENCE

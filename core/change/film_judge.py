@@ -32,8 +32,6 @@ class FilmFinding:
         hours that it is averaged over.
     deviation, deviation_std
         Deviation of this reading alone; None unless it was compared.
-    baseline_version
-        Version of the baseline.
     attribution
         Cause of the change, while a level is held.
     """
@@ -81,14 +79,9 @@ class FilmDecision:
 
 @dataclass(frozen=True)
 class FilmMemory:
-    """State of `FilmWatch` that stored readings do not hold.
+    """State of `FilmWatch` that stored readings do not hold: the oil is by bearing.
 
-    Parameters
-    ----------
-    oil
-        By bearing.
-    slot
-        Number of the newest interval that had its reading.
+    The slot is the number of the newest interval that had its reading.
     """
 
     operation: Operation
@@ -111,12 +104,7 @@ MAX_RECENT = 4 * MEAN_READINGS
 
 
 class FilmJudge:
-    """Active baselines and decisions so far of one unit.
-
-    Parameters
-    ----------
-    brackets_n_per_m
-        Stiffness of the bracket of every bearing.
+    """Active baselines and decisions so far of one unit, with the brackets' stiffness by bearing.
 
     Attributes
     ----------
@@ -142,10 +130,7 @@ class FilmJudge:
     ) -> None:
         """Compare a bearing with a baseline, or with none, from its next reading on.
 
-        Parameters
-        ----------
-        decisions
-            Decisions in x and y to continue from; by default the initial ones.
+        Decisions in x and y may be given to continue from; by default they are the initial ones.
         """
         if baseline is None:
             self._baselines.pop(bearing, None)

@@ -224,8 +224,6 @@ class OilSettling:
         First reading at speed; None while the unit is not at speed.
     levels
         Times in ns and temperatures in °C over the settling time, oldest first.
-    has_settled
-        Whether the temperatures lay within the band.
     """
 
     stretch_ns: int | None = None

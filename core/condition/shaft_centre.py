@@ -27,17 +27,8 @@ def locate_shaft(
     """Locate the shaft from one or two probes on each axis, with uncertainty.
 
     An axis with one probe cannot separate the shaft's displacement from thermal growth. It takes
-    the growth that the other axis measures now, else `last_growth`, else none, with the
-    corresponding uncertainty.
-
-    Parameters
-    ----------
-    clearance_um
-        Radial clearance, above zero.
-    accuracy
-        Limits of error; by default those of :class:`GapAccuracy`.
-    last_growth
-        Growth when it was last measured.
+    the growth that the other axis measures now, else that which was measured last, else none, with
+    the corresponding uncertainty.
 
     Returns
     -------
