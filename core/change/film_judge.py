@@ -186,10 +186,11 @@ class FilmJudge:
     def _decide(self, reading: FilmReading, direction: str) -> FilmFinding:
         film, value = (reading.bearing, direction), reading.values[DIRECTIONS.index(direction)]
         learned, before = self._learned(*film), self._decisions.get(film, INITIAL_DECISION)
-        columns = (value.ln_k, value.u_random, value.outcome, reading.condition.is_settled)
-        found = outcomes(reading.conditions, *(np.array([x]) for x in columns), learned)
+        ln_k, u_random = np.array([value.ln_k]), np.array([value.u_random])
+        code, is_settled = np.array([value.outcome]), np.array([reading.condition.is_settled])
+        [outcome] = outcomes(reading.conditions, ln_k, u_random, code, is_settled, learned)
         now_ns = self._rules.lapsed_ns(reading.time_ns)
-        decision = step(before, now_ns, next(found), learned, self._rules.change)
+        decision = step(before, now_ns, outcome, learned, self._rules.change)
         self._decisions[film] = decision
         finding, is_compared = decision.finding, decision.last_counted_ns == decision.last_ns
         return FilmFinding(

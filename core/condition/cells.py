@@ -30,11 +30,7 @@ class FilmConditions:
 
     def rows(self, wanted: npt.NDArray[np.bool_ | np.int64]) -> "FilmConditions":
         """Some of the readings, by mask or row."""
-        return FilmConditions(
-            self.eccentricity_ratio[wanted],
-            self.oil_temperature_c[wanted],
-            self.attitude_deg[wanted],
-        )
+        return FilmConditions(*(column[wanted] for column in vars(self).values()))
 
     def is_known(self, needs_attitude: bool) -> npt.NDArray[np.bool_]:
         """(n,) whether eccentricity, oil temperature and, if needed, attitude are numbers."""
