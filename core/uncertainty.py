@@ -109,11 +109,6 @@ class Budget:
         interval = self.bounded_interval or (self.value - half, self.value + half)
         return Reading(self.value, quality, random, systematic, interval)
 
-    @property
-    def random_interval(self) -> tuple[float, float]:
-        """The same if transducers and bracket were known exactly."""
-        return _interval(self.value, [line for line in self.lines if line.kind is Kind.RANDOM])
-
 
 def random_line(name: str, standard: float, freedoms: float = math.inf) -> BudgetLine:
     """Contribution of spectral statistics, in the unit of the result."""
