@@ -49,14 +49,22 @@ from core.uncertainty import Budget, Budgeted, Found, with_budgets
 
 @dataclass(frozen=True)
 class BearingReadings:
-    """What some segments show of a bearing, as the same fields of `Assessment`.
+    """What some segments show of a bearing.
 
     Parameters
     ----------
+    readings
+        One for each quantity of the catalogue.
+    budgets
+        Of the readings whose uncertainty is known, by quantity.
+    estimators
+        Where `stiffness` came from, by axes "xx" and "yy".
     spectrum
         At the bins; empty of polls.
-    n_segments, coverage
-        Segments in which all four channels were usable; their share of those that could be.
+    n_segments
+        Segments in which all four channels were usable.
+    coverage
+        Their share of those that there could have been.
     """
 
     readings: Mapping[str, Reading]

@@ -48,6 +48,8 @@ class MonitorState:
         First sample of what it counts as possible in this epoch.
     n_voided
         Segments that gaps have voided.
+    growth
+        By bearing.
     """
 
     epoch: int | None
@@ -159,13 +161,21 @@ class UnitMonitor:
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
         """Take a block in and hand over the assessments that it completes, one bearing at a time.
 
-        Blocks come in index order; what is repeated is dropped. Each hop that is complete gives one
-        assessment for each bearing; all must be taken before the next block.
+        Parameters
+        ----------
+        block
+            Must follow its predecessors in index order; what is repeated is dropped.
+
+        Yields
+        ------
+        One assessment for each bearing and each hop that the block completes; mostly none. They
+        must all be taken before the next block.
 
         Raises
         ------
         BlockMisfitError
-            As `require` does.
+            If the block is not of this unit, or has another rate or number of channels; the
+            message gives both.
         """
         self.require(block)
         for piece in _pieces(block, self._transform.segment_samples):
