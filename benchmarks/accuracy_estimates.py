@@ -15,7 +15,7 @@ from core.stiffness.dynamic_readings import dynamic_budgets
 from core.stiffness.estimators import DYNAMIC_COEFFICIENTS
 from core.stiffness.evidence import line_excitation
 from core.stiffness.stiffness_budget import ratio_budget, transfer_budgets
-from core.uncertainty import Budget
+from core.uncertainty import Budget, Kind
 
 LINES = {"1×": ORDER1, "vortex": VORTEX}
 AXES = {"xx": (SHAFT_X, BEARING_X), "yy": (SHAFT_Y, BEARING_Y)}
@@ -131,7 +131,8 @@ def _compared(
     if budget is None:
         return Estimate(name, math.nan)
     low, high = budget.interval
-    low_random, high_random = budget.random_interval
+    random = tuple(line for line in budget.lines if line.kind is Kind.RANDOM)
+    low_random, high_random = Budget(budget.value, random).interval
     return Estimate(
         name=name,
         error=(budget.value - true) / scale,

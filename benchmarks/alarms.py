@@ -15,7 +15,7 @@ import numpy as np
 
 from acquisition.clock import SystemClock
 from acquisition.delivery.blocks import sample_block
-from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
 from core.quality import Reading
@@ -37,10 +37,10 @@ def main() -> None:
     plant = load_plant_file(DEMO)
     unit = plant.unit[0]
     machine = machine_of(unit)
-    limits = BearingRules(
-        shaft_order1=LimitRule(Limits(300.0, 400.0, 5.0), rule_of(10.0, 30.0)),
-        oil_temperature=LimitRule(Limits(80.0, 90.0, 1.0), rule_of(10.0, 30.0)),
-    )
+    limits = {
+        "shaft_order1": LimitRule(Limits(300.0, 400.0, 5.0), rule_of(10.0, 30.0)),
+        "oil_temperature": LimitRule(Limits(80.0, 90.0, 1.0), rule_of(10.0, 30.0)),
+    }
     rules = UnitRules(bearings={bearing.id: limits for bearing in machine.bearings})
     feed = simulated_feed(unit, SystemClock())
     first = sample_block([feed.advance(50)], calibration_of(unit))

@@ -19,7 +19,7 @@ from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import DecisionHistory, decide_all, operation_history
 from core.change.cause import Attribution, UnitReadings, attribute
-from core.change.decision import JUDGED, WatchedReadings
+from core.change.decision import JUDGED
 from core.change.settings import ChangeLimits
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
@@ -75,8 +75,7 @@ class LearnedUnit:
 
     def decide(self, later: Later, bearing: str, direction: str) -> DecisionHistory:
         found = self.stiffness(bearing, direction)
-        readings = WatchedReadings.of(later.histories[bearing], later.is_settled, direction)
-        return decide_all(readings, found, LIMITS)
+        return decide_all(later.histories[bearing], later.is_settled, direction, found, LIMITS)
 
     def stiffness(self, bearing: str, direction: str) -> QuantityBaseline:
         found = self.baselines[bearing].of(direction)

@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
-from typing import Self
 
 from core.condition.cells import OperatingPoint
 from core.quality import Reading, Reason
@@ -69,17 +68,11 @@ class Limits:
     Parameters
     ----------
     alert, danger
-        Upper limits; None if there is no such level.
+        Upper limits, above zero and rising; None if there is no such level. One limit is given.
     deadband
         How far inside a limit a value must be for its level to end.
     alert_below, danger_below
         Lower limits.
-
-    Raises
-    ------
-    ValueError
-        If there is no limit, a limit is not a number above zero, danger does not lie outside alert,
-        or the deadband is negative or so wide that no value would end a level.
     """
 
     alert: float | None = None
@@ -87,27 +80,6 @@ class Limits:
     deadband: float = 0.0
     alert_below: float | None = None
     danger_below: float | None = None
-
-    def __post_init__(self) -> None:
-        rising = [self.danger_below, self.alert_below, self.alert, self.danger]
-        given = [limit for limit in rising if limit is not None]
-        if not given:
-            raise ValueError("limits without any limit: give alert, danger or both")
-        for limit in given:
-            if not (math.isfinite(limit) and limit > 0.0):
-                raise ValueError(f"limit {limit:g} must be a number above 0")
-        self._check_order("alert", self.alert, "danger", self.danger)
-        self._check_order("danger_below", self.danger_below, "alert_below", self.alert_below)
-        self._check_order("lower limit", self._highest_low, "upper limit", self._lowest_high)
-        if not 0.0 <= self.deadband < self._room:
-            raise ValueError(
-                f"deadband {self.deadband:g} must be 0 or more, and below {self._room:g}"
-            )
-
-    @staticmethod
-    def _check_order(lower: str, low: float | None, upper: str, high: float | None) -> None:
-        if low is not None and high is not None and not low < high:
-            raise ValueError(f"{lower} {low:g} must be below {upper} {high:g}")
 
     @cached_property
     def _lowest_high(self) -> float | None:
@@ -117,15 +89,6 @@ class Limits:
     def _highest_low(self) -> float | None:
         low = (x for x in (self.alert_below, self.danger_below) if x is not None)
         return max(low, default=None)
-
-    @cached_property
-    def _room(self) -> float:
-        """What the deadband must be below: inside it there must be values that are within."""
-        if self._lowest_high is None:
-            return math.inf
-        if self._highest_low is None:
-            return self._lowest_high
-        return (self._lowest_high - self._highest_low) / 2.0
 
     def is_within(self, value: float) -> bool:
         """Whether a value passes no limit."""
@@ -175,16 +138,11 @@ class Limits:
 
 
 def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Judgement:
-    """Compare a reading with limits.
+    """Compare a reading with limits, after a judgement with the level `held`.
 
     A reading at an implausible speed may be too low: it can raise an alarm but not clear it. A
     shaft at standstill has no vibration: its alarms are suppressed and do not return, since the
     speed itself may be wrong.
-
-    Parameters
-    ----------
-    held
-        Level of the judgement before.
     """
     value = reading.value
     if value is None:
@@ -203,28 +161,9 @@ ZONES = {AlarmLevel.ALERT: "zone_c", AlarmLevel.DANGER: "zone_d"}
 
 @dataclass(frozen=True)
 class ZoneLimits(Limits):
-    """Zones as limits: C is an alert, D a danger; A and B are within limits.
-
-    Parameters
-    ----------
-    zone_b
-        Where zone B begins.
-    """
+    """Zones as limits: C is an alert, D a danger; A and B, from `zone_b` on, are within limits."""
 
     zone_b: float = 0.0
-
-    @classmethod
-    def between(cls, a_b: float, b_c: float, c_d: float, deadband: float = 0.0) -> Self:
-        """Zones by their boundaries.
-
-        Raises
-        ------
-        ValueError
-            If they do not rise from above zero, or the deadband is not below the boundary B/C.
-        """
-        if not 0.0 < a_b < b_c:
-            raise ValueError(f"boundary A/B {a_b:g} must be above 0 and below B/C {b_c:g}")
-        return cls(b_c, c_d, deadband, zone_b=a_b)
 
     def reason(self, level: AlarmLevel | None, value: float) -> str:
         """The zone."""
@@ -239,8 +178,6 @@ class DelayTimer:
 
     Parameters
     ----------
-    is_on
-        Whether the level counts.
     opposed_ns
         Known time for which the condition has contradicted `is_on` without interruption.
     last_ns
@@ -261,11 +198,8 @@ class DelayTimer:
     ) -> "DelayTimer":
         """Update with the condition of now.
 
-        Parameters
-        ----------
-        elapsed_ns
-            Known time that a contradiction stands for. By default the time since the one before;
-            a clock that was put back adds nothing.
+        A contradiction stands for the known time since the one before, unless it is given; a clock
+        that was put back adds nothing.
         """
         if wanted == self.is_on:
             return ON if wanted else INACTIVE

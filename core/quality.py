@@ -114,10 +114,7 @@ NOT_MEASURED = missing(Reason.NOT_MEASURED)
 def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = None) -> Reading:
     """Mean of the usable readings, or the newest unusable one if they are less than half.
 
-    Parameters
-    ----------
-    weights
-        Weight of each reading, such as its number of samples; equal if not given.
+    Weights, such as numbers of samples, are equal if not given.
     """
     weights = [1.0] * len(readings) if weights is None else weights
     counted = [
@@ -137,12 +134,8 @@ def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = 
 def current_mean(readings: Sequence[Reading], *, is_grazed: bool = False) -> Reading:
     """Mean of the usable readings, or the newest reading if that one is unusable.
 
-    For readings of minutes that are shown as the present: a channel that has just failed has none.
-
-    Parameters
-    ----------
-    is_grazed
-        Whether the newest reading is missing only for a few clipped samples: the mean stands.
+    For readings of minutes that are shown as the present: a channel that has just failed has none,
+    unless its newest reading is missing only for a few clipped samples (`is_grazed`).
     """
     newest = readings[-1]
     usable = [reading for reading in readings if reading.value is not None]

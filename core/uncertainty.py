@@ -109,11 +109,6 @@ class Budget:
         interval = self.bounded_interval or (self.value - half, self.value + half)
         return Reading(self.value, quality, random, systematic, interval)
 
-    @property
-    def random_interval(self) -> tuple[float, float]:
-        """The same if transducers and bracket were known exactly."""
-        return _interval(self.value, [line for line in self.lines if line.kind is Kind.RANDOM])
-
 
 def random_line(name: str, standard: float, freedoms: float = math.inf) -> BudgetLine:
     """Contribution of spectral statistics, in the unit of the result."""
@@ -191,18 +186,7 @@ def mean_budget(
     systematic: tuple[BudgetLine, ...] = (),
     sensitivity: float = 1.0,
 ) -> Budget | None:
-    """Uncertainty of a mean, or of what is calculated from one.
-
-    Parameters
-    ----------
-    value
-        The result.
-    values : (n,)
-        What the mean is of, oldest first.
-    systematic
-        What stays from one averaging time to the next.
-    sensitivity
-        Change of the result per change of the mean.
+    """Uncertainty of a mean of values (n,), oldest first, or of what is calculated from one.
 
     Returns
     -------
@@ -230,13 +214,7 @@ Found = tuple[dict[str, Reading], dict[str, Budget]]
 
 
 def with_budgets(found: Mapping[str, Budgeted], prefix: str = "") -> Found:
-    """State the uncertainty of readings that have a number and a budget.
-
-    Parameters
-    ----------
-    prefix
-        Put before the name of each.
-    """
+    """State the uncertainty of readings that have a number and a budget, by prefixed name."""
     readings: dict[str, Reading] = {}
     budgets: dict[str, Budget] = {}
     for name, (reading, budget) in found.items():

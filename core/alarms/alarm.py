@@ -189,14 +189,10 @@ class AlarmEvent:
         Level after the event, or before it if the alarm has returned or was reset.
     time_ns
         Time of the samples that decided; host time of an action or of the link.
-    occurrence
-        Occurrence of the alarm that it belongs to.
     actor
         Person who acted; empty if none did.
     reason
         Why, in a word or in the words of the actor.
-    raised_at
-        Operating condition when that occurrence was raised, if known.
     """
 
     identity: AlarmIdentity

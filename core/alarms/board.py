@@ -14,20 +14,16 @@ from core.quality import Reason
 
 @dataclass(frozen=True)
 class AlarmMemory:
-    """State of the alarms of a unit, from which another process continues.
+    """State of the alarms of a unit, with their delays, from which another process continues.
 
     Parameters
     ----------
-    alarms
-        With their delays.
     segment_faults
         Faults of channels that only segments show, by channel.
     points
         Newest operating condition of each bearing with its time, by bearing.
     stop
         Epoch and index up to which blocks were judged.
-    is_connected, link_reason
-        State of the link.
     """
 
     alarms: tuple[Alarm, ...]
@@ -47,13 +43,7 @@ RESTARTED, NO_LONGER_WATCHED = "restarted", "no_longer_watched"
 
 
 class AlarmBoard:
-    """Owns some alarms and their rules. News is in the order in which things happened.
-
-    Parameters
-    ----------
-    watched
-        The alarms, each inactive at first.
-    """
+    """Owns some alarms, inactive at first, and their rules. News is in the order of events."""
 
     def __init__(self, watched: Iterable[Watch] = ()) -> None:
         watches = list(watched)
@@ -108,7 +98,7 @@ class AlarmBoard:
         KeyError
             If there is no such alarm.
         ActionRefusedError
-            If the action does not fit the state of the alarm.
+            As `operate` does.
         """
         self._note(id_, *operate(self._alarms[id_], action, host_ns))
         return self.drain_news()

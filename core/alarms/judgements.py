@@ -28,14 +28,10 @@ def fault_judgement(fault: str | None) -> Judgement:
 def channel_judgement(
     quality: Quality, segment_fault: Reason | None, clipped_percent: float | None = None
 ) -> Judgement:
-    """Whether a waveform channel is OK.
+    """Whether a waveform channel is OK, by its newest samples and its newest segment.
 
     Parameters
     ----------
-    quality
-        Of its newest samples.
-    segment_fault
-        Fault that the newest segment has shown, if any.
     clipped_percent
         Share of clipped samples of that segment, %.
     """
@@ -53,8 +49,6 @@ def fault_after_segment(
 
     Parameters
     ----------
-    fault
-        Fault before.
     amplitude
         1× amplitude of the channel.
     has_wrong_sign
@@ -93,12 +87,7 @@ AMPLITUDE_ONLY = {"ok": "amplitude_change_only", "above_limit": "amplitude_chang
 
 @dataclass(frozen=True)
 class OrderVector:
-    """A 1× vector.
-
-    Parameters
-    ----------
-    phase_deg
-        Where it leads the key-phase; None where it is not known.
+    """A 1× vector; its phase, by which it leads the key-phase, is None where it is not known.
 
     Raises
     ------
@@ -155,14 +144,7 @@ def vector_judgement(
     A crack, a loose part or a rub can turn the vector and leave its length as it was, so that the
     length of the complex difference is judged. Without a phase only the difference of the lengths
     is known, which is never more than that: it may raise an alarm, but does not clear one where the
-    reference has a phase.
-
-    Parameters
-    ----------
-    watch
-        Its source is the place: "shaft_x", "shaft_y", "bearing_x" or "bearing_y".
-    held
-        Level of the judgement before.
+    reference has a phase. The source of the watch is the place, such as "shaft_x".
     """
     place = watch.source
     amplitude = readings[f"order1_{place}_um_pk"]

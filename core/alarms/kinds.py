@@ -15,6 +15,9 @@ from core.quality import Reading
 CHANNEL_NOT_OK, LINK_LOST = "channel_not_ok", "link_lost"
 """Kinds that are known by name beyond this table."""
 
+OIL_TEMPERATURE, TIME_STAMPS = "oil_temperature", "time_stamps"
+"""Names of a kind and of its rule alike."""
+
 CHANNEL, BEARING, DEVICE, LINK = "channel", "bearing", "device", "link"
 """Subjects of alarms: a channel or bearing, named by its id; the device or the link of a unit."""
 
@@ -34,7 +37,7 @@ class AlarmKind:
     subject
         `CHANNEL` or `BEARING` if the alarm is about one of them, else the subject itself.
     rule
-        Field of `BearingRules` or `UnitRules` that holds its rule.
+        Its rule: a key of `BearingRules`, or a field of `UnitRules`.
     reading
         Reading of an assessment that is compared with limits; for a 1× vector, its place.
     needs
@@ -58,82 +61,67 @@ def kind_table(*kinds: AlarmKind) -> Mapping[str, AlarmKind]:
     return MappingProxyType({kind.name: kind for kind in kinds})
 
 
-def _on_bearing(
-    rule: str, unit: str, *kinds: tuple[str, str] | tuple[str, str, str] | tuple[str, str, str, str]
-) -> Iterable[AlarmKind]:
-    """Kinds of one rule, by name, label, reading and what a bearing must have for it."""
-    return (AlarmKind(name, label, unit, BEARING, rule, *rest) for name, label, *rest in kinds)
+def _pair(rule: str, unit: str, *texts: str) -> Iterable[AlarmKind]:
+    """Kinds in x and in y; braces in name, label, reading and need stand for the axis."""
+    for axis in "xy":
+        name, label, *rest = (text.format(axis) for text in texts)
+        yield AlarmKind(name, label, unit, BEARING, rule, *rest)
 
+
+UM_PK, UM_PP, MM_S_RMS = "µm 0-pk", "µm pk-pk", "mm/s rms"
+SPAN, VELOCITY = "overall_shaft_{}_um_pp", "overall_bearing_{}_mm_s_rms"
 
 ALARM_KINDS = kind_table(
     AlarmKind(CHANNEL_NOT_OK, "Channel not OK", "%", CHANNEL, "channel"),
-    *_on_bearing(
-        "shaft_order1",
-        "µm 0-pk",
-        ("order1_shaft_x", "Shaft vibration 1×, x", "order1_shaft_x_um_pk"),
-        ("order1_shaft_y", "Shaft vibration 1×, y", "order1_shaft_y_um_pk"),
+    *_pair(
+        "shaft_order1", UM_PK, "order1_shaft_{}", "Shaft vibration 1×, {}", "order1_shaft_{}_um_pk"
     ),
-    *_on_bearing(
-        "shaft_overall",
-        "µm pk-pk",
-        ("overall_shaft_x", "Shaft vibration, broad-band, x", "overall_shaft_x_um_pp"),
-        ("overall_shaft_y", "Shaft vibration, broad-band, y", "overall_shaft_y_um_pp"),
+    *_pair("shaft_overall", UM_PP, "overall_shaft_{}", "Shaft vibration, broad-band, {}", SPAN),
+    *_pair("bearing_overall", MM_S_RMS, "overall_bearing_{}", "Bearing velocity, {}", VELOCITY),
+    AlarmKind(
+        "eccentricity_ratio", "Eccentricity", "1", BEARING, "eccentricity", "eccentricity_ratio"
     ),
-    *_on_bearing(
-        "bearing_overall",
-        "mm/s rms",
-        ("overall_bearing_x", "Bearing velocity, x", "overall_bearing_x_mm_s_rms"),
-        ("overall_bearing_y", "Bearing velocity, y", "overall_bearing_y_mm_s_rms"),
-    ),
-    *_on_bearing("eccentricity", "1", ("eccentricity_ratio", "Eccentricity", "eccentricity_ratio")),
-    *_on_bearing(
+    *_pair("gap", "µm", "gap_{}", "Probe gap {}", "gap_{}_um"),
+    *_pair(
         "gap",
         "µm",
-        ("gap_x", "Probe gap x", "gap_x_um"),
-        ("gap_y", "Probe gap y", "gap_y_um"),
-        ("opposite_gap_x", "Gap of the probe opposite x", "opposite_gap_x_um", "opposite_x"),
-        ("opposite_gap_y", "Gap of the probe opposite y", "opposite_gap_y_um", "opposite_y"),
+        "opposite_gap_{}",
+        "Gap of the probe opposite {}",
+        "opposite_gap_{}_um",
+        "opposite_{}",
     ),
-    *_on_bearing(
-        "shaft_zones",
-        "µm pk-pk",
-        ("zone_shaft_x", "Vibration zone of the shaft, x", "overall_shaft_x_um_pp"),
-        ("zone_shaft_y", "Vibration zone of the shaft, y", "overall_shaft_y_um_pp"),
-    ),
-    *_on_bearing(
+    *_pair("shaft_zones", UM_PP, "zone_shaft_{}", "Vibration zone of the shaft, {}", SPAN),
+    AlarmKind(
+        "zone_shaft",
+        "Vibration zone of the shaft",
+        UM_PK,
+        BEARING,
         "orbit_zones",
-        "µm 0-pk",
-        ("zone_shaft", "Vibration zone of the shaft", "overall_shaft_um_pk"),
+        "overall_shaft_um_pk",
     ),
-    *_on_bearing(
-        "bearing_zones",
-        "mm/s rms",
-        ("zone_bearing_x", "Vibration zone of the bearing, x", "overall_bearing_x_mm_s_rms"),
-        ("zone_bearing_y", "Vibration zone of the bearing, y", "overall_bearing_y_mm_s_rms"),
+    *_pair(
+        "bearing_zones", MM_S_RMS, "zone_bearing_{}", "Vibration zone of the bearing, {}", VELOCITY
     ),
-    *_on_bearing(
-        "shaft_change",
-        "µm 0-pk",
-        ("order1_change_shaft_x", "Shaft 1× vector moved, x", "shaft_x"),
-        ("order1_change_shaft_y", "Shaft 1× vector moved, y", "shaft_y"),
+    *_pair(
+        "shaft_change", UM_PK, "order1_change_shaft_{}", "Shaft 1× vector moved, {}", "shaft_{}"
     ),
-    *_on_bearing(
+    *_pair(
         "bearing_change",
-        "µm 0-pk",
-        ("order1_change_bearing_x", "Bearing 1× vector moved, x", "bearing_x"),
-        ("order1_change_bearing_y", "Bearing 1× vector moved, y", "bearing_y"),
+        UM_PK,
+        "order1_change_bearing_{}",
+        "Bearing 1× vector moved, {}",
+        "bearing_{}",
     ),
-    *_on_bearing(
-        "oil_temperature",
+    AlarmKind(
+        OIL_TEMPERATURE,
+        "Oil temperature",
         "°C",
-        ("oil_temperature", "Oil temperature", "oil_temperature_c", "oil_temperature"),
+        BEARING,
+        OIL_TEMPERATURE,
+        "oil_temperature_c",
+        OIL_TEMPERATURE,
     ),
-    *_on_bearing(
-        "films",
-        "1",
-        ("stiffness_x", "Film stiffness changed, x"),
-        ("stiffness_y", "Film stiffness changed, y"),
-    ),
+    *_pair("films", "1", "stiffness_{}", "Film stiffness changed, {}"),
     AlarmKind(
         "clock_offset",
         "Device clock off",
@@ -151,11 +139,11 @@ ALARM_KINDS = kind_table(
         advice="Compare the sampling rate in the plant file with the device’s own.",
     ),
     AlarmKind(
-        "time_stamps",
+        TIME_STAMPS,
         "Wrong time stamps",
         None,
         DEVICE,
-        "time_stamps",
+        TIME_STAMPS,
         advice="Look at the clock of the device: its time jumps, repeats or runs backwards.",
     ),
     AlarmKind(
@@ -181,8 +169,6 @@ VECTORS = ("shaft_change", "bearing_change")
 WAVEFORM_CHANNEL, SLOW_CHANNEL = "channel", "slow_channel"
 """Rules of the kind "channel_not_ok", by what the channel delivers."""
 
-OIL_TEMPERATURE, TIME_STAMPS = "oil_temperature", "time_stamps"
-
 
 @dataclass(frozen=True)
 class Watch:
@@ -194,8 +180,6 @@ class Watch:
         What is judged: a channel, a reading, the place of a vector, or the subject itself.
     group
         Name of its rule, by which alarms are judged together.
-    limits
-        Limits that a value is compared with; None if it has none.
     """
 
     identity: AlarmIdentity
@@ -229,26 +213,26 @@ def watches_of(unit: Unit, rules: UnitRules) -> list[Watch]:
     """The alarms that rules make of a unit, each of them once."""
     watches: list[Watch] = []
 
-    def add(kind: AlarmKind, subject: str, source: str, group: str, owner: object) -> None:
-        rule: AlarmRule | LimitRule | None = getattr(owner, group)
+    def add(kind: AlarmKind, subject: str, source: str, group: str, own: BearingRules) -> None:
+        rule: AlarmRule | LimitRule | None = own.get(group, getattr(rules, group, None))
         if rule is not None:
             watches.append(watch(AlarmIdentity(unit.id, subject, kind.name), rule, source, group))
 
     not_ok = ALARM_KINDS[CHANNEL_NOT_OK]
+    of_bearings = [(each, rules.bearings.get(each.id, {})) for each in unit.bearings]
     for channel in unit.channels:
-        add(not_ok, channel.id, channel.id, not_ok.rule, rules)
-    of_bearings = [(each, rules.bearings.get(each.id, BearingRules())) for each in unit.bearings]
-    for source in dict.fromkeys(b.oil_temperature for b, own in of_bearings if own.oil_temperature):
-        if source is not None:
-            add(not_ok, source, source, SLOW_CHANNEL, rules)
+        add(not_ok, channel.id, channel.id, not_ok.rule, {})
+    oils = (b.oil_temperature for b, own in of_bearings if own.get(OIL_TEMPERATURE))
+    for source in dict.fromkeys(filter(None, oils)):
+        add(not_ok, source, source, SLOW_CHANNEL, {})
     for bearing, own in of_bearings:
         slow = {OIL_TEMPERATURE: bearing.oil_temperature}
         for kind in ALARM_KINDS.values():
             is_there = kind.needs is None or getattr(bearing, kind.needs) is not None
             if kind.subject == BEARING and is_there:
                 source = slow.get(kind.rule) or kind.reading or bearing.id
-                add(kind, bearing.id, source, kind.rule, own if hasattr(own, kind.rule) else rules)
+                add(kind, bearing.id, source, kind.rule, own)
     for kind in ALARM_KINDS.values():
         if kind.subject in (DEVICE, LINK):
-            add(kind, kind.subject, kind.subject, kind.rule, rules)
+            add(kind, kind.subject, kind.subject, kind.rule, {})
     return watches

@@ -77,12 +77,7 @@ Action: TypeAlias = (
 
 
 def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """Apply an action of a person; one that changes nothing has no event.
-
-    Parameters
-    ----------
-    now_ns
-        Host time.
+    """Apply an action of a person at a host time; one that changes nothing has no event.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """Rules of alarms: limits by operating condition, delays, and what is watched on a unit."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
+from typing import TypeAlias
 
 from core.alarms.alarm import AlarmRule
 from core.condition.cells import OperatingPoint
@@ -24,30 +24,13 @@ Range = tuple[float, float]
 class Region:
     """Operating states and ranges of the other conditions; None where any value will do.
 
-    A condition cell is a region whose ranges are the cell's bounds.
-
-    Parameters
-    ----------
-    attitude_deg
-        Within 0 to 360.
-
-    Raises
-    ------
-    ValueError
-        If there is no state, or a range ends where it begins or before.
+    A condition cell is a region whose ranges are the cell's bounds. Attitudes are within 0 to 360.
     """
 
     states: States = EVERY_STATE
     eccentricity_ratio: Range | None = None
     oil_temperature_c: Range | None = None
     attitude_deg: Range | None = None
-
-    def __post_init__(self) -> None:
-        if not self.states:
-            raise ValueError("limits that count in no operating state")
-        for low, high in filter(None, self.ranges):
-            if low >= high:
-                raise ValueError(f"a range from {low:g} to {high:g} must rise")
 
     def holds(self, point: OperatingPoint) -> bool | None:
         """Whether a point lies in it; None where that is not known."""
@@ -92,26 +75,13 @@ class LimitRule:
     states
         Operating states in which `limits` count.
     tables
-        Regions of the condition in which other limits hold instead.
-
-    Raises
-    ------
-    ValueError
-        If there are no limits at all, no states, or two tables overlap.
+        Regions of the condition in which other limits hold instead; no two overlap.
     """
 
     limits: Limits | None
     rule: AlarmRule
     states: States = EVERY_STATE
     tables: tuple[tuple[Region, Limits], ...] = ()
-
-    def __post_init__(self) -> None:
-        if not (self.states and (self.tables or self.limits)):
-            raise ValueError("no limits for any operating state")
-        for (one, _), (other, _) in combinations(self.tables, 2):
-            if one.overlaps(other):
-                states = ", ".join(s.name.lower() for s in sorted(one.states & other.states))
-                raise ValueError(f"two limits for the operating state {states}")
 
     def at(self, point: OperatingPoint) -> Sequence[Limits]:
         """The limits that hold at a point, or may hold; empty where none do."""
@@ -128,8 +98,7 @@ class LimitRule:
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
         """Worst judgement by all limits that may hold; of equal ones, by the strictest limit.
 
-        Where no limits hold, the alarm is suppressed and its condition unknown, so that it does not
-        return to normal by being suppressed.
+        Where none hold, the condition is unknown: an alarm does not return by being suppressed.
         """
         found = [judge(reading, limits, held) for limits in self.at(point)]
         if not found:
@@ -150,42 +119,8 @@ def point_of(assessment: Assessment) -> OperatingPoint:
     return OperatingPoint(state, *(readings.get(name, NOT_MEASURED).value for name in names))
 
 
-@dataclass(frozen=True)
-class BearingRules:
-    """Rules of one bearing; None where nothing is watched.
-
-    Parameters
-    ----------
-    shaft_order1
-        Relative shaft vibration at 1× in each direction, µm zero-to-peak.
-    oil_temperature
-        °C.
-    shaft_overall
-        Relative shaft vibration in each direction, broad-band, µm peak-to-peak.
-    bearing_overall
-        Absolute bearing vibration in each direction, broad-band, mm/s rms.
-    eccentricity
-        Distance of the shaft's centre from that of the bearing, as a share of the clearance.
-    gap
-        Mean of each probe's gap, µm.
-    shaft_change, bearing_change
-        How far the 1× vector has moved from its reference, µm zero-to-peak.
-    shaft_zones, orbit_zones, bearing_zones
-        Zones of the broad-band peak-to-peak values, of the farthest excursion, and of the bearing
-        velocity.
-    """
-
-    shaft_order1: LimitRule | None = None
-    oil_temperature: LimitRule | None = None
-    shaft_overall: LimitRule | None = None
-    bearing_overall: LimitRule | None = None
-    eccentricity: LimitRule | None = None
-    gap: LimitRule | None = None
-    shaft_change: LimitRule | None = None
-    bearing_change: LimitRule | None = None
-    shaft_zones: LimitRule | None = None
-    orbit_zones: LimitRule | None = None
-    bearing_zones: LimitRule | None = None
+BearingRules: TypeAlias = Mapping[str, LimitRule | None]
+"""Limits of one bearing, by the `rule` of the kinds of alarms that they make; None makes none."""
 
 
 @dataclass(frozen=True)
@@ -194,18 +129,14 @@ class UnitRules:
 
     Parameters
     ----------
-    channel
-        Of each waveform channel.
     slow_channel
         Of slow channels that a limit needs; another device may deliver them, and later.
     bearings
-        By bearing; one that is not there has no limits.
+        By bearing.
     films
         Of changes of each film's stiffness, which `core.change` decides.
-    clock_offset
-        Of the device's stamps against the host, s.
-    clock_drift
-        Of the device's sampling against the host, parts per million.
+    clock_offset, clock_drift
+        Of the device's stamps against the host, s; of its sampling, parts per million.
     time_stamps
         That the device's stamps fit the sample index.
     link
@@ -214,7 +145,7 @@ class UnitRules:
 
     channel: AlarmRule = field(default_factory=lambda: rule_of(0.5, 10.0))
     slow_channel: AlarmRule = field(default_factory=lambda: rule_of(5.0, 10.0))
-    bearings: dict[str, BearingRules] = field(default_factory=dict)
+    bearings: Mapping[str, BearingRules] = field(default_factory=dict)
     films: AlarmRule | None = None
     clock_offset: LimitRule | None = field(
         default_factory=lambda: LimitRule(Limits(2.0), rule_of(30.0, 30.0))

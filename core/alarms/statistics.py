@@ -1,6 +1,6 @@
 """Figures of an alarm list (ISA-18.2, clause 16): rates, standing and chattering alarms."""
 
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 from core.alarms.alarm import ANNOUNCED, Alarm, AlarmChange, AlarmEvent, AlarmState
 from core.arrays import TimeArray
 from core.limits import AlarmLevel
-from core.units import NS_PER_S
+from core.units import DAY_NS, NS_PER_S
 
 SHOWN_NS = 600 * NS_PER_S
 """For how long after its last activation an alarm still counts as chattering."""
@@ -18,29 +18,13 @@ SHOWN_NS = 600 * NS_PER_S
 
 @dataclass(frozen=True)
 class ChatterRule:
-    """When an alarm is chattering or fleeting.
+    """Activations within a window that make an alarm chattering.
 
-    Parameters
-    ----------
-    n_activations
-        Activations within the window that make an alarm chattering.
-    window_ns
-        Length of the window; an alarm that is active for less is fleeting.
-
-    Raises
-    ------
-    ValueError
-        If fewer than two activations are asked for, or the window is empty.
+    An alarm that is active for less than the window is fleeting.
     """
 
     n_activations: int = 3
     window_ns: int = 60 * NS_PER_S
-
-    def __post_init__(self) -> None:
-        if self.n_activations < 2:
-            raise ValueError(f"n_activations {self.n_activations} must be 2 or more")
-        if self.window_ns <= 0:
-            raise ValueError(f"window_ns {self.window_ns} must be above 0")
 
 
 class ChatterWatch:
@@ -52,13 +36,7 @@ class ChatterWatch:
         self._chattered: dict[str, int] = {}
 
     def note(self, event: AlarmEvent, seen_ns: int) -> None:
-        """Count an event.
-
-        Parameters
-        ----------
-        seen_ns
-            Host time at which it was seen; its own time may be that of samples long past.
-        """
+        """Count an event, seen at a host time; its own time may be that of samples long past."""
         if event.change not in ANNOUNCED:
             return
         n_wanted = self._rule.n_activations
@@ -74,7 +52,6 @@ class ChatterWatch:
 
 
 TEN_MINUTES_NS = 600 * NS_PER_S
-DAY_NS = 86_400 * NS_PER_S
 
 STALE_NS = DAY_NS
 """An alarm that is active for longer is stale."""
@@ -104,14 +81,10 @@ class AlarmFigures:
     ----------
     n_alarms
         Announcements: alarms that were raised, rose to danger, or came back from being hidden.
-    per_day, per_10_min
-        On average.
     most_in_10_min
         In the worst ten minutes.
     share_in_flood
         Of the ten-minute periods, those with more than `N_FLOOD`.
-    n_by_level
-        By priority.
     most_frequent
         At most `N_MOST_FREQUENT`, the most frequent first.
     chattering
@@ -141,14 +114,7 @@ def is_announced(event: AlarmEvent) -> bool:
 def figures_of(
     events: Iterable[AlarmEvent], start_ns: int, end_ns: int, rule: ChatterRule
 ) -> AlarmFigures:
-    """Figures of the events of some time.
-
-    Parameters
-    ----------
-    events
-        In the order in which they happened; events of other times are left out.
-    start_ns, end_ns
-        From the first, up to but not including the second.
+    """Figures of the events from a start up to, not including, an end; other events are left out.
 
     Raises
     ------
@@ -197,16 +163,15 @@ def _n_before(times: TimeArray, window_ns: int) -> npt.NDArray[np.int64]:
 
 def _chattering(events: Iterable[AlarmEvent], rule: ChatterRule) -> dict[str, int]:
     """Activations of each alarm that lie, with enough others, within one window."""
-    raised: dict[str, list[int]] = {}
+    raised: defaultdict[str, list[int]] = defaultdict(list)
     for event in events:
         if event.change in ANNOUNCED:
-            raised.setdefault(event.identity.id, []).append(event.time_ns)
-    counts: dict[str, int] = {}
+            raised[event.identity.id].append(event.time_ns)
+    counts, n = {}, rule.n_activations
     for alarm, times in raised.items():
-        last = np.flatnonzero(_n_before(np.sort(times), rule.window_ns) >= rule.n_activations)
-        if last.size:
-            counts[alarm] = np.unique(last[:, np.newaxis] - np.arange(rule.n_activations)).size
-    return counts
+        last = np.flatnonzero(_n_before(np.sort(times), rule.window_ns) >= n)
+        counts[alarm] = np.unique(last[:, np.newaxis] - np.arange(n)).size
+    return {alarm: count for alarm, count in counts.items() if count}
 
 
 def _n_fleeting(events: Iterable[AlarmEvent], rule: ChatterRule) -> int:

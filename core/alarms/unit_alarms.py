@@ -52,8 +52,6 @@ class UnitAlarms(AlarmBoard):
         What is watched; alarms whose rule is gone can only be acknowledged.
     rows
         Which channel each row of a block is about, by id; the unit's channels if not given.
-    references
-        Vectors that 1× is compared with.
     """
 
     def __init__(
@@ -104,13 +102,7 @@ class UnitAlarms(AlarmBoard):
     def take(
         self, block: SampleBlock, assessments: Iterable[Assessment], host_ns: int
     ) -> list[AlarmNews]:
-        """Judge a block and the results that it has completed.
-
-        Parameters
-        ----------
-        host_ns
-            Host time, against which the device's clock is judged.
-        """
+        """Judge a block, the device's clock by the host's, and results that are complete."""
         if self._is_repeated(block):
             return []
         for assessment in assessments:
@@ -134,14 +126,7 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def films(self, conditions: Mapping[str, Judgement], now_ns: int) -> list[AlarmNews]:
-        """Update the alarms about films.
-
-        Parameters
-        ----------
-        conditions
-            By id of the alarm.
-        now_ns
-            Time of the samples that the decision stands on.
+        """Update the alarms about films, by id, at the time of the samples that decided.
 
         Raises
         ------

@@ -14,11 +14,9 @@ from core.baseline.history import DIRECTIONS, StiffnessHistory
 
 
 def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[str, float]:
-    """Mean difference of ln, second less first, in the cells that both support by themselves.
+    """Mean difference of ln by direction, second less first, in cells that both support themselves.
 
-    Returns
-    -------
-    By direction, weighted by readings of the first; only those with common cells.
+    It is weighted by readings of the first; a direction without common cells is missing.
     """
     found: dict[str, float] = {}
     for one in first.quantities:
@@ -59,12 +57,7 @@ class Drift:
 def learning_drift(
     history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: QuantityBaseline
 ) -> Drift | None:
-    """Drift of the readings that a baseline was learned from.
-
-    Returns
-    -------
-    None if too few conditions recur in other spells.
-    """
+    """Drift of the readings that a baseline was learned from; None if too few conditions recur."""
     conditions, value = history.conditions, history.ln_k[DIRECTIONS.index(baseline.direction)]
     usable = is_settled & baseline.is_known(conditions) & np.isfinite(value)
     if not usable.any():
@@ -114,14 +107,9 @@ Tables 8 and 9)."""
 def far_readings(
     history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: BearingBaseline
 ) -> str | None:
-    """Warning about readings at least twice or at most half of what was learned; None if none.
+    """Warning about settled readings at least twice or at most half of what was learned.
 
     A robust fit gives such readings no weight, so that the baseline does not show them.
-
-    Parameters
-    ----------
-    is_settled : (n,)
-        Whether the unit had settled in a steady state.
     """
     counts = []
     for learned in baseline.quantities:

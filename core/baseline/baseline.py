@@ -37,8 +37,6 @@ class Origin:
 
     Parameters
     ----------
-    estimator
-        Estimator whose stiffness was learned.
     version
         Number of the baseline among those of its bearing, from 1.
     created_ns
@@ -98,16 +96,13 @@ class QuantityBaseline:
     ----------
     quantity
         Name of the quantity in stored documents.
-    direction
-        "x" or "y".
     attitude_covariance
         Covariance of the surface's attitude terms; empty if it has none.
     max_surface_std
         Uncertainty of the surface above which nothing is compared.
-    scatter
-        Scatter of single readings about the surface, over all cells.
-    u_random
-        Typical random uncertainty of readings; it is part of their scatter.
+    scatter, u_random
+        Of single readings: scatter about the surface over all cells, and the typical random
+        uncertainty that is part of it.
     reading_h
         Running hours that a reading stands for.
     time_scatter
@@ -147,12 +142,9 @@ class QuantityBaseline:
     def compare(
         self, conditions: FilmConditions, value: FloatArray, u_random: FloatArray
     ) -> Deviations:
-        """Compare readings with the learned values under their conditions.
+        """Compare readings (n,) with the learned values under their conditions.
 
-        Parameters
-        ----------
-        value, u_random : (n,)
-            ln of the stiffness and its random standard uncertainty.
+        The value is ln of the stiffness, with its random standard uncertainty.
         """
         is_known = self.is_known(conditions)
         place = self.table.find(self.grid.cells(conditions))
@@ -220,14 +212,9 @@ def _steps(x: FloatArray, width: float) -> tuple[npt.NDArray[np.int64], FloatArr
 
 @dataclass(frozen=True)
 class BearingBaseline:
-    """Learned baselines of the film of one bearing.
+    """Learned baselines of the film of one bearing, from the first to the last reading of a period.
 
-    Parameters
-    ----------
-    learned_from_ns, learned_until_ns
-        First and last reading of the learning period.
-    quantities
-        At most one for each direction; those with too few readings are missing.
+    There is at most one for each direction; those with too few readings are missing.
     """
 
     origin: Origin

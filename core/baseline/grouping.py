@@ -8,22 +8,12 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
 from core.condition.cells import CellGrid, FilmConditions
-from core.units import NS_PER_S
-
-DAY_NS = 86_400 * NS_PER_S
+from core.units import DAY_NS
 
 
 @dataclass(frozen=True, eq=False)
 class Groups:
-    """Points that a surface is fitted to.
-
-    Parameters
-    ----------
-    value : (n,)
-        Median of the readings.
-    n_readings, day : (n,)
-        Number of readings, and days since 1970.
-    """
+    """Points (n,) that a surface is fitted to: medians of readings, their number and their day."""
 
     conditions: FilmConditions
     value: FloatArray

@@ -29,26 +29,25 @@ class ReadingOutcome(IntEnum):
 class StiffnessHistory:
     """One bearing of one unit; readings in order of time, NaN where there is no number.
 
+    Columns are (n,); those by direction, `PER_DIRECTION`, are (2, n). Hours without a reading are
+    allowed and are gaps.
+
     Parameters
     ----------
-    time_ns : (n,)
-        Strictly increasing. Hours without a reading are allowed and are gaps.
-    speed_rpm, power_mw, eccentricity_ratio, u_eccentricity, attitude_deg, oil_temperature_c : (n,)
-    ln_k : (2, n)
-        Natural logarithm of measured stiffness in N/m, x and y direction.
-    u_random : (2, n)
+    ln_k
+        Natural logarithm of measured stiffness in N/m.
+    u_random
         Random standard uncertainty of stiffness relative to it, which is that of `ln_k`.
-    shaft_um_pk, bearing_um_pk : (2, n)
+    shaft_um_pk, bearing_um_pk
         Amplitudes at 1×, of shaft relative to bearing and of bearing.
-    outcome : (2, n), optional
+    outcome
         Members of `ReadingOutcome`; by default a missing `ln_k` is of bad quality.
 
     Raises
     ------
     ValueError
-        If a column has another length or shape, time does not increase, a number is infinite, an
-        uncertainty is not above zero, or outcome and number contradict one another; with column
-        and row.
+        With column and row, if a column has another shape, time does not increase, a number is
+        infinite, an uncertainty is not above zero, or outcome and number contradict one another.
     """
 
     time_ns: TimeArray
@@ -86,12 +85,10 @@ class StiffnessHistory:
 
     def rows(self, start: int, stop: int) -> "StiffnessHistory":
         """The readings from row `start` up to, not including, row `stop`."""
-        return StiffnessHistory(
-            **{f.name: getattr(self, f.name)[..., start:stop] for f in fields(self)}
-        )
+        return self.where(slice(start, stop))
 
-    def where(self, wanted: npt.NDArray[np.bool_]) -> "StiffnessHistory":
-        """The readings that a mask of shape (n,) picks."""
+    def where(self, wanted: npt.NDArray[np.bool_] | slice) -> "StiffnessHistory":
+        """The readings that a mask of shape (n,) or a slice picks."""
         return StiffnessHistory(
             **{f.name: getattr(self, f.name)[..., wanted] for f in fields(self)}
         )

@@ -6,13 +6,14 @@ import numpy.typing as npt
 from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.cell_table import CellTable
-from core.baseline.grouping import DAY_NS, Groups, group_readings
+from core.baseline.grouping import Groups, group_readings
 from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.baseline.scatter import time_scatter, with_scatter
 from core.baseline.settings import BaselineSettings
 from core.baseline.surface_fit import MIN_SCATTER, Fit, fit_surface, refit, surface_shape
 from core.baseline.tabulate import tabulate
 from core.condition.cells import FilmConditions
+from core.units import DAY_NS
 
 FOLDS = 5
 LONGEST_SPELL_DAYS = 10
@@ -27,11 +28,9 @@ def held_out_deviations(
     table: CellTable,
     settings: BaselineSettings,
 ) -> FloatArray:
-    """Cross-validated deviations: each reading against a surface fitted without its spell of days.
+    """Deviations (n,) of each reading from a surface fitted without its spell of days.
 
-    Returns
-    -------
-    (n,) NaN where the cell has no support without the spell.
+    NaN where the cell has no support without the spell.
     """
     n_days = np.unique(groups.day).size
     spell_days = int(np.clip(n_days // (2 * FOLDS), 1, LONGEST_SPELL_DAYS))
@@ -76,14 +75,7 @@ def learn(
     origin: Origin,
     settings: BaselineSettings,
 ) -> BearingBaseline:
-    """Learn the baseline of a bearing.
-
-    Parameters
-    ----------
-    history
-        Readings of the learning period, for the most part of a healthy machine.
-    is_settled : (n,)
-        Whether the unit had settled in a steady state.
+    """Learn the baseline of a bearing from readings that are mostly of a healthy machine.
 
     Raises
     ------

@@ -94,10 +94,7 @@ def time_scatter(
 ) -> tuple[TimeScatter, ...]:
     """Scatter over each time scale that the learning period is long enough for.
 
-    Parameters
-    ----------
-    deviation, place : (n,)
-        Cross-validated deviations, oldest first, and rows of their cells.
+    The deviations (n,) are cross-validated, oldest first; places are rows of their cells.
     """
     smooth, weight = running_median(deviation), _weight(table.scatter[place])
     columns = (np.ones(weight.size), smooth, table.passing[place], table.lasting[place])

@@ -1,6 +1,5 @@
 """How a baseline is learned."""
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -40,11 +39,6 @@ class BaselineSettings:
         short time scales, small ones on the long ones.
     reading_h
         Running hours from one reading to the next.
-
-    Raises
-    ------
-    ValueError
-        With key and value, if one is not a number above zero, or time scales do not increase.
     """
 
     grid: CellGrid = field(default_factory=CellGrid)
@@ -60,17 +54,6 @@ class BaselineSettings:
     time_scales_h: tuple[float, ...] = (4.0, 16.0, 64.0, 128.0)
     reading_h: float = 1.0 / 6.0
 
-    def __post_init__(self) -> None:
-        for key in POSITIVE:
-            value = getattr(self, key)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{key} = {value:g} must be a number above 0")
-        scales_h = self.time_scales_h
-        if not all(math.isfinite(h) and h > self.reading_h for h in scales_h) or not scales_h:
-            raise ValueError(f"time_scales_h = {scales_h} must be numbers above {self.reading_h:g}")
-        if list(scales_h) != sorted(set(scales_h)):
-            raise ValueError(f"time_scales_h = {scales_h} must increase")
-
     @property
     def has_attitude(self) -> bool:
         """Whether surface or cells depend on the attitude angle."""
@@ -79,9 +62,3 @@ class BaselineSettings:
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
         """(n,) whether readings have everything that the baseline depends on."""
         return conditions.is_known(self.has_attitude)
-
-
-POSITIVE = (
-    *("min_readings", "min_days", "borrowing_readings", "borrowing_reach", "max_surface_std"),
-    *("min_learning_days", "knot_cells", "bend_std", "reading_h"),
-)

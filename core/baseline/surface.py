@@ -69,12 +69,7 @@ class SurfaceShape:
         return tensor + (ATTITUDE_TERMS if self.has_attitude else 0)
 
     def terms(self, conditions: FilmConditions) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """Tensor products that are not zero, and their values.
-
-        Returns
-        -------
-        (16, n), (16, n)
-        """
+        """(16, n) tensor products that are not zero, and (16, n) their values."""
         first_e, value_e = self.eccentricity.splines(conditions.eccentricity_ratio)
         first_t, value_t = self.temperature.splines(conditions.oil_temperature_c)
         step = np.arange(4)[:, np.newaxis]

@@ -24,12 +24,7 @@ MIN_SCATTER = 1e-6
 class SlopeScatter:
     """Variance of a deviation, given the slope.
 
-    Parameters
-    ----------
-    flat
-        Variance where the squared slope is at most `flat_square`.
-    per_slope
-        Variance per squared slope beyond `flat_square`.
+    It is `flat` up to a squared slope, and rises by `per_slope` with the squared slope beyond.
     """
 
     flat: float
@@ -46,12 +41,7 @@ class SlopeScatter:
 
 
 def slope_scatter(slope: FloatArray, deviation: FloatArray) -> SlopeScatter:
-    """Fit variance to squared deviations, each weighted by its expected value.
-
-    Parameters
-    ----------
-    slope, deviation : (n,)
-    """
+    """Fit variance to squared deviations (n,), each weighted by its expected value."""
     from scipy.optimize import nnls  # slow to load, and not needed to begin
 
     flat_square = float(np.quantile(slope**2, FLAT_SHARE))
@@ -123,9 +113,7 @@ class Fit:
 def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
     """Fit a surface, and estimate scatter and correlation of the groups."""
     offset = float(np.median(groups.value))
-    points = _Points(
-        shape.design(groups.conditions), groups.value - offset, _trust(groups), groups.day
-    )
+    points = _Points.of(groups, shape, offset)
     prior = prior_precision(shape, bend_std)
     coefficients, robust = _resisting(points, prior)
     for _ in range(SLOPE_ROUNDS):
@@ -148,6 +136,11 @@ class _Points:
     y: FloatArray
     trust: FloatArray
     day: npt.NDArray[np.int64]
+
+    @classmethod
+    def of(cls, groups: Groups, shape: SurfaceShape, offset: float) -> "_Points":
+        trust = groups.n_readings / (groups.n_readings + FEW_READINGS)
+        return cls(shape.design(groups.conditions), groups.value - offset, trust, groups.day)
 
     def left(self, coefficients: FloatArray) -> FloatArray:
         """(n,) residuals of a surface, scaled to the same scatter."""
@@ -186,9 +179,7 @@ def _std(
 def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Surface:
     """Surface fitted to some of the groups, with the weights of the whole fit."""
     shape, offset = fit.surface.shape, fit.surface.offset
-    points = _Points(
-        shape.design(groups.conditions), groups.value - offset, _trust(groups), groups.day
-    )
+    points = _Points.of(groups, shape, offset)
     precision = is_used * fit.robust_weight / (fit.group_std**2 * fit.clustering)
     coefficients, _ = points.solve(precision, prior_precision(shape, bend_std))
     return Surface(shape, offset, tuple(coefficients.tolist()))
@@ -207,10 +198,6 @@ def prior_precision(shape: SurfaceShape, bend_std: float) -> FloatArray:
 def _differences(n: int, bend_std: float) -> FloatArray:
     slopes, bends = np.diff(np.eye(n), axis=0), np.diff(np.eye(n), 2, axis=0)
     return np.asarray(slopes.T @ slopes / SLOPE_STD**2 + bends.T @ bends / bend_std**2)
-
-
-def _trust(groups: Groups) -> FloatArray:
-    return groups.n_readings / (groups.n_readings + FEW_READINGS)
 
 
 def _clustering(

@@ -44,13 +44,7 @@ def tabulate(
     fit: Fit,
     settings: BaselineSettings,
 ) -> CellTable:
-    """Statistics and support of every cell with readings, and of those between them.
-
-    Parameters
-    ----------
-    value : (n,)
-        ln of the readings.
-    """
+    """Statistics and support of cells with readings, given in ln, and of those between."""
     contents = _seen(conditions, value, groups, fit, settings.grid)
     enough = {
         cell
@@ -65,17 +59,12 @@ def tabulate(
     return CellTable(
         tuple(
             CellStatistics(
+                **vars(content),
                 cell=cell,
-                n_readings=content.n_readings,
-                n_days=content.n_days,
-                location=content.location,
                 scatter=max(float(np.median(fit.group_std)), MIN_SCATTER),  # until it is known
                 lasting=0.0,
                 surface_std=float(std[row]),
                 node_std=nodes[row],
-                eccentricity_ratio=content.eccentricity_ratio,
-                oil_temperature_c=content.oil_temperature_c,
-                attitude_deg=content.attitude_deg,
                 support=_support(cell, enough, between, std[row] <= settings.max_surface_std),
             )
             for row, (cell, content) in enumerate(contents.items())

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from core.arrays import FloatArray, TimeArray
 from core.baseline.baseline import QuantityBaseline
-from core.baseline.history import CodeArray, StiffnessHistory
-from core.change.decision import INITIAL_DECISION, Decision, WatchedReadings, step
+from core.baseline.history import DIRECTIONS, CodeArray, StiffnessHistory
+from core.change.decision import INITIAL_DECISION, Decision, outcomes, step
 from core.change.settings import ChangeLimits, FilmRules
 from core.condition.operating_state import (
     NOT_AT_SPEED,
@@ -27,14 +27,7 @@ from core.condition.operating_state import (
 
 @dataclass(frozen=True, eq=False)
 class OperationHistory:
-    """Operating state of every reading.
-
-    Parameters
-    ----------
-    state : (n,)
-        Members of `OperatingState`.
-    is_settled : (n,)
-    """
+    """`OperatingState` of every reading (n,), and whether it had settled."""
 
     state: CodeArray
     is_settled: npt.NDArray[np.bool_]
@@ -50,14 +43,8 @@ def operation_history(
 ) -> OperationHistory:
     """Operating states from speed and power, or those that a file gives, and their settling.
 
-    Parameters
-    ----------
-    time_ns, speed_rpm, power_mw : (n,)
-        Strictly increasing; NaN where there is no number.
-    oil_temperature_c : (n,), optional
-        Of the bearing; without it a film warms up for the longest time.
-    state : (n,), optional
-        Given members of `OperatingState`.
+    Times increase; columns are (n,) with NaN where there is no number. Without an oil temperature
+    a film warms up for the longest time.
     """
     columns = (speed_rpm, power_mw, oil_temperature_c, state)
     rows = [
@@ -101,16 +88,10 @@ def _operations(
 
 @dataclass(frozen=True, eq=False)
 class DecisionHistory:
-    """The decision after every reading.
+    """The decision after every reading, (n,) each.
 
-    Parameters
-    ----------
-    verdict : (n,)
-        Members of `Verdict`.
-    level : (n,)
-        Level that is held: 0 for none, or a member of `AlarmLevel`.
-    change, significance, time_scale_h : (n,)
-        The most significant mean deviation; NaN before there is one.
+    Members of `Verdict`; level 0 or a member of `AlarmLevel`; and the most significant mean
+    deviation, NaN before there is one.
     """
 
     verdict: CodeArray
@@ -125,7 +106,11 @@ class DecisionHistory:
 
 
 def decide_all(
-    readings: WatchedReadings, baseline: QuantityBaseline | None, limits: ChangeLimits
+    history: StiffnessHistory,
+    is_settled: npt.NDArray[np.bool_],
+    direction: str,
+    baseline: QuantityBaseline | None,
+    limits: ChangeLimits,
 ) -> DecisionHistory:
     """Decide over stored readings, oldest first, from the initial decision on."""
     nothing = (np.nan, np.nan, np.nan)
@@ -134,7 +119,7 @@ def decide_all(
             *(decision.verdict, decision.level or 0),
             *((f.change, f.significance, f.time_scale_h) if (f := decision.finding) else nothing),
         )
-        for decision in _decisions(readings, baseline, limits)
+        for decision in _decisions(history, is_settled, direction, baseline, limits)
     ]
     verdict, level, *finding = np.array(rows, np.float64).reshape(-1, 5).T.copy()
     return DecisionHistory(verdict.astype(np.int8), level.astype(np.int8), *finding)
@@ -146,24 +131,23 @@ def last_decision(
     baseline: QuantityBaseline,
     rules: FilmRules,
 ) -> Decision:
-    """Decision after stored readings, as if the baseline had been in force.
-
-    Parameters
-    ----------
-    is_settled : (n,)
-    """
-    readings = WatchedReadings.of(history, is_settled, baseline.direction)
-    found = deque(_decisions(readings, baseline, rules.change, rules.lapsed_ns), maxlen=1)
+    """Decision after stored readings, as if the baseline had been in force."""
+    watched = (history, is_settled, baseline.direction, baseline)
+    found = deque(_decisions(*watched, rules.change, rules.lapsed_ns), maxlen=1)
     return found[0] if found else INITIAL_DECISION
 
 
 def _decisions(
-    readings: WatchedReadings,
+    history: StiffnessHistory,
+    is_settled: npt.NDArray[np.bool_],
+    direction: str,
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,
     lapsed_ns: Callable[[int], int] = int,
 ) -> Iterator[Decision]:
-    decision = INITIAL_DECISION
-    for time_ns, outcome in readings.compared(baseline):
+    decision, row = INITIAL_DECISION, DIRECTIONS.index(direction)
+    columns = (history.conditions, history.ln_k[row], history.u_random[row], history.outcome[row])
+    found = outcomes(*columns, is_settled, baseline)
+    for time_ns, outcome in zip(history.time_ns.tolist(), found, strict=True):
         decision = step(decision, lapsed_ns(time_ns), outcome, baseline, limits)
         yield decision

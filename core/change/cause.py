@@ -95,11 +95,9 @@ class UnitReadings:
     ln_k, ln_shaft
         ln of stiffness and of shaft motion at 1×.
     deviation
-        Deviation of stiffness from its baseline.
+        Of stiffness from its baseline.
     rise
         Rise of the baseline's ln k with ln of the eccentricity ratio.
-    attitude_deg
-        Attitude angle of the shaft.
     """
 
     ln_k: FloatArray
@@ -147,10 +145,7 @@ def attribute(
 
 @dataclass(frozen=True, eq=False)
 class _Residuals:
-    """Readings, and how far the motion of the shaft is from what each cause predicts.
-
-    Residuals are (n_films,), in standard uncertainties.
-    """
+    """Distance (n_films,) of the motion from each cause's, in standard uncertainties."""
 
     row: int
     response: ShaftResponse

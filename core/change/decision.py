@@ -9,9 +9,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from core.arrays import FloatArray, TimeArray
+from core.arrays import FloatArray
 from core.baseline.baseline import QuantityBaseline
-from core.baseline.history import DIRECTIONS, CodeArray, ReadingOutcome, StiffnessHistory
+from core.baseline.history import CodeArray, ReadingOutcome
 from core.change.evidence import NO_EVIDENCE, Comparison, Finding, GatheredEvidence
 from core.change.settings import ALERT_MARGIN, DANGER_MARGIN, ChangeLimits
 from core.condition.cells import FilmConditions
@@ -46,54 +46,34 @@ Outcome: TypeAlias = Comparison | Verdict
 """Comparison of a reading with its baseline, or the verdict that says why there is none."""
 
 
-@dataclass(frozen=True, eq=False)
-class WatchedReadings:
-    """Readings of one film in one direction as columns (n,); NaN where there is no number.
+def outcomes(
+    conditions: FilmConditions,
+    value: FloatArray,
+    u_random: FloatArray,
+    codes: CodeArray,
+    is_settled: npt.NDArray[np.bool_],
+    baseline: QuantityBaseline | None,
+) -> Iterator[Outcome]:
+    """Outcome of each reading of one film in one direction, from columns (n,).
 
-    Parameters
-    ----------
-    is_settled
-        Whether the unit had settled in a steady state.
-    value, u_random
-        ln of the stiffness and its random standard uncertainty.
-    outcome
-        Members of `ReadingOutcome`.
+    The value is ln of the stiffness, NaN where there is no number; codes are of `ReadingOutcome`.
     """
-
-    time_ns: TimeArray
-    is_settled: npt.NDArray[np.bool_]
-    conditions: FilmConditions
-    value: FloatArray
-    u_random: FloatArray
-    outcome: CodeArray
-
-    @classmethod
-    def of(
-        cls, history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], direction: str
-    ) -> "WatchedReadings":
-        """Readings of a history in one direction."""
-        row = DIRECTIONS.index(direction)
-        columns = (history.ln_k[row], history.u_random[row], history.outcome[row])
-        return cls(history.time_ns, is_settled, history.conditions, *columns)
-
-    def compared(self, baseline: QuantityBaseline | None) -> Iterator[tuple[int, Outcome]]:
-        """Time of each reading, and its comparison with a baseline or why there is none."""
-        unusable = np.full(self.time_ns.size, -1)
-        columns: tuple[FloatArray, ...] = (np.zeros(self.time_ns.size),) * 4
-        if baseline is None:
-            unusable[:] = Verdict.NO_BASELINE
-        else:
-            found = baseline.compare(self.conditions, self.value, self.u_random)
-            unusable[found.place < 0] = Verdict.NO_BASELINE
-            unusable[~found.is_known] = Verdict.BAD_QUALITY
-            columns = (found.deviation, found.weight, found.scatter, found.offset_std)
-        unusable[np.isnan(self.value)] = Verdict.BAD_QUALITY
-        for outcome, verdict in WITHOUT_NUMBER.items():
-            unusable[self.outcome == outcome] = verdict
-        unusable[~self.is_settled] = Verdict.TRANSIENT
-        rows = zip(*(column.tolist() for column in (*columns, self.u_random)), strict=True)
-        for time_ns, why, row in zip(self.time_ns.tolist(), unusable.tolist(), rows, strict=True):
-            yield time_ns, Comparison(*row) if why < 0 else Verdict(why)
+    unusable = np.full(value.size, -1)
+    columns: tuple[FloatArray, ...] = (np.zeros(value.size),) * 4
+    if baseline is None:
+        unusable[:] = Verdict.NO_BASELINE
+    else:
+        found = baseline.compare(conditions, value, u_random)
+        unusable[found.place < 0] = Verdict.NO_BASELINE
+        unusable[~found.is_known] = Verdict.BAD_QUALITY
+        columns = (found.deviation, found.weight, found.scatter, found.offset_std)
+    unusable[np.isnan(value)] = Verdict.BAD_QUALITY
+    for code, verdict in WITHOUT_NUMBER.items():
+        unusable[codes == code] = verdict
+    unusable[~is_settled] = Verdict.TRANSIENT
+    rows = zip(*(column.tolist() for column in (*columns, u_random)), strict=True)
+    for why, row in zip(unusable.tolist(), rows, strict=True):
+        yield Comparison(*row) if why < 0 else Verdict(why)
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,11 +87,9 @@ class Decision:
     finding
         The most significant mean deviation, as of the newest reading that counted.
     deviation, deviation_std
-        Deviation of the newest reading that counted, in ln, and its standard uncertainty.
+        Of the newest reading that counted, in ln, and its standard uncertainty.
     alert, danger
         Levels with their delays.
-    last_ns, last_counted_ns
-        Newest reading, and newest that counted.
     """
 
     verdict: Verdict = Verdict.GATHERING_EVIDENCE

@@ -27,14 +27,9 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class ScaleSums:
-    """Exponentially weighted sums over one time scale.
+    """Exponentially weighted sums over one time scale, weighted by readings.
 
-    Parameters
-    ----------
-    fill
-        Of ones: the part of the time scale that has been seen.
-    weight, deviation, scatter, offset
-        Of weights, and weighted sums of deviations, cell scatters and lasting uncertainties.
+    `fill` is that of ones: the part of the time scale that has been seen.
     """
 
     fill: float = 0.0
@@ -65,15 +60,7 @@ class ScaleSums:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Mean deviation over a time scale.
-
-    Parameters
-    ----------
-    change
-        ln of measured over learned.
-    std
-        Standard uncertainty of a healthy film's mean deviation.
-    """
+    """Mean deviation, ln of measured over learned, and standard uncertainty of a healthy one."""
 
     time_scale_h: float
     change: float
@@ -87,17 +74,9 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class GatheredEvidence:
-    """Deviations counted so far.
+    """Deviations counted so far, and their sums over the time scales of the baseline.
 
-    Parameters
-    ----------
-    n_counted
-        Number of readings.
-    newest
-        The newest deviations, oldest first. Their median is averaged, so that single spikes do not
-        count.
-    scales
-        Sums over the time scales of the baseline.
+    The median of the newest deviations is averaged, so that single spikes do not count.
     """
 
     n_counted: int = 0

@@ -11,7 +11,7 @@ from core.arrays import FloatArray
 from core.baseline.baseline import BearingBaseline, QuantityBaseline
 from core.baseline.history import DIRECTIONS
 from core.change.cause import Attribution, Cause, UnitReadings, attribute
-from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, WatchedReadings, step
+from core.change.decision import INITIAL_DECISION, JUDGED, Decision, Verdict, outcomes, step
 from core.change.film_reading import FilmReading
 from core.change.settings import ChangeLimits, FilmRules
 from core.change.shaft_response import MEAN_READINGS, FilmDirection, ShaftResponse
@@ -32,8 +32,6 @@ class FilmFinding:
         hours that it is averaged over.
     deviation, deviation_std
         Deviation of this reading alone; None unless it was compared.
-    baseline_version
-        Version of the baseline.
     attribution
         Cause of the change, while a level is held.
     """
@@ -81,14 +79,9 @@ class FilmDecision:
 
 @dataclass(frozen=True)
 class FilmMemory:
-    """State of `FilmWatch` that stored readings do not hold.
+    """State of `FilmWatch` that stored readings do not hold: the oil is by bearing.
 
-    Parameters
-    ----------
-    oil
-        By bearing.
-    slot
-        Number of the newest interval that had its reading.
+    The slot is the number of the newest interval that had its reading.
     """
 
     operation: Operation
@@ -111,12 +104,7 @@ MAX_RECENT = 4 * MEAN_READINGS
 
 
 class FilmJudge:
-    """Active baselines and decisions so far of one unit.
-
-    Parameters
-    ----------
-    brackets_n_per_m
-        Stiffness of the bracket of every bearing.
+    """Active baselines and decisions so far of one unit, with the brackets' stiffness by bearing.
 
     Attributes
     ----------
@@ -142,10 +130,7 @@ class FilmJudge:
     ) -> None:
         """Compare a bearing with a baseline, or with none, from its next reading on.
 
-        Parameters
-        ----------
-        decisions
-            Decisions in x and y to continue from; by default the initial ones.
+        Decisions in x and y may be given to continue from; by default they are the initial ones.
         """
         if baseline is None:
             self._baselines.pop(bearing, None)
@@ -200,17 +185,11 @@ class FilmJudge:
 
     def _decide(self, reading: FilmReading, direction: str) -> FilmFinding:
         film, value = (reading.bearing, direction), reading.values[DIRECTIONS.index(direction)]
-        watched = WatchedReadings(
-            np.array([reading.time_ns]),
-            np.array([reading.condition.is_settled]),
-            reading.conditions,
-            np.array([value.ln_k]),
-            np.array([value.u_random]),
-            np.array([value.outcome]),
-        )
-        learned = self._learned(*film)
-        [(time_ns, outcome)] = watched.compared(learned)
-        before, now_ns = self._decisions.get(film, INITIAL_DECISION), self._rules.lapsed_ns(time_ns)
+        learned, before = self._learned(*film), self._decisions.get(film, INITIAL_DECISION)
+        ln_k, u_random = np.array([value.ln_k]), np.array([value.u_random])
+        code, is_settled = np.array([value.outcome]), np.array([reading.condition.is_settled])
+        [outcome] = outcomes(reading.conditions, ln_k, u_random, code, is_settled, learned)
+        now_ns = self._rules.lapsed_ns(reading.time_ns)
         decision = step(before, now_ns, outcome, learned, self._rules.change)
         self._decisions[film] = decision
         finding, is_compared = decision.finding, decision.last_counted_ns == decision.last_ns

@@ -36,15 +36,7 @@ class FilmValue:
 
 @dataclass(frozen=True)
 class FilmReading:
-    """One film at one moment, averaged over a few minutes; NaN where there is no number.
-
-    Parameters
-    ----------
-    estimator
-        Estimator of the stiffness.
-    values
-        Readings in x and y.
-    """
+    """One film at one moment in x and y, averaged over a few minutes; NaN without a number."""
 
     unit: str
     bearing: str

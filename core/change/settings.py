@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from core.condition.cells import CellGrid
 from core.condition.operating_state import OperatingLimits
@@ -37,12 +37,6 @@ class ChangeLimits:
         own length.
     on_delay_h, off_delay_h
         Running hours without interruption before a level counts, or counts no longer.
-
-    Raises
-    ------
-    ValueError
-        With key and value, if one is not a number above zero, alert is not below danger, or the
-        deadband is not below the alert limit.
     """
 
     alert_change: float = 0.035
@@ -53,21 +47,6 @@ class ChangeLimits:
     min_evidence_h: float = 4.0
     on_delay_h: float = 1.0
     off_delay_h: float = 8.0
-
-    def __post_init__(self) -> None:
-        for key in (field.name for field in fields(self)):
-            value = getattr(self, key)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{key} = {value:g} must be a number above 0")
-        if not self.alert_change < self.danger_change:
-            raise ValueError(
-                f"alert_change = {self.alert_change:g} must be below"
-                f" danger_change = {self.danger_change:g}"
-            )
-        if not self.deadband < self.alert_change:
-            raise ValueError(
-                f"deadband = {self.deadband:g} must be below alert_change = {self.alert_change:g}"
-            )
 
     @property
     def holding_share(self) -> float:

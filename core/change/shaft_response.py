@@ -70,29 +70,14 @@ class ShaftResponse:
         return np.array(self.coefficients)
 
     def expected(self, ln_k: FloatArray) -> FloatArray:
-        """Expected ln of the shaft's motion at each film over the geometric mean of all.
-
-        Parameters
-        ----------
-        ln_k : (n_films, n)
-
-        Returns
-        -------
-        (n_films, n)
-        """
+        """(n_films, n) ln of the shaft's motion at each film over the geometric mean of all."""
         return self._coefficients @ _terms(ln_k - np.array(self.centre)[:, np.newaxis])
 
 
 def learn_response(
     histories: Mapping[str, StiffnessHistory], is_settled: npt.NDArray[np.bool_]
 ) -> ShaftResponse | None:
-    """Learn the response from all bearings of a unit together.
-
-    Parameters
-    ----------
-    histories
-        By bearing, all at the same times.
-    is_settled : (n,)
+    """Learn the response from all bearings of a unit together, all at the same times.
 
     Returns
     -------

@@ -61,16 +61,7 @@ class SensorLimits:
 
 
 def quietest_rms(samples: FloatArray) -> FloatArray:
-    """Least standard deviation of each channel over pieces of a segment.
-
-    Parameters
-    ----------
-    samples : (n_channels, n_samples)
-        At least `N_PIECES` samples.
-
-    Returns
-    -------
-    (n_channels,) in the channels' own units.
+    """Least standard deviation (n_channels,) of channels (n_channels, n_samples) over their pieces.
 
     Raises
     ------
@@ -90,17 +81,14 @@ def quietest_rms(samples: FloatArray) -> FloatArray:
 def signal_quality(
     rms: float, mean: float, unit_per_count: float, turning: bool, limits: SensorLimits
 ) -> Quality:
-    """Whether a channel moves at all while the machine turns.
+    """Whether a channel moves at all while the machine turns; at standstill nothing is judged.
 
     Parameters
     ----------
     rms, mean
         Least standard deviation (:func:`quietest_rms`) and mean of a segment, channel's unit.
     unit_per_count
-        The channel's unit per count of its converter, of either sign; zero where it is not known,
-        and then only a signal without any change at all is a failure.
-    turning
-        At standstill nothing need move, and nothing is judged.
+        Of either sign; zero where it is not known: then only a constant signal is a failure.
     """
     count = abs(unit_per_count)
     if not turning or rms > limits.min_counts_rms * count:
@@ -111,17 +99,11 @@ def signal_quality(
 def level_quality(
     samples: FloatArray, turn_samples: int, ok_limits: tuple[float, float]
 ) -> Quality:
-    """Whether the level of a transducer, without its vibration, lies within its OK limits.
+    """Whether the level (n_samples,) of a transducer without its vibration is within its OK limits.
 
     A mean over part of a turn follows the shaft, a mean over a turn does not. A level that jumps
-    farther than the shaft vibrates is that of a contact that was lost for a moment.
-
-    Parameters
-    ----------
-    samples : (n_samples,)
-        Of a segment.
-    turn_samples
-        Samples in a turn of the shaft; all samples are one turn if they are fewer.
+    farther than the shaft vibrates is that of a contact that was lost for a moment. Samples that
+    are fewer than a turn count as one.
     """
     n_turns = samples.size // turn_samples
     turns = samples[-n_turns * turn_samples :].reshape(max(n_turns, 1), -1)
@@ -133,36 +115,18 @@ def level_quality(
 
 
 def clipped_share(samples: FloatArray, unit_per_count: float) -> float:
-    """Share of the samples of a channel that are at an end of its converter's range.
-
-    Parameters
-    ----------
-    samples : (n_samples,)
-        In the channel's unit.
-    unit_per_count
-        Of either sign; not zero.
-    """
+    """Share of the samples (n_samples,) of a channel at an end of its converter's range."""
     counts = samples / unit_per_count
     at_end = (counts > HIGHEST_COUNT - 0.5) | (counts < LOWEST_COUNT + 0.5)
     return float(np.mean(at_end))
 
 
 def backward_share(power_x: float, power_y: float, cross_xy: complex) -> float:
-    """Share of an orbit's power that turns from y to x, against the positive sense.
+    """Share of an orbit's power that turns from y to x, against the positive sense; 0 to 1.
 
     With the orbit z = x + iy split into forward and backward circles F and B, |F|² and |B|² are
-    (S_xx + S_yy ± 2 Im S_xy) / 4. It needs no phase reference, and averages like the spectra do.
-
-    Parameters
-    ----------
-    power_x, power_y
-        Mean of |X|² and |Y|² at the line.
-    cross_xy
-        Mean of X · conj(Y).
-
-    Returns
-    -------
-    0 to 1; 0.5 when nothing moves.
+    (S_xx + S_yy ± 2 Im S_xy) / 4, of the means of |X|², |Y|² and X · conj(Y) at a line. It needs no
+    phase reference, and averages like the spectra do.
     """
     total = power_x + power_y
     if total <= 0.0:
@@ -171,18 +135,11 @@ def backward_share(power_x: float, power_y: float, cross_xy: complex) -> float:
 
 
 def axes_quality(share: float, rotation_sense: int, limits: SensorLimits) -> Quality:
-    """Whether the 1× orbit of a pair of transducers turns with the shaft.
+    """Whether the 1× orbit of a pair of transducers turns with the shaft, by its `backward_share`.
 
     Unbalance and runout turn with it, whatever the film; an orbit that turns against it has most
     likely its x and y swapped. Stiffness anisotropy can do it too, between two critical speeds, so
     that it is no more than a doubt. To be asked only where the line stands out.
-
-    Parameters
-    ----------
-    share
-        From :func:`backward_share`.
-    rotation_sense
-        +1 if the shaft turns from x to y, -1 if it turns from y to x.
     """
     against = share if rotation_sense > 0 else 1.0 - share
     return uncertain(Reason.SWAPPED_AXES) if against > limits.max_backward_share else GOOD
@@ -195,21 +152,15 @@ def checked_speed(
     limits: SensorLimits,
     u_line: float = 0.0,
 ) -> Reading:
-    """Speed reading as far as it can be true.
+    """Speed reading in r/min as far as it can be true: missing where no machine turns like that.
 
     Parameters
     ----------
-    measured
-        From the speed channel, r/min.
     line_rpm
-        Speed that the 1× line shows, where it stands out of its surroundings.
+        Speed that the 1× line shows, where it stands out of its surroundings; where it contradicts
+        the reading, that is uncertain.
     u_line
         Its standard uncertainty, relative.
-
-    Returns
-    -------
-    The reading itself; uncertain where the line contradicts it; missing where no machine turns like
-    that.
     """
     if measured.value is None:
         return measured
@@ -230,18 +181,15 @@ def stationarity(
 ) -> Quality:
     """Whether speed and load stood still while the averaged segments were recorded.
 
+    An unknown newest power is uncertain, since an unknown load is not steady.
+
     Parameters
     ----------
     speed_rpm, power_mw : (n_segments,)
-        Mean of each segment, oldest first; not a number where it is not known. Power may be empty
-        for a unit that does not measure it: its speed alone is judged.
+        Mean of each segment, oldest first; NaN where it is not known. Without power the speed alone
+        is judged.
     rated_power_mw
         Where it is not known, changes of power are compared with the mean power.
-
-    Returns
-    -------
-    Uncertain where something moved, and where the newest power is not known: an unknown load is
-    not steady.
     """
     mean_rpm, spread_rpm = _mean_and_spread(speed_rpm)
     if spread_rpm > limits.max_speed_change * mean_rpm:

@@ -13,12 +13,7 @@ from core.condition.operating_state import OperatingState
 
 @dataclass(frozen=True, eq=False)
 class FilmConditions:
-    """Conditions of n readings as columns; NaN where unknown.
-
-    Parameters
-    ----------
-    eccentricity_ratio, oil_temperature_c, attitude_deg : (n,)
-    """
+    """Conditions of n readings as columns (n,); NaN where unknown."""
 
     eccentricity_ratio: FloatArray
     oil_temperature_c: FloatArray
@@ -35,11 +30,7 @@ class FilmConditions:
 
     def rows(self, wanted: npt.NDArray[np.bool_ | np.int64]) -> "FilmConditions":
         """Some of the readings, by mask or row."""
-        return FilmConditions(
-            self.eccentricity_ratio[wanted],
-            self.oil_temperature_c[wanted],
-            self.attitude_deg[wanted],
-        )
+        return FilmConditions(*(column[wanted] for column in vars(self).values()))
 
     def is_known(self, needs_attitude: bool) -> npt.NDArray[np.bool_]:
         """(n,) whether eccentricity, oil temperature and, if needed, attitude are numbers."""
@@ -58,12 +49,7 @@ CellArray: TypeAlias = npt.NDArray[np.int64]
 class CellGrid:
     """Widths of the bins; the first bin of each axis begins at zero.
 
-    Parameters
-    ----------
-    eccentricity_width, temperature_width_c
-        Of eccentricity ratio and oil temperature.
-    attitude_width_deg
-        Of the attitude angle; must divide the full circle. None if cells do not depend on it.
+    Without a width of the attitude, which must divide the circle, cells do not depend on it.
 
     Raises
     ------
@@ -90,12 +76,7 @@ class CellGrid:
         return self.attitude_width_deg is not None
 
     def cells(self, conditions: FilmConditions) -> CellArray:
-        """Cell of each reading; valid only where `is_known`.
-
-        Returns
-        -------
-        (n_axes, n)
-        """
+        """(n_axes, n) cell of each reading; valid only where `is_known`."""
         axes = [
             conditions.eccentricity_ratio / self.eccentricity_width,
             conditions.oil_temperature_c / self.temperature_width_c,
@@ -129,17 +110,10 @@ NOWHERE_KNOWN = OperatingPoint()
 
 @dataclass(frozen=True)
 class BearingCondition:
-    """Condition that a bearing's stiffness is compared under.
+    """Condition that a bearing's stiffness is compared under; its cell is None where it is unknown.
 
-    Parameters
-    ----------
-    state
-        Operating state of the unit.
-    is_settled
-        Whether the state has lasted for the settling time, after the warm-up. Only settled films
-        are comparable.
-    cell
-        None where one of its quantities is unknown.
+    Settled is a state that has lasted for the settling time, after the warm-up: only settled films
+    are comparable.
     """
 
     state: OperatingState

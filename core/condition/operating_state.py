@@ -7,7 +7,7 @@ temperature is part of the condition that films are compared under.
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import IntEnum
 
 from core.units import ns_from_s
@@ -39,11 +39,6 @@ class OperatingLimits:
         follows the grid.
     longest_gap_s
         Time without readings after which the state before no longer counts.
-
-    Raises
-    ------
-    ValueError
-        With key and value, if a limit is not a number above zero, or limits overlap.
     """
 
     rated_speed_rpm: float
@@ -59,22 +54,6 @@ class OperatingLimits:
     oil_settling_s: float = 7200.0
     warm_up_s: float = 21_600.0
     longest_gap_s: float = 3600.0
-
-    def __post_init__(self) -> None:
-        for key in (field.name for field in fields(self)):
-            value = getattr(self, key)
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{key} = {value:g} must be a number above 0")
-        self._check_order("standing_below", "at_speed_above", self.speed_hysteresis)
-        self._check_order("loaded_above", "full_load_above", self.power_hysteresis)
-
-    def _check_order(self, lower: str, upper: str, hysteresis: float) -> None:
-        low, high = getattr(self, lower), getattr(self, upper)
-        if not (hysteresis < low and low + hysteresis < high - hysteresis):
-            raise ValueError(
-                f"{lower} = {low:g} and {upper} = {high:g} must be above 0 and apart from each"
-                f" other by more than their hysteresis of {hysteresis:g}"
-            )
 
 
 class OperatingState(IntEnum):
@@ -245,8 +224,6 @@ class OilSettling:
         First reading at speed; None while the unit is not at speed.
     levels
         Times in ns and temperatures in °C over the settling time, oldest first.
-    has_settled
-        Whether the temperatures lay within the band.
     """
 
     stretch_ns: int | None = None

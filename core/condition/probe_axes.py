@@ -22,14 +22,7 @@ NAMES = ("gap x", "opposite gap x", "gap y", "opposite gap y", "thermal growth",
 
 @dataclass(frozen=True)
 class ProbeAxis:
-    """Gaps along one axis.
-
-    Parameters
-    ----------
-    near, far
-        Mean gaps in µm of the probe on the positive axis and of the opposite probe, None if there
-        is no opposite probe.
-    """
+    """Mean gaps in µm along one axis: of the probe on the positive axis and of the opposite one."""
 
     near: Reading
     near_reference_um: float
@@ -65,13 +58,7 @@ class ProbeAxis:
 
 @dataclass(frozen=True)
 class Growth:
-    """Thermal growth of all gaps of a bearing, as last measured with opposite probes.
-
-    Parameters
-    ----------
-    half_width_um
-        Limits of its error.
-    """
+    """Thermal growth of all gaps of a bearing, as last measured, and limits of its error."""
 
     value_um: float
     half_width_um: float

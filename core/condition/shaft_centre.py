@@ -27,31 +27,15 @@ def locate_shaft(
     """Locate the shaft from one or two probes on each axis, with uncertainty.
 
     An axis with one probe cannot separate the shaft's displacement from thermal growth. It takes
-    the growth that the other axis measures now, else `last_growth`, else none, with the
-    corresponding uncertainty.
-
-    Parameters
-    ----------
-    clearance_um
-        Radial clearance; must be positive.
-    accuracy
-        Limits of error; by default those of :class:`GapAccuracy`.
-    last_growth
-        Growth when it was last measured.
+    the growth that the other axis measures now, else that which was measured last, else none, with
+    the corresponding uncertainty.
 
     Returns
     -------
     By quantity: widening of all gaps since their references were read (measured by opposite probes
     only), displacement along the bearing axes, eccentricity ratio, and attitude angle from the
     positive x axis towards the positive y axis.
-
-    Raises
-    ------
-    ValueError
-        If the clearance is not positive.
     """
-    if not clearance_um > 0.0:
-        raise ValueError(f"clearance must be positive, got {clearance_um} µm")
     accuracy = accuracy or GapAccuracy()
     axes = ProbeAxes(x, y, accuracy, last_growth)
     position_um = axes.weights @ axes.values_um

@@ -28,12 +28,7 @@ def position_results(
 ) -> Found:
     """Gaps, shaft centre, eccentricity and attitude with their budgets, by quantity.
 
-    Parameters
-    ----------
-    segments
-        Oldest first, at least one.
-    last_growth
-        Thermal growth of the gaps when it was last measured.
+    There is at least one segment, the oldest first.
     """
     measured = {
         "gap_x_um": _gap(unit, segments, bearing.shaft_x, bearing.gap_x),
@@ -72,11 +67,6 @@ def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]
     """Means of slow channels over the segments, by quantity, with their scatter.
 
     The calibration uncertainty of the plant's transmitters is unknown here.
-
-    Parameters
-    ----------
-    channels
-        Slow channel of each quantity, None where it is not measured.
     """
     found: dict[str, Budgeted] = {}
     for name, channel in channels.items():
@@ -88,13 +78,7 @@ def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]
 def probe_axis(
     bearing: Bearing, near: Sequence[Reading], far: Sequence[Reading], axis: int
 ) -> ProbeAxis:
-    """Probes of an axis (0 is x) with their references.
-
-    Parameters
-    ----------
-    near, far
-        Mean gaps (x, y), µm, of the probes on the positive axes and of the opposite probes.
-    """
+    """Probes of an axis (0 is x) with their references, from mean gaps (x, y) in µm."""
     has_far = (bearing.opposite_x, bearing.opposite_y)[axis] is not None
     if not has_far or bearing.opposite_reference_um is None:
         return ProbeAxis(near[axis], bearing.gap_reference_um[axis])

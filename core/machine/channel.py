@@ -24,8 +24,6 @@ class SlowRollVector:
     phasor_um_pk
         Displacement along the axis, relative to the mark on the shaft: its phase is that of the
         reading when the mark passes the key-phase pick-up.
-    taken_ns
-        UTC.
     """
 
     channel: str
@@ -60,8 +58,6 @@ class Channel:
         +1 if a growing reading means motion along the positive bearing axis, -1 if against it. A
         probe mounted on the positive axis sees its gap shrink as the shaft approaches: -1. Of a
         key-phase, -1 if its pulses fall.
-    response
-        How the transducer changes the signal with frequency; none if it does not.
     delay_s
         By how much the channel is read later than the others, s.
     line_floor
@@ -89,24 +85,15 @@ class Channel:
 
 
 def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexArray:
-    """Displacement phasor in µm per phasor of the channel's own engineering unit.
+    """Displacement phasor (n_lines,) in µm per phasor of the channel's own engineering unit.
 
     Velocity is integrated once, acceleration twice, by division by iω and (iω)²; the transducer's
     response and the channel's delay are compensated. A key-phase shows no displacement: zero.
 
-    Parameters
-    ----------
-    frequency_hz : (n_lines,)
-        All above zero: a constant velocity has no displacement phasor.
-
-    Returns
-    -------
-    (n_lines,)
-
     Raises
     ------
     ValueError
-        If a frequency is zero or negative.
+        If a frequency is not above zero: a constant velocity has no displacement phasor.
     """
     if np.any(frequency_hz <= 0.0):
         raise ValueError(f"frequencies must be positive, got {frequency_hz.min()} Hz")

@@ -39,21 +39,12 @@ MIN_NATURAL_HZ = 15.0
 class BracketDynamics:
     """Isotropic spring, effective mass and damper between bearing and foundation.
 
-    Parameters
-    ----------
-    mass_kg
-        Effective mass m_b of bracket and bearing; None if not known, which leaves its inertia out.
-    damping_n_s_per_m
-        Structural damping c_b; usually not known and zero.
+    An unknown mass leaves the inertia out; structural damping is usually not known and zero.
     """
 
     stiffness_n_per_m: float
     mass_kg: float | None = None
     damping_n_s_per_m: float = 0.0
-
-    def __post_init__(self) -> None:
-        if not self.stiffness_n_per_m > 0.0:
-            raise ValueError(f"bracket stiffness must be above 0 N/m, got {self.stiffness_n_per_m}")
 
     @property
     def max_mass_kg(self) -> float:
@@ -152,28 +143,18 @@ class Bearing:
         Radial stiffness k_b of the bracket that holds the bearing.
     clearance_um
         Radial assembled clearance in operation: the radius in which the shaft centre can move.
-    gap_reference_um
-        Probe gaps (x, y) with the shaft centred.
-    oil_temperature, gap_x, gap_y
+    gap_reference_um, opposite_reference_um
+        Gaps (x, y) of the probes and of the opposite probes with the shaft centred.
+    oil_temperature, gap_x, gap_y, opposite_gap_x, opposite_gap_y
         Slow channel ids, where measured. Without slow gap channels the mean of the shaft channels
         is the gap.
     opposite_x, opposite_y
         Probes across the shaft from `shaft_x` and `shaft_y`, by channel id, where there are any.
-    opposite_gap_x, opposite_gap_y
-        Their slow gap channels, where measured.
-    opposite_reference_um
-        Their gaps (x, y) with the shaft centred.
     bracket_mass_kg
         Effective mass of the bracket; None if not known: `dynamic` then fits it with the film.
         Equation (5) leaves it out, the other estimators take it in.
-    bracket_damping_n_s_per_m
-        Damping of the bracket; zero where not known.
     runout_um_pk
         Largest runout of the shaft's surface at 1×, as far as it is not taken off.
-    gap_accuracy
-        How well gaps, references, thermal growth and clearance are known.
-    accuracy
-        How well transducers and bracket are known.
     preference
         Which estimators `stiffness` is taken from, best first.
     """

@@ -33,13 +33,7 @@ def overall_readings(
     """Broad-band vibration, averaged over the segments, and its budgets, by quantity.
 
     Peak-to-peak values and the farthest excursions are averaged as they are, velocities as power.
-
-    Parameters
-    ----------
-    rows
-        Of the bearing's four channels.
-    number
-        The bearing's place in the unit.
+    Rows are those of the bearing's four channels; number is its place in the unit.
     """
     if segments[-1].overall is None:
         return dict.fromkeys(OVERALL_NAMES, missing(Reason.NOT_MEASURED)), {}
@@ -63,13 +57,7 @@ def overall_readings(
 def recent_readings(
     segment: Segment, rows: Sequence[int], rate_hz: float
 ) -> tuple[RecentReadings, ...]:
-    """Shaft vibration of the newest parts of a segment, and bearing velocity of all of it.
-
-    Parameters
-    ----------
-    rows
-        Of the bearing's four channels.
-    """
+    """Shaft vibration of the newest parts of a segment, and bearing velocity of all of it."""
     recent, overall, found = segment.recent, segment.overall, []
     if recent is None or overall is None:
         return ()
@@ -93,13 +81,7 @@ def recent_readings(
 
 
 def polled_readings(polls: Sequence[Segment], rows: Sequence[int]) -> tuple[RecentReadings, ...]:
-    """Shaft vibration at 1× of each of some polls.
-
-    Parameters
-    ----------
-    rows
-        Of the bearing's four channels.
-    """
+    """Shaft vibration at 1× of each of some polls."""
     return tuple(
         RecentReadings(
             poll.stop_ns,

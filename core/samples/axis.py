@@ -70,13 +70,7 @@ class Epochs:
             self.number = reported % DEVICE_EPOCHS
 
     def begin(self, reported: int | None = None) -> None:
-        """Begin another count.
-
-        Parameters
-        ----------
-        reported
-            Its epoch, by the device; None where the device has reported no restart.
-        """
+        """Begin another count; its epoch is None where the device has reported no restart."""
         self._own += 1
         if reported is not None and self._trusts_device:
             self.number = reported % DEVICE_EPOCHS
@@ -92,13 +86,6 @@ def signed_distance(counter: int, reference: int, modulus: int) -> int:
 
 class SampleAxis:
     """Where one device stands on its sample axis, across connections.
-
-    Parameters
-    ----------
-    rate_hz
-        Nominal samples per second.
-    epochs
-        Numbers the counts of the device.
 
     Attributes
     ----------
@@ -120,13 +107,7 @@ class SampleAxis:
         return self.epochs.number
 
     def stand_at(self, index: int, at_ns: int) -> None:
-        """Begin the axis, or go on at another place.
-
-        Parameters
-        ----------
-        at_ns
-            By a clock that is never set.
-        """
+        """Begin the axis, or go on at another place, at a time by a clock that is never set."""
         self.index, self.at_ns = index, at_ns
 
     def forward(self, counter: int, modulus: int) -> int:

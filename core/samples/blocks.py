@@ -26,14 +26,9 @@ UNCOUNTED_LOSS = "uncounted_loss"
 
 @dataclass(frozen=True)
 class Rejection:
-    """Samples that a device offered and the adapter refused, directly before a block.
+    """Samples per channel that a device offered and the adapter refused, directly before a block.
 
-    Parameters
-    ----------
-    reason
-        Short snake-case word, used as a counter's label.
-    n_samples
-        Per channel.
+    The reason is a short snake-case word, used as a counter's label.
     """
 
     reason: str
@@ -273,10 +268,7 @@ class SampleBlock:
     def from_sample(self, start: int, stop: int | None = None) -> "SampleBlock":
         """Return a part of the block, counted from its own start; what was rejected stays in front.
 
-        Raises
-        ------
-        ValueError
-            If the part begins outside the block.
+        Raises `ValueError` if the part begins outside the block.
         """
         stop = self.n_samples if stop is None else min(stop, self.n_samples)
         if not 0 <= start <= self.n_samples:

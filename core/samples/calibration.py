@@ -27,8 +27,7 @@ class ChannelCalibration:
     unit_per_v
         Engineering units per volt: the reciprocal of the transducer's sensitivity.
     ok_min_v, ok_max_v
-        The mean voltage of a healthy transducer lies between these (gap OK limits), over turns of
-        the shaft.
+        Limits of the mean voltage of a healthy transducer over turns of the shaft (gap OK limits).
     """
 
     full_scale_v: float

@@ -26,8 +26,7 @@ class Gap:
     start_ns
         Time of the first sample that is missing; None where it follows from the number.
     is_estimated
-        Whether ``n_samples`` follows from the times, since the device began to count anew or counts
-        nothing.
+        Whether the number follows from the times: the device counted anew, or counts nothing.
     """
 
     epoch: int
@@ -89,16 +88,9 @@ class SampleAccount:
 
 @dataclass(frozen=True)
 class Reach:
-    """How far the stored samples of a unit reach.
+    """How far the stored samples of a unit reach: the first sample after them, and its time.
 
-    Parameters
-    ----------
-    epoch, stop_index
-        Of the first sample after them, on the axis that the device counted on then.
-    stop_ns
-        Its time.
-    gaps
-        Already recorded after it, oldest first.
+    Gaps are those already recorded after it, oldest first.
     """
 
     epoch: int
@@ -110,10 +102,8 @@ class Reach:
 def outage(reach: Reach, block: SampleBlock) -> list[Gap]:
     """Return what is missing between the stored samples and the first block after them.
 
-    Returns
-    -------
-    One gap for every stretch that is not recorded yet; none if the block follows on what is stored
-    or repeats it.
+    There is one gap for every stretch that is not recorded yet; none if the block follows on what
+    is stored or repeats it.
     """
     if _goes_on(reach, block):
         return list(_counted(reach, block))
@@ -123,9 +113,7 @@ def outage(reach: Reach, block: SampleBlock) -> list[Gap]:
 def restart(reach: Reach, block: SampleBlock) -> Gap | None:
     """Return what is missing between the last sample that arrived and the restart of its device.
 
-    Returns
-    -------
-    None if by the device's clock nothing is; what it has counted since is no part of it.
+    It is None if by the device's clock nothing is; what was counted since is no part of it.
     """
     stop_ns = _begin_ns(block) if n_missed(reach.stop_ns, block) else block.start_ns
     lost = _lost(reach, reach.stop_ns, stop_ns, block.rate_hz)
@@ -145,13 +133,9 @@ def begins_anew(reach: Reach, block: SampleBlock) -> bool:
 def n_missed(stop_ns: int, block: SampleBlock) -> int:
     """Samples of a new count that were not delivered, before the first block of it.
 
-    A count that by its index began before the last sample that arrived does not show what is
-    missing: it did not begin then, as a counter that went on or has wrapped.
-
-    Parameters
-    ----------
-    stop_ns
-        Time up to which samples have arrived, of counts before.
+    A count that by its index began before `stop_ns`, up to which samples of earlier counts have
+    arrived, does not show what is missing: it did not begin then, as a counter that went on or has
+    wrapped.
     """
     counted_ns = ns_from_s(block.first_index / block.rate_hz)
     return block.first_index if _begin_ns(block) - stop_ns >= -_TOLERANCE.over(counted_ns) else 0
@@ -237,12 +221,8 @@ class Counts:
     """Gives another number to a count that a device begins again in the same epoch.
 
     A device may begin its count again without reporting it, and so may a program that reads it. By
-    the index alone, all that it then delivers has been there; its time shows that it is new.
-
-    Attributes
-    ----------
-    count
-        None before the first block.
+    the index alone, all that it then delivers has been there; its time shows that it is new. The
+    count is None before the first block.
     """
 
     def __init__(self) -> None:

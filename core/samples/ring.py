@@ -17,18 +17,9 @@ from core.units import ns_from_s
 
 @dataclass(frozen=True)
 class Window:
-    """Consecutive samples of one epoch in engineering units.
+    """Consecutive samples (n_channels, n_samples) of one epoch in engineering units.
 
-    Parameters
-    ----------
-    start_ns
-        Time of the first sample.
-    samples
-        (n_channels, n_samples) in the engineering unit of each channel.
-    channel_quality
-        Of each channel, the worst within the window.
-    slow
-        Mean of each slow channel.
+    Each channel has its worst quality within the window, each slow channel its mean.
     """
 
     unit: str
@@ -58,13 +49,7 @@ class Window:
 
 @dataclass(frozen=True)
 class _Part:
-    """Cells of a block that lie within a window, if only in part.
-
-    Parameters
-    ----------
-    weights : (n_cells,)
-        Samples of each cell within the window.
-    """
+    """Cells of a block that lie within a window, if only in part, and their samples within it."""
 
     block: SampleBlock
     cells: slice
@@ -159,8 +144,6 @@ class Ring:
 
     def read(self, first_index: int, stop_index: int) -> Window:
         """Calibrate a stretch of consecutive samples.
-
-        Each channel has its worst quality within the stretch, each slow channel its mean.
 
         Raises
         ------

@@ -305,18 +305,19 @@ def _shared(calibration: UnitCalibration) -> UnitCalibration:
 def _side_values(head: BlockHead) -> SideValues:
     n_channels, n_slow = len(head.calibration.channels), len(head.calibration.slow)
     starts = [cell.start for cell in head.cells]
-    edges = [*starts, head.n_samples]
+    edges = [*starts, max(head.n_samples, 1)]  # an empty block has one cell, without a sample
     if (
         starts[:1] != [0]
         or any(start >= stop for start, stop in itertools.pairwise(edges))
         or any(len(cell.slow) != n_slow or cell.ok >> n_channels for cell in head.cells)
     ):
         raise WireError("not_understood", "a block whose cells do not fit its samples")
+    slow = np.array([cell.slow for cell in head.cells], dtype=np.float64)
     return SideValues(
         starts=np.array(starts, dtype=np.int64),
         start_ns=np.array([cell.start_ns for cell in head.cells], dtype=np.int64),
         ok=np.array([[bool(c.ok >> row & 1) for c in head.cells] for row in range(n_channels)]),
-        slow=np.array([cell.slow for cell in head.cells], dtype=np.float64).reshape(-1, n_slow).T,
+        slow=slow.reshape(len(starts), n_slow).T,
     )
 
 

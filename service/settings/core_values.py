@@ -167,19 +167,19 @@ def references_of(unit: UnitSettings) -> list[VectorReference]:
 
 def _bearing_rules(bearing: BearingSettings) -> BearingRules:
     alarms, zones = bearing.alarms, bearing.alarms.zones
-    return BearingRules(
-        shaft_order1=_limits(alarms.shaft_order1_um_pk),
-        oil_temperature=_limits(alarms.oil_temperature_c),
-        shaft_overall=_limits(alarms.shaft_overall_um_pp),
-        bearing_overall=_limits(alarms.bearing_overall_mm_s_rms),
-        eccentricity=_limits(alarms.eccentricity_ratio),
-        gap=_limits(alarms.gap_um),
-        shaft_change=_limits(alarms.shaft_order1_change_um_pk),
-        bearing_change=_limits(alarms.bearing_order1_change_um_pk),
-        shaft_zones=_zones(zones.shaft_um_pp),
-        orbit_zones=_zones(zones.shaft_max_um_pk),
-        bearing_zones=_zones(zones.bearing_mm_s_rms),
-    )
+    return {
+        "shaft_order1": _limits(alarms.shaft_order1_um_pk),
+        "oil_temperature": _limits(alarms.oil_temperature_c),
+        "shaft_overall": _limits(alarms.shaft_overall_um_pp),
+        "bearing_overall": _limits(alarms.bearing_overall_mm_s_rms),
+        "eccentricity": _limits(alarms.eccentricity_ratio),
+        "gap": _limits(alarms.gap_um),
+        "shaft_change": _limits(alarms.shaft_order1_change_um_pk),
+        "bearing_change": _limits(alarms.bearing_order1_change_um_pk),
+        "shaft_zones": _zones(zones.shaft_um_pp),
+        "orbit_zones": _zones(zones.shaft_max_um_pk),
+        "bearing_zones": _zones(zones.bearing_mm_s_rms),
+    }
 
 
 def _limits(found: LimitSettings | None) -> LimitRule | None:
@@ -211,7 +211,7 @@ def _zones(found: ZoneSettings | None) -> LimitRule | None:
 
 def _table(table: ZoneTableSettings) -> ZoneLimits:
     deadband = ZONE_DEADBAND * table.a_b if table.deadband is None else table.deadband
-    return ZoneLimits.between(table.a_b, table.b_c, table.c_d, deadband)
+    return ZoneLimits(table.b_c, table.c_d, deadband, zone_b=table.a_b)
 
 
 def _clock_limit(limit: float, delay_s: float) -> LimitRule:

@@ -21,7 +21,8 @@ def test_random_and_systematic_half_widths_stay_apart_and_combine_by_squares() -
     assert budget.systematic == pytest.approx(math.hypot(4.0, 12.0))
     assert budget.combined == pytest.approx(13.0)
     assert budget.interval == pytest.approx((100.0 - 1.95996 * 13.0, 100.0 + 1.95996 * 13.0))
-    assert budget.random_interval == pytest.approx((100.0 - 1.95996 * 3.0, 100.0 + 1.95996 * 3.0))
+    random = Budget(100.0, budget.lines[:1])
+    assert random.interval == pytest.approx((100.0 - 1.95996 * 3.0, 100.0 + 1.95996 * 3.0))
     assert Budget(5.0, ()).interval == (5.0, 5.0)
 
 

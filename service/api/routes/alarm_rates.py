@@ -9,8 +9,9 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from core.alarms.alarm import PLANT, AlarmEvent
-from core.alarms.statistics import DAY_NS, AlarmFigures, ChatterRule, figures_of, stale_alarms
+from core.alarms.statistics import AlarmFigures, ChatterRule, figures_of, stale_alarms
 from core.limits import AlarmLevel
+from core.units import DAY_NS
 from service.api.auth.declared import Reach, subject_router
 from service.api.context import Context
 from service.api.parameters import Moment, OnlyUnit, ns_from_datetime, require_order, time_query

@@ -18,7 +18,6 @@ from core.change.backtest import (
     decide_all,
     operation_history,
 )
-from core.change.decision import WatchedReadings
 from core.change.settings import ChangeLimits
 from core.condition.operating_state import OperatingLimits
 from core.units import DAY_NS
@@ -233,9 +232,7 @@ def _run(
     later, settled = history.rows(learned, end), is_settled[learned:end]
     run = PeriodRun(period, baseline, {}, doubt or "", far or "")
     decided = {
-        direction: decide_all(
-            WatchedReadings.of(later, settled, direction), run.stiffness(direction), rules.change
-        )
+        direction: decide_all(later, settled, direction, run.stiffness(direction), rules.change)
         for direction in DIRECTIONS
     }
     return replace(run, decided=decided)

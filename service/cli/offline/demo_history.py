@@ -10,7 +10,6 @@ from core.baseline.baseline import BearingBaseline, Origin, QuantityBaseline
 from core.baseline.history import DIRECTIONS, StiffnessHistory
 from core.baseline.learning import learn
 from core.change.backtest import DecisionHistory, OperationHistory, decide_all, operation_history
-from core.change.decision import WatchedReadings
 from core.change.settings import FilmRules
 from core.change.shaft_response import learn_response
 from core.machine.unit import Estimator
@@ -104,8 +103,7 @@ def judged(
     if len(quantities) < len(DIRECTIONS):
         raise ValueError(f"no baseline of {learned.origin.bearing}: too few readings")
     decided = [
-        decide_all(WatchedReadings.of(history, operation.is_settled, q.direction), q, rules.change)
-        for q in quantities
+        decide_all(history, operation.is_settled, q.direction, q, rules.change) for q in quantities
     ]
     deviations = [_deviation(history, operation.is_settled, q) for q in quantities]
     return FilmHistory(

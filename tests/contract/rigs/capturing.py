@@ -3,7 +3,9 @@
 import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +70,21 @@ def block(
         channel_quality=(bad(Reason.SENSOR_FAILURE) if lost else GOOD, GOOD),
         calibration=recorded_unit(unit).calibration,
     )
+
+
+def counted_unit(unit: str) -> RecordedUnit:
+    """The same unit with a device that delivers counts, one for each unit of displacement."""
+    limits = {"full_scale_v": 32768.0, "unit_per_v": 1.0, "ok_min_v": -4e4, "ok_max_v": 4e4}
+    found = recorded_unit(unit)
+    channels = tuple(channel.model_copy(update=limits) for channel in found.channels)
+    return found.model_copy(update={"channels": channels, "sample_type": "int16"})
+
+
+def counted_block(number: int, unit: str = "U1", by: float = 0.0, **how: Any) -> SampleBlock:
+    """The same block as counts; where they are off by a fraction, as engineering units."""
+    found = block(number, unit, by=by, **how)
+    counts = found.counts if by else found.counts.astype(np.int16)
+    return replace(found, counts=counts, calibration=counted_unit(unit).calibration)
 
 
 def raised(

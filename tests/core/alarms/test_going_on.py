@@ -7,7 +7,7 @@ import pytest
 
 from core.alarms.alarm import Alarm, AlarmNews, AlarmState
 from core.alarms.operation import Acknowledge, Action, Comment
-from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel, Limits
 from core.machine.unit import Unit
@@ -17,7 +17,7 @@ SECOND = 1_000_000_000
 OIL = "U1:UJB:oil_temperature"
 LINK = "U1:link:link_lost"
 WATCHED = UnitRules(
-    bearings={"UJB": BearingRules(oil_temperature=LimitRule(Limits(65.0), rule_of(0.0, 0.0)))},
+    bearings={"UJB": {"oil_temperature": LimitRule(Limits(65.0), rule_of(0.0, 0.0))}},
     clock_offset=None,
     clock_drift=None,
     time_stamps=None,

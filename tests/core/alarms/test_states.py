@@ -9,7 +9,7 @@ import pytest
 from core.alarms.alarm import AlarmEvent, AlarmState
 from core.alarms.judgements import OrderVector, VectorReference
 from core.alarms.operation import Acknowledge
-from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.condition.cells import BearingCondition, OperatingPoint
 from core.condition.operating_state import STEADY, OperatingState
@@ -32,13 +32,13 @@ def rule(limits: Limits, states: frozenset[OperatingState] = STEADY) -> LimitRul
 
 RULES = UnitRules(
     bearings={
-        "UJB": BearingRules(
-            shaft_overall=rule(Limits(200.0)),
-            eccentricity=rule(Limits(0.7, 0.9)),
-            gap=rule(Limits(2400.0, alert_below=600.0)),
-            shaft_change=rule(Limits(30.0)),
-            oil_temperature=rule(Limits(60.0), frozenset({FULL})),
-        )
+        "UJB": {
+            "shaft_overall": rule(Limits(200.0)),
+            "eccentricity": rule(Limits(0.7, 0.9)),
+            "gap": rule(Limits(2400.0, alert_below=600.0)),
+            "shaft_change": rule(Limits(30.0)),
+            "oil_temperature": rule(Limits(60.0), frozenset({FULL})),
+        }
     },
 )
 

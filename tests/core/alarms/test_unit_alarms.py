@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from core.alarms.alarm import AlarmState
-from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import AlarmLevel, Limits
 from core.machine.unit import Unit
@@ -22,10 +22,10 @@ RULES = UnitRules(
     channel=rule_of(0.0, 0.0),
     slow_channel=rule_of(0.0, 0.0),
     bearings={
-        "UJB": BearingRules(
-            shaft_order1=LimitRule(Limits(60.0, 90.0), rule_of(0.0, 0.0)),
-            oil_temperature=LimitRule(Limits(65.0, 75.0, 1.0), rule_of(2.0, 2.0)),
-        )
+        "UJB": {
+            "shaft_order1": LimitRule(Limits(60.0, 90.0), rule_of(0.0, 0.0)),
+            "oil_temperature": LimitRule(Limits(65.0, 75.0, 1.0), rule_of(2.0, 2.0)),
+        }
     },
 )
 

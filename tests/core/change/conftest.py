@@ -12,7 +12,7 @@ from core.baseline.history import StiffnessHistory
 from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import DecisionHistory, decide_all, operation_history
-from core.change.decision import INITIAL_DECISION, Decision, WatchedReadings, step
+from core.change.decision import INITIAL_DECISION, Decision, outcomes, step
 from core.change.settings import ChangeLimits
 from core.condition.operating_state import OperatingLimits
 
@@ -31,8 +31,7 @@ class Watch:
 
     def whole(self, limits: ChangeLimits = LIMITS) -> DecisionHistory:
         """Decide over all that came later at once."""
-        readings = WatchedReadings.of(self.later, self.is_settled, "x")
-        return decide_all(readings, self.baseline, limits)
+        return decide_all(self.later, self.is_settled, "x", self.baseline, limits)
 
     def steps(
         self, limits: ChangeLimits = LIMITS, begin: Decision = INITIAL_DECISION
@@ -41,9 +40,10 @@ class Watch:
         found, history = [begin], self.later
         for row in range(len(history)):
             settled = self.is_settled[row : row + 1]
-            one = WatchedReadings.of(history.rows(row, row + 1), settled, "x")
-            [(time_ns, outcome)] = one.compared(self.baseline)
-            found.append(step(found[-1], time_ns, outcome, self.baseline, limits))
+            one = history.rows(row, row + 1)
+            columns = (one.conditions, one.ln_k[0], one.u_random[0], one.outcome[0])
+            [outcome] = outcomes(*columns, settled, self.baseline)
+            found.append(step(found[-1], int(one.time_ns[0]), outcome, self.baseline, limits))
         return found[1:]
 
     def first(self, n: int) -> "Watch":

@@ -185,15 +185,3 @@ def test_eccentricity_and_angle_stay_within_their_stated_uncertainty(lost: tuple
     assert inside.min() >= 0.93 * n_runs
     # and the statement is no empty one: the errors are as large as it says, within 15 %
     assert np.std(off) == pytest.approx(np.sqrt(np.mean(np.square(widths))), rel=0.15)
-
-
-@pytest.mark.parametrize(
-    ("growth_um", "clearance_um"), [(-1.0, 0.0), (math.inf, -1.0), (math.nan, math.nan)]
-)
-def test_limits_and_clearances_that_cannot_be_are_refused(
-    growth_um: float, clearance_um: float
-) -> None:
-    with pytest.raises(ValueError, match="growth_um must be a half-width"):
-        GapAccuracy(growth_um=growth_um)
-    with pytest.raises(ValueError, match="clearance must be positive"):
-        locate_shaft(*gaps(0.0, 0.0), clearance_um)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rigs.tiers import fast_and_long
 
-from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.arrays import FloatArray
 from core.limits import Limits
@@ -28,7 +28,7 @@ def rules(delay_s: float) -> UnitRules:
     """Limits that 60 µm at 1× are within."""
     delay = rule_of(delay_s, 30.0)
     order1, span = (LimitRule(Limits(limit), delay) for limit in (100.0, 200.0))
-    return UnitRules(bearings={"UJB": BearingRules(shaft_order1=order1, shaft_overall=span)})
+    return UnitRules(bearings={"UJB": {"shaft_order1": order1, "shaft_overall": span}})
 
 
 def known_after(

@@ -15,7 +15,6 @@ from core.baseline.learning import learn
 from core.baseline.settings import BaselineSettings
 from core.change.backtest import decide_all, operation_history
 from core.change.cause import UnitReadings, attribute
-from core.change.decision import WatchedReadings
 from core.change.settings import ChangeLimits
 from core.change.shaft_response import film_columns, learn_response
 from core.condition.operating_state import OperatingLimits
@@ -88,8 +87,7 @@ def test_alarms_are_those_that_core_decides(two_units: Any, found: BackTestResul
                 film = baseline.of(direction)
                 assert film is not None
                 later = history.rows(n, len(history))
-                readings = WatchedReadings.of(later, is_settled[n:], direction)
-                decided = decide_all(readings, film, ChangeLimits())
+                decided = decide_all(later, is_settled[n:], direction, film, ChangeLimits())
                 active = np.concatenate([[0], decided.level > 0, [0]])
                 begins = np.flatnonzero(np.diff(active) == 1)
                 expected += [

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 from harness.waiting import at_work
-from rigs import capturing
-from rigs.capturing import Rig, block
+from rigs.capturing import Rig, counted_block, counted_unit
 from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.manifest import RecordedUnit
@@ -17,26 +16,18 @@ from service.recordings.segment import SegmentSettings
 SETTINGS = SegmentSettings(segment_s=10.0, part_s=2.0)
 
 
-def recorded_unit(unit: str) -> RecordedUnit:
-    """A unit with two channels whose samples are counts."""
-    limits = {"full_scale_v": 32768.0, "unit_per_v": 1.0, "ok_min_v": -4e4, "ok_max_v": 4e4}
-    found = capturing.recorded_unit(unit)
-    channels = tuple(channel.model_copy(update=limits) for channel in found.channels)
-    return found.model_copy(update={"channels": channels, "sample_type": "int16"})
-
-
 class TapeRig(Rig):
     """A tape, and what is in its way."""
 
     def __init__(self, root: Path, units: tuple[str, ...]) -> None:
         self.root, self.clock = root, StandingClock()
         self.reason: DropReason | None = None
-        recorded = {unit: recorded_unit(unit) for unit in units}
+        recorded = {unit: counted_unit(unit) for unit in units}
         self.tape = ContinuousRecorder(root, recorded, SETTINGS, self.clock, lambda: self.reason)
 
     def send(self, start: int, stop: int, unit: str = "U1", **how: float) -> None:
         for number in range(start, stop):
-            self.tape.take(block(number, unit, **how))  # type: ignore[arg-type]
+            self.tape.take(counted_block(number, unit, **how))  # type: ignore[arg-type]
 
 
 Running = Callable[..., AbstractAsyncContextManager[TapeRig]]
@@ -63,4 +54,4 @@ def root(folder_in_memory: Path) -> Path:
 
 @pytest.fixture
 def unit() -> RecordedUnit:
-    return recorded_unit("U1")
+    return counted_unit("U1")

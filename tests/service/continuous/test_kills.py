@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs.capturing import BLOCK, block, numbers, samples
+from rigs.capturing import BLOCK, counted_block, numbers, samples
 
 from acquisition.recordings.manifest import RecordedUnit
 from acquisition.recordings.reader import Recording, open_recording
@@ -82,8 +82,8 @@ def recordings_in(root: Path) -> list[Recording]:
 def test_a_kill_at_any_moment_loses_nothing_that_was_synced_and_tells_the_hole(
     tmp_path: Path, unit: RecordedUnit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    blocks = [block(n) for n in range(N_BLOCKS)]
-    later = [block(n) for n in range(N_BLOCKS + 5, N_BLOCKS + 15)]
+    blocks = [counted_block(n) for n in range(N_BLOCKS)]
+    later = [counted_block(n) for n in range(N_BLOCKS + 5, N_BLOCKS + 15)]
     with killed_at(10**9, monkeypatch) as done:
         record(tmp_path / "whole", unit, blocks, [0])
     assert len(done) > 25
@@ -106,7 +106,7 @@ def test_a_kill_at_any_moment_loses_nothing_that_was_synced_and_tells_the_hole(
 def test_a_kill_during_recovery_changes_nothing(
     tmp_path: Path, unit: RecordedUnit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    blocks = [block(n) for n in range(15)]
+    blocks = [counted_block(n) for n in range(15)]
 
     def crashed(root: Path) -> None:
         tape = UnitRecorder(root, unit, SETTINGS)

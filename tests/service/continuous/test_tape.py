@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs.capturing import block, numbers, samples
+from rigs.capturing import counted_block, numbers, samples
 from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.reader import open_recording
@@ -224,7 +224,7 @@ def plant() -> Plant:
 async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_more(
     plant: Plant,
 ) -> None:
-    await plant.bus.publish(block(0))
+    await plant.bus.publish(counted_block(0))
     plant.clock.s = pressure.BEHIND_S
     assert plant.pressure.look() is None
     plant.clock.s += 0.1
@@ -232,7 +232,7 @@ async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_mo
 
     await anext(plant.bus.blocks())
     plant.bus.done()
-    await plant.bus.publish(block(1))
+    await plant.bus.publish(counted_block(1))
     plant.clock.s += 0.5 * pressure.BEHIND_S
     assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND  # not well enough yet
     await anext(plant.bus.blocks())
@@ -242,13 +242,13 @@ async def test_blocks_that_wait_long_come_before_recording_until_they_wait_no_mo
 
 async def test_a_queue_that_fills_does_as_well(plant: Plant) -> None:
     for number in range(26):
-        await plant.bus.publish(block(number))
+        await plant.bus.publish(counted_block(number))
     assert plant.pressure.look() is DropReason.ANALYSIS_BEHIND
 
 
 async def test_questions_are_given_up_before_samples_are(plant: Plant) -> None:
     plant.refuses_questions = False
-    await plant.bus.publish(block(0))
+    await plant.bus.publish(counted_block(0))
     plant.clock.s = 10 * pressure.BEHIND_S
     assert plant.pressure.look() is None
     plant.refuses_questions = True

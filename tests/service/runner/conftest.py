@@ -13,7 +13,7 @@ from rigs.standing_clock import StandingClock
 
 from acquisition.recordings.manifest import RecordedChannel, RecordedUnit
 from acquisition.recordings.writer import RecordingWriter
-from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
 from core.machine.channel import Channel, Measurand
@@ -141,7 +141,7 @@ def block_number(number: int, unit: str = "U1", rate_hz: float = RATE_HZ) -> Sam
 
 RULES = UnitRules(
     channel=rule_of(2.0, 4.0),
-    bearings={"UJB": BearingRules(LimitRule(Limits(60.0, 90.0, 5.0), rule_of(0.0, 0.0)))},
+    bearings={"UJB": {"shaft_order1": LimitRule(Limits(60.0, 90.0, 5.0), rule_of(0.0, 0.0))}},
 )
 """A block lasts 1.28 s, a refresh takes 8.96 s; the shaft of :func:`block_number` moves 50 µm."""
 

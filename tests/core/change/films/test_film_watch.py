@@ -9,7 +9,7 @@ import pytest
 
 from core.baseline.history import ReadingOutcome
 from core.change.backtest import decide_all, last_decision, last_operation, operation_history
-from core.change.decision import JUDGED, Verdict, WatchedReadings
+from core.change.decision import JUDGED, Verdict
 from core.change.film_judge import FilmFinding, alarm_condition
 from core.change.film_reading import film_reading
 from core.change.settings import FilmRules
@@ -38,7 +38,7 @@ def test_results_one_by_one_are_judged_as_their_whole_history_is(
     assert [n.reading.condition.is_settled for n in news] == settled.tolist()
     for row, direction in enumerate("xy"):
         learned = films.baseline.of(direction)
-        whole = decide_all(WatchedReadings.of(said, settled, direction), learned, rules.change)
+        whole = decide_all(said, settled, direction, learned, rules.change)
         findings = [n.findings[row] for n in news]
         assert [f.verdict for f in findings] == whole.verdict.tolist()
         assert [f.level or 0 for f in findings] == whole.level.tolist()

@@ -7,7 +7,7 @@ import pytest
 from rigs.blocks import of_unit
 from rigs.racks import AMPLITUDES, GAPS, K_B, RATE_HZ, SLOW, VORTEX, blocks_of, polls, watch
 
-from core.alarms.rules import BearingRules, LimitRule, UnitRules, rule_of
+from core.alarms.rules import LimitRule, UnitRules, rule_of
 from core.alarms.unit_alarms import UnitAlarms
 from core.limits import Limits
 from core.machine.channel import Channel, Measurand
@@ -222,7 +222,7 @@ def test_a_step_of_vibration_is_an_alarm_within_half_a_minute_and_its_delay(
     unit: Unit, rack, first: int, delay_s: float
 ) -> None:
     limits = LimitRule(Limits(100.0), rule_of(delay_s, 30.0))
-    board = UnitAlarms(unit, UnitRules(bearings={"UJB": BearingRules(shaft_order1=limits)}))
+    board = UnitAlarms(unit, UnitRules(bearings={"UJB": {"shaft_order1": limits}}))
     monitor, n_before = rack(averaging=PollSettings()), 40 + first
     values = np.repeat([[60.0], [50.0], [20.0], [10.0]], n_before + 12, axis=1)
     values[0, n_before:] = 120.0
