@@ -57,6 +57,7 @@ check: lint types contracts docs
 lint: develop
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
+	! grep -rnwiE --include='*.py' -f .ci/banned-phrases core acquisition service
 
 types: develop
 	$(BIN)/mypy

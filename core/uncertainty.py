@@ -116,7 +116,7 @@ def random_line(name: str, standard: float, freedoms: float = math.inf) -> Budge
 
 
 def systematic_line(name: str, half_width: float, sensitivity: float) -> BudgetLine:
-    """Contribution of which only limits are known."""
+    """Contribution with known limits only, uniformly distributed."""
     return BudgetLine(name, Kind.SYSTEMATIC, Distribution.UNIFORM, half_width, sensitivity)
 
 

@@ -151,7 +151,7 @@ class CounterFollower:
         return [PlacedFrame(f.part, f.data, self._nearest(f, index)) for f in frames]
 
     def _is_gap(self, frames: Sequence[_CountedFrame], widest: _CountedFrame) -> bool:
-        """Whether the same count goes on: it went up, has wrapped, or reports its restarts."""
+        """Whether the same count continues: it increased, wrapped, or reports its restarts."""
         axis, reports = self._axis, self._plan.reports_epoch
         if reports and all(frame.epoch is None for frame in frames):
             return True
@@ -164,7 +164,7 @@ class CounterFollower:
         return abs(deviation) <= axis.allowance(at_ns, JUMP_TOLERANCE)
 
     def _resumes(self, frame: _CountedFrame, epoch: int | None) -> bool:
-        """Whether a count goes on that was left for another one within the last second."""
+        """Whether a count continues that another one replaced within the last second."""
         if self._left is None:
             return False
         index, modulus, left_ns, left_epoch = self._left

@@ -47,7 +47,7 @@ class DuplicateSenderDetector:
         self._judge()
 
     def note_return(self) -> None:
-        """Note that a count goes on that another one had replaced: no single device does that."""
+        """Note that a replaced count continues: no single device does that."""
         self._end_window(contrary=True)
 
     def _judge(self) -> None:

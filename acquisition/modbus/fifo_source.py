@@ -36,7 +36,7 @@ class FifoSettings(LinkSettings):
         A device without a new sample, or a queue that never runs empty, for longer than this is
         not connected.
     loss_tolerance_s
-        For a device that does not count: a loss shorter than this cannot be told from jitter.
+        For a device that does not count: a loss shorter than this is indistinguishable from jitter.
     """
 
     poll_period_s: float = 0.005
@@ -82,7 +82,7 @@ class FifoSource:
                 yield blocks
 
     async def _begin(self) -> None:
-        """Discard samples that cannot be told from new ones any more."""
+        """Discard samples that are no longer distinguishable from new ones."""
         self._channels.forget()
         uncounted = not self._layout.has_counter
         if uncounted and self._connections:

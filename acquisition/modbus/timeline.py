@@ -10,8 +10,8 @@ _US_PER_S = 1_000_000
 _TOLERANCE = ClockTolerance()
 
 _MAX_MISCOUNTED = 8
-"""Slots in a row of which only the sequence number may be wrong; a device that counts otherwise for
-longer has been reset."""
+"""Longest run of slots whose sequence number alone may be wrong; a longer run means that the device
+was reset."""
 
 
 class Refusal(StrEnum):

@@ -89,7 +89,7 @@ class ConfinedProcess:
                 os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         for stream in (self.input, self.output, self._log):
-            with suppress(OSError):  # a request that was not taken any more
+            with suppress(OSError):  # the child no longer takes requests
                 stream.close()
 
 

@@ -78,8 +78,8 @@ def write_rows(recording: Recording, kind: ExportFormat, sink: Path | RawIOBase)
     Raises
     ------
     ConfigError
-        If a channel has the name of a column of every export, or a file of the recording cannot be
-        read any more.
+        If a channel has the name of a column of every export, or a file of the recording is
+        unreadable.
     """
     schema_of, open_writer = _FORMATS[kind]
     schema = schema_of(recording.manifest)
@@ -95,7 +95,7 @@ def export_tables(recording: Recording, schema: Any) -> Iterator[Any]:
 
     Where samples are missing there are no rows: time and index jump. Times are whole microseconds;
     samples of a bad channel, and slow values that cannot be, are NaN. Raises ConfigError if a file
-    of the recording cannot be read any more.
+    of the recording is unreadable.
     """
     blocks = recording.raw_blocks()
     while some := list(islice(blocks, _BLOCKS_AT_ONCE)):

@@ -26,7 +26,7 @@ class Recording:
     """A recording whose files are those of its manifest; see :func:`open_recording`.
 
     The Parquet files are read in the confined child process. All methods raise ConfigError if a
-    file cannot be read any more.
+    file has become unreadable.
     """
 
     folder: Path

@@ -155,7 +155,7 @@ class RecordingSource:
         Raises
         ------
         ConfigError
-            While iterating, if a file cannot be read any more.
+            While iterating, if a file has become unreadable.
         """
         if self._start_s is None:
             self._start_s = self._clock.monotonic_s()

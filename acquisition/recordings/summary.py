@@ -50,7 +50,7 @@ def summary_of(recording: Recording) -> RecordingSummary:
     Raises
     ------
     ConfigError
-        If they cannot be read any more.
+        If they have become unreadable.
     """
     rate_hz, ids = recording.manifest.rate_hz, [c.id for c in recording.manifest.channels]
     first: BlockHead | None = None

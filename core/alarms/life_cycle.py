@@ -15,7 +15,7 @@ Timers = tuple[DelayTimer, DelayTimer]
 def update(
     alarm: Alarm, condition: Judgement, now_ns: int, rule: AlarmRule
 ) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """Update an alarm by what is found now.
+    """Update an alarm with the newest finding.
 
     While the condition is unknown, an active alarm stays active and a pending one pending, with its
     delay stopped. While it is suppressed, level and value stay those that were known last.

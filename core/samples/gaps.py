@@ -1,7 +1,7 @@
 """Where every offered sample went: gaps, outages, restarts, and counts that begin again.
 
-Where a device goes on counting, what is missing is counted by its index and exact. Where it counts
-anew, only times are left: the number of missing samples is estimated from them and marked so.
+If a device continues its count, missing samples are counted by index, exactly. If it restarts the
+count, their number is estimated from times and marked as an estimate.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -38,7 +38,7 @@ def amplitude_budget(
 def phase_budget(
     phase_deg: float, vectors: ComplexArray, runout_um_pk: float = 0.0
 ) -> Budget | None:
-    """Uncertainty of the phase, deg, of the mean of vectors (n,); beyond 0 or 360° it goes on.
+    """Uncertainty of the phase, deg, of the mean of vectors (n,), not wrapped at 0 or 360°.
 
     Runout turns the mean by so much at most.
     """

@@ -107,7 +107,7 @@ NoteText = Annotated[
     str,
     StringConstraints(strip_whitespace=True, max_length=500),
     AfterValidator(_printable),
-    Field(examples=["seen, shift engineer told"]),
+    Field(examples=["seen, shift engineer informed"]),
 ]
 
 

@@ -41,7 +41,7 @@ class TimedMonitor(UnitMonitor):
     Parameters
     ----------
     monitor
-        Monitor whose state is taken over; it must not be used any more.
+        Monitor whose state is taken over; it must not be used afterwards.
     """
 
     def __init__(self, monitor: UnitMonitor, timings: Timings) -> None:

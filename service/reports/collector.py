@@ -97,8 +97,8 @@ class EvidenceCollector:
 
     def see(self, news: Sequence[AlarmNews]) -> None:
         """Take snapshots of alarms that are raised or rise in level."""
-        for told in news:
-            for event in told.events:
+        for each in news:
+            for event in each.events:
                 if event.change in ANNOUNCED:
                     self._take(event)
 

@@ -77,7 +77,7 @@ CAUSES = {
     "film": "the oil film itself",
     "oil": "the oil or its cooling, in all films",
     "bracket_or_transducer": "the bracket or a transducer, not the film",
-    "unknown": "not told apart",
+    "unknown": "undetermined",
 }
 
 SAMPLES = {
@@ -222,7 +222,7 @@ def story(case: Case) -> str:
     if cause is None:
         return sentence
     if cause.cause == "unknown":
-        return f"{sentence} What changed is not told apart: {cause.reason}."
+        return f"{sentence} The cause is undetermined: {cause.reason}."
     return f"{sentence} Put down to {CAUSES.get(cause.cause, plain(cause.cause))}: {cause.reason}."
 
 

@@ -39,7 +39,7 @@ class RecordedFeed:
         FeedEndedError
             If the recording has ended.
         ConfigError
-            If a file of the recording cannot be read any more.
+            If a file of the recording has become unreadable.
         ValueError
             If no samples are requested.
         """

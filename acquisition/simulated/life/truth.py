@@ -28,7 +28,7 @@ GAIN_HALF_WIDTH = 0.05
 
 GAP_DRIFT = ((30.0 * 86_400.0, 0.8), (6.0 * 3600.0, 0.5), (600.0, 0.3))
 """Time constant and rms in µm of the error of a displacement from four probes. An assumption: a
-drift of 0.03 % of the gap of 2 mm per kelvin, most of which opposite probes share."""
+drift of 0.03 % of the gap of 2 mm per kelvin, mostly common to opposite probes."""
 
 REFERENCE_UM_RMS = 3.0
 GAP_GAIN_HALF_WIDTH = 0.02

@@ -236,8 +236,8 @@ class ModbusFifoSettings(ModbusLinkSettings):
     def fifo_layout(self, n_channels: int) -> FifoLayout:
         """Return the queues as a value of the adapter.
 
-        Raises `MisfitError` if the channels do not fit into a FIFO read of 31 registers, or cannot
-        be told apart.
+        Raises `MisfitError` if the channels do not fit into a FIFO read of 31 registers, or are not
+        distinguishable.
         """
         n_queues = 1 if self.layout is FifoKind.INTERLEAVED else n_channels
         if len(self.addresses) != n_queues:
