@@ -19,9 +19,9 @@ from service.app.recordings import recording_of, recording_source, selection_of
 from service.cli.offline.reanalysis import (
     LastAverages,
     assessment_model,
-    assessments,
     calibration_differences,
     is_full,
+    refreshes,
 )
 from service.cli.options import UnitOption, fail, one_unit, read_plant_file
 from service.runtime.times import rfc3339
@@ -127,14 +127,14 @@ async def _print(
     with typer.progressbar(
         length=n_samples, label="Analysing", file=sys.stderr, hidden=not sys.stderr.isatty()
     ) as bar:
-        async for assessment in assessments(source, monitor, bar.update):
+        async for refresh in refreshes(source, monitor, bar.update):
             found = True
             if choice is WindowChoice.ALL:
-                printer.put(assessment)
+                printer.put(refresh.assessment())
             else:
-                last.put(assessment)
-    for assessment in last.all():
-        printer.put(assessment)
+                last.put(refresh)
+    for refresh in last.all():
+        printer.put(refresh.assessment())
     printer.end()
     return found
 
@@ -144,7 +144,7 @@ def _table(assessment: Assessment) -> Iterator[str]:
     segments = f"{found.n_segments} of {found.n_segments_wanted} segments"
     yield (
         f"\n{assessment.unit} {assessment.bearing}, {rfc3339(assessment.time_ns)},"
-        f" {segments}{'' if is_full(assessment) else ' (not a full average)'},"
+        f" {segments}{'' if is_full(found) else ' (not a full average)'},"
         f" {found.duration_s:.1f} s, {assessment_model(assessment).quality.level}"
     )
     for reading in assessment_model(assessment).readings.values():

@@ -3,8 +3,9 @@
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 
 from acquisition.source import SampleSource
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import Assessment, AveragingWindow
 from core.monitor.monitor import UnitMonitor
+from core.monitor.refresh import Refresh
 from core.samples.calibration import UnitCalibration
 from service.api.routes.bearings import estimator_names, runout_names
 from service.api.values import (
@@ -69,10 +70,10 @@ def assessment_model(assessment: Assessment) -> AssessmentModel:
     )
 
 
-async def assessments(
+async def refreshes(
     source: SampleSource, monitor: UnitMonitor, passed: Callable[[int], None]
-) -> AsyncIterator[Assessment]:
-    """All that a monitor learns from a source that comes to an end.
+) -> AsyncIterator[Refresh]:
+    """All that a monitor learns from a source that comes to an end; assessed on request.
 
     Parameters
     ----------
@@ -86,29 +87,29 @@ async def assessments(
     """
     async with source.connect() as blocks:
         async for block in blocks:
-            for assessment in monitor.ingest(block):
-                yield assessment
+            for refresh in monitor.refreshes(block):
+                yield refresh
             passed(block.n_samples)
 
 
-def is_full(assessment: Assessment) -> bool:
-    """Whether the average has all the segments it wants."""
-    return assessment.window.n_segments >= assessment.window.n_segments_wanted
+def is_full(averaged: AveragingWindow) -> bool:
+    """Whether an average has all the segments it wants."""
+    return averaged.n_segments >= averaged.n_segments_wanted
 
 
 class LastAverages:
     """The last full average of each bearing; the last one of all while none is full."""
 
     def __init__(self) -> None:
-        self._kept: dict[str, Assessment] = {}
+        self._kept: dict[str, Refresh] = {}
 
-    def put(self, assessment: Assessment) -> None:
-        """Take the next assessment."""
-        kept = self._kept.get(assessment.bearing)
-        if kept is None or is_full(assessment) or not is_full(kept):
-            self._kept[assessment.bearing] = assessment
+    def put(self, refresh: Refresh) -> None:
+        """Take the next one."""
+        kept = self._kept.get(refresh.bearing.id)
+        if kept is None or is_full(refresh.averaged) or not is_full(kept.averaged):
+            self._kept[refresh.bearing.id] = refresh
 
-    def all(self) -> Iterable[Assessment]:
+    def all(self) -> Iterable[Refresh]:
         """One for each bearing, in the order they came."""
         return self._kept.values()
 

@@ -17,7 +17,7 @@ from acquisition.errors import LinkError
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.app.recordings import recording_of, recording_source, recording_writer, selection_of
-from service.cli.offline.reanalysis import assessment_model, assessments
+from service.cli.offline.reanalysis import assessment_model, refreshes
 from service.cli.record import Patience, record_blocks
 from service.measuring.simulated_sources import simulated_feed as feed_of
 from service.settings.core_values import analysis_of, calibration_of, machine_of
@@ -167,8 +167,8 @@ async def test_the_command_prints_every_assessment_of_the_analysis_to_the_last_d
     source = recording_source(opened, selection_of(opened, unit), None, SystemClock())
     monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
     expected = [
-        assessment_model(found).model_dump(mode="json")
-        async for found in assessments(source, monitor, lambda _: None)
+        assessment_model(found.assessment()).model_dump(mode="json")
+        async for found in refreshes(source, monitor, lambda _: None)
     ]
     assert len(expected) == 3 * 5
     assert json.loads(result.stdout) == expected
