@@ -132,6 +132,16 @@ class BlockLayout:
     calibration: UnitCalibration
     sample_types: tuple[str, ...] = ("int16", "float32")
 
+    def rows(self, message: Message) -> tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]]]:
+        """Heads of the blocks of a message as (n_blocks,) of `head_type`, and rejections by row.
+
+        Raises
+        ------
+        ConfigError
+            As :meth:`heads`.
+        """
+        return self._parts(message)[:2]
+
     def heads(self, message: Message) -> list[BlockHead]:
         """Heads of the blocks of a message.
 
@@ -172,10 +182,7 @@ class BlockLayout:
         if len(samples) != n_channels * int(n_samples.sum()):
             raise _malformed()
         samples, stops = samples.reshape(n_channels, -1), np.cumsum(n_samples)
-        begins = np.ones(len(rows), dtype=np.bool_)
-        begins[1:] = rows["epoch"][1:] != rows["epoch"][:-1]
-        begins[1:] |= rows["first_index"][1:] != (rows["first_index"] + n_samples)[:-1]
-        begins[list(rejected)] = True
+        begins = ~follows(rows, rejected)
         is_ok = (rows["ok"] >> np.arange(n_channels)[:, np.newaxis] & 1).astype(np.bool_)
         for first, stop in itertools.pairwise([*np.flatnonzero(begins).tolist(), len(rows)]):
             start, cells = int(stops[first] - n_samples[first]), slice(first, stop)
@@ -209,6 +216,17 @@ class BlockLayout:
                 raise _malformed()
             rejected[row].append(Rejection(reason, n_rejected))
         return np.frombuffer(message[1], type_, head.n), rejected, head.sample_type
+
+
+def follows(
+    rows: npt.NDArray[np.void], rejected: Mapping[int, list[Rejection]]
+) -> npt.NDArray[np.bool_]:
+    """Which blocks follow the one before in the same message, nothing missing or rejected."""
+    found = np.zeros(len(rows), dtype=np.bool_)
+    found[1:] = rows["epoch"][1:] == rows["epoch"][:-1]
+    found[1:] &= rows["first_index"][1:] == (rows["first_index"] + rows["n_samples"])[:-1]
+    found[list(rejected)] = False
+    return found
 
 
 class _BlocksHead(BaseModel):

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from core.condition.probe_axes import Growth
-from core.condition.shaft_readings import measured_growth, position_results
+from core.condition.shaft_readings import measured_growth, measures_growth, position_results
 from core.machine.unit import Bearing, Unit
 from core.monitor.assessment import AnalysisSettings, Assessment, AveragingWindow, OrbitTrace
 from core.monitor.bearing_readings import bearing_readings
@@ -62,8 +62,9 @@ class Refresh:
     @cached_property
     def averaged(self) -> AveragingWindow:
         """The samples that the assessment stands on."""
-        first, last, rows = self.kept.segments[0], self._segment, list(self._rows)
-        n_segments = sum(bool(s.order_usable[ORDER1, rows].all()) for s in self.kept.segments)
+        first, last = self.kept.segments[0], self._segment
+        usable = np.array([segment.order_usable[ORDER1] for segment in self.kept.segments])
+        n_segments = int(usable[:, self._rows].all(axis=1).sum())
         return AveragingWindow(
             epoch=last.epoch,
             first_index=first.first_index,
@@ -78,11 +79,11 @@ class Refresh:
     @property
     def growth(self) -> Growth | None:
         """Thermal growth of the gaps, measured now."""
-        return measured_growth(self._position[0])
+        return measured_growth(self._position[0]) if measures_growth(self.bearing) else None
 
     def assessment(self) -> Assessment:
         """Evaluate the bearing."""
-        newest, rows, coverage = self._segment, list(self._rows), self.averaged.coverage
+        newest, rows, coverage = self._segment, self._rows, self.averaged.coverage
         found = bearing_readings(
             self.unit, self.bearing, self.settings, self.kept, coverage, self._position
         )
@@ -120,9 +121,9 @@ class Refresh:
         return self.kept.frequency_hz is None
 
     @cached_property
-    def _rows(self) -> tuple[int, ...]:
+    def _rows(self) -> list[int]:
         by_id = {c.id: n for n, c in enumerate(self.unit.channels)}
-        return tuple(by_id[id_] for id_ in self.bearing.channels)
+        return [by_id[id_] for id_ in self.bearing.channels]
 
     @cached_property
     def _position(self) -> Found:
@@ -132,7 +133,7 @@ class Refresh:
     def _clipped_share(self) -> Mapping[str, float]:
         if self._is_polled:
             return {}
-        shares = self._segment.clipped_share[list(self._rows)].tolist()
+        shares = self._segment.clipped_share[self._rows].tolist()
         return dict(zip(AMPLITUDES, shares, strict=True))
 
     def _orbit(self, rows: list[int]) -> OrbitTrace | None:
