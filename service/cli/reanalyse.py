@@ -24,6 +24,7 @@ from service.cli.offline.reanalysis import (
     refreshes,
 )
 from service.cli.options import UnitOption, fail, one_unit, read_plant_file
+from service.runtime.process import return_large_pieces
 from service.runtime.times import rfc3339
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 
@@ -67,6 +68,7 @@ def reanalyse(
     """
     plant_file = read_plant_file(plant)
     choice = window or (WindowChoice.ALL if json_output else WindowChoice.LAST)
+    return_large_pieces()
     try:
         opened = recording_of(recording)
         settings = one_unit(plant_file, unit or opened.manifest.unit, plant)
