@@ -132,16 +132,6 @@ class BlockLayout:
     calibration: UnitCalibration
     sample_types: tuple[str, ...] = ("int16", "float32")
 
-    def rows(self, message: Message) -> tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]]]:
-        """Heads of the blocks of a message as (n_blocks,) of `head_type`, and rejections by row.
-
-        Raises
-        ------
-        ConfigError
-            As :meth:`heads`.
-        """
-        return self._parts(message)[:2]
-
     def heads(self, message: Message) -> list[BlockHead]:
         """Heads of the blocks of a message.
 
@@ -150,7 +140,7 @@ class BlockLayout:
         ConfigError
             If the message is not one of blocks of this layout.
         """
-        rows, rejected, _ = self._parts(message)
+        rows, rejected, _ = self.parts(message)
         n_channels = len(self.calibration.channels)
         numbers, ok_bits = rows[list(HEAD_NUMBERS[:-1])].tolist(), rows["ok"].tolist()
         return [
@@ -173,7 +163,7 @@ class BlockLayout:
         ConfigError
             As :meth:`heads`, and if the samples are not those of the heads.
         """
-        rows, rejected, sample_type = self._parts(message)
+        rows, rejected, sample_type = self.parts(message)
         n_channels, n_samples = len(self.calibration.channels), rows["n_samples"]
         is_possible = ((n_samples > 0) & (n_samples <= len(message[1]))).all()
         if sample_type not in self.sample_types or not is_possible:
@@ -200,9 +190,10 @@ class BlockLayout:
                 rejected=tuple(rejected[first]),
             )
 
-    def _parts(
+    def parts(
         self, message: Message
     ) -> tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]], SampleType | None]:
+        """Heads as (n_blocks,) of `head_type`, rejections by row, and the type of the samples."""
         try:
             head = _BlocksHead.model_validate(message[0])
         except ValidationError as error:

@@ -56,9 +56,9 @@ class Recording:
             yield from self._layout.heads(message)
 
     def rows(self) -> Iterator[tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]]]]:
-        """The same, some hundred at once; see `BlockLayout.rows`."""
+        """The same, some hundred at once; see `BlockLayout.parts`."""
         for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
-            rows, rejected = self._layout.rows(message)
+            rows, rejected, _ = self._layout.parts(message)
             if rows.size:
                 yield rows, rejected
 
