@@ -140,7 +140,7 @@ class BlockLayout:
         ConfigError
             If the message is not one of blocks of this layout.
         """
-        rows, rejected, _ = self._parts(message)
+        rows, rejected, _ = self.parts(message)
         n_channels = len(self.calibration.channels)
         numbers, ok_bits = rows[list(HEAD_NUMBERS[:-1])].tolist(), rows["ok"].tolist()
         return [
@@ -163,7 +163,7 @@ class BlockLayout:
         ConfigError
             As :meth:`heads`, and if the samples are not those of the heads.
         """
-        rows, rejected, sample_type = self._parts(message)
+        rows, rejected, sample_type = self.parts(message)
         n_channels, n_samples = len(self.calibration.channels), rows["n_samples"]
         is_possible = ((n_samples > 0) & (n_samples <= len(message[1]))).all()
         if sample_type not in self.sample_types or not is_possible:
@@ -172,10 +172,7 @@ class BlockLayout:
         if len(samples) != n_channels * int(n_samples.sum()):
             raise _malformed()
         samples, stops = samples.reshape(n_channels, -1), np.cumsum(n_samples)
-        begins = np.ones(len(rows), dtype=np.bool_)
-        begins[1:] = rows["epoch"][1:] != rows["epoch"][:-1]
-        begins[1:] |= rows["first_index"][1:] != (rows["first_index"] + n_samples)[:-1]
-        begins[list(rejected)] = True
+        begins = ~follows(rows, rejected)
         is_ok = (rows["ok"] >> np.arange(n_channels)[:, np.newaxis] & 1).astype(np.bool_)
         for first, stop in itertools.pairwise([*np.flatnonzero(begins).tolist(), len(rows)]):
             start, cells = int(stops[first] - n_samples[first]), slice(first, stop)
@@ -193,9 +190,10 @@ class BlockLayout:
                 rejected=tuple(rejected[first]),
             )
 
-    def _parts(
+    def parts(
         self, message: Message
     ) -> tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]], SampleType | None]:
+        """Heads as (n_blocks,) of `head_type`, rejections by row, and the type of the samples."""
         try:
             head = _BlocksHead.model_validate(message[0])
         except ValidationError as error:
@@ -209,6 +207,17 @@ class BlockLayout:
                 raise _malformed()
             rejected[row].append(Rejection(reason, n_rejected))
         return np.frombuffer(message[1], type_, head.n), rejected, head.sample_type
+
+
+def follows(
+    rows: npt.NDArray[np.void], rejected: Mapping[int, list[Rejection]]
+) -> npt.NDArray[np.bool_]:
+    """Which blocks follow the one before in the same message, nothing missing or rejected."""
+    found = np.zeros(len(rows), dtype=np.bool_)
+    found[1:] = rows["epoch"][1:] == rows["epoch"][:-1]
+    found[1:] &= rows["first_index"][1:] == (rows["first_index"] + rows["n_samples"])[:-1]
+    found[list(rejected)] = False
+    return found
 
 
 class _BlocksHead(BaseModel):

@@ -2,23 +2,28 @@
 
 import hashlib
 import stat
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
 
 from acquisition.delivery.blocks import RawBlock, cells_of
 from acquisition.errors import ConfigError
 from acquisition.recordings.manifest import (
     BLOCKS,
+    MAX_BLOCK_SAMPLES,
+    MAX_INDEX,
     Manifest,
     Progress,
     RecordedFile,
     read_manifest,
 )
-from acquisition.recordings.messages import BlockHead, BlockLayout, Message
+from acquisition.recordings.messages import BlockHead, BlockLayout, Message, follows
 from acquisition.recordings.reading import confined_messages
-from core.samples.blocks import SampleBlock
+from core.samples.blocks import Rejection, SampleBlock
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,13 @@ class Recording:
         """All blocks without their samples."""
         for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
             yield from self._layout.heads(message)
+
+    def rows(self) -> Iterator[tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]]]]:
+        """The same, some hundred at once; see `BlockLayout.parts`."""
+        for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
+            rows, rejected, _ = self._layout.parts(message)
+            if rows.size:
+                yield rows, rejected
 
     @cached_property
     def _layout(self) -> BlockLayout:
@@ -96,16 +108,29 @@ def _require_file(path: Path, expected: RecordedFile) -> None:
 def _require_lengths(recording: Recording) -> None:
     """Go through the blocks without their samples: each must be possible, all must add up."""
     path, manifest = recording.folder / BLOCKS, recording.manifest
-    n_samples, progress = 0, Progress()
-    for number, head in enumerate(recording.heads()):
-        try:
-            if len(head.ok) > len(manifest.channels):
-                raise ConfigError("OK bits of more than the recorded channels")
-            progress = progress.after(head.epoch, head.first_index, head.n_samples, head.rejected)
-        except ConfigError as error:
-            raise ConfigError(f"{path}: block {number}: {error}") from error
-        n_samples += head.n_samples
+    n_samples, n_blocks, progress = 0, 0, Progress()
+    for rows, rejected in recording.rows():
+        first_index, length = rows["first_index"], rows["n_samples"]
+        has_more = rows["ok"] >> len(manifest.channels) != 0
+        is_plain = follows(rows, rejected) & ~has_more & (first_index <= MAX_INDEX)
+        is_plain &= (length >= 1) & (length <= MAX_BLOCK_SAMPLES)
+        for row in np.flatnonzero(~is_plain).tolist():
+            try:
+                if has_more[row]:
+                    raise ConfigError("OK bits of more than the recorded channels")
+                before = progress if row == 0 else _end_of(rows[row - 1])
+                epoch, first, n = rows[["epoch", "first_index", "n_samples"]][row].tolist()
+                before.after(epoch, first, n, rejected.get(row, ()))
+            except ConfigError as error:
+                raise ConfigError(f"{path}: block {n_blocks + row}: {error}") from error
+        progress = _end_of(rows[-1])
+        n_samples, n_blocks = n_samples + int(length.sum()), n_blocks + len(rows)
     if n_samples != manifest.n_samples:
         raise ConfigError(
             f"{path}: {n_samples} samples in all, the manifest says {manifest.n_samples}"
         )
+
+
+def _end_of(row: np.void) -> Progress:
+    stop_index = int(row["first_index"]) + int(row["n_samples"])
+    return Progress(epoch=int(row["epoch"]), stop_index=stop_index)

@@ -22,6 +22,8 @@ from core.uncertainty import (
     with_budgets,
 )
 
+_NO_GAPS = (NOT_MEASURED, NOT_MEASURED)
+
 
 def position_results(
     unit: Unit, bearing: Bearing, segments: Sequence[Segment], last_growth: Growth | None
@@ -48,6 +50,12 @@ def position_results(
         x, y, bearing.clearance_um, bearing.gap_accuracy, last_growth
     )
     return gaps | centre, gap_budgets | centre_budgets
+
+
+def measures_growth(bearing: Bearing) -> bool:
+    """Whether thermal growth of the gaps can be measured: an axis has opposite probes."""
+    far = [probe_axis(bearing, _NO_GAPS, _NO_GAPS, axis).far for axis in (0, 1)]
+    return far != [None, None]
 
 
 def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:

@@ -9,8 +9,7 @@ import numpy.typing as npt
 
 from core.arrays import ComplexArray, FloatArray
 from core.checks.sensor_checks import stationarity
-from core.condition.probe_axes import Growth
-from core.condition.shaft_readings import position_results, slow_channels, slow_results
+from core.condition.shaft_readings import slow_channels, slow_results
 from core.machine.channel import line_floor_um_pk
 from core.machine.unit import Bearing, Estimator, Unit
 from core.monitor.assessment import AnalysisSettings
@@ -61,18 +60,12 @@ class BearingReadings:
         Where `stiffness` came from, by axes "xx" and "yy".
     spectrum
         At the bins; empty of polls.
-    n_segments
-        Segments in which all four channels were usable.
-    coverage
-        Their share of those that there could have been.
     """
 
     readings: Mapping[str, Reading]
     budgets: Mapping[str, Budget]
     estimators: Mapping[str, Estimator | None]
     spectrum: CrossSpectrum
-    n_segments: int
-    coverage: float
     evidence: Evidence
 
 
@@ -81,8 +74,8 @@ def bearing_readings(
     bearing: Bearing,
     settings: AnalysisSettings,
     kept: KeptSegments,
-    n_expected: int,
-    last_growth: Growth | None = None,
+    coverage: float,
+    position: Found,
 ) -> BearingReadings:
     """Evaluate one bearing over some segments or polls.
 
@@ -90,13 +83,13 @@ def bearing_readings(
     ----------
     kept
         The segments, at least one.
-    n_expected
-        How many segments there could have been.
-    last_growth
-        Thermal growth of the gaps when it was last measured.
+    coverage
+        Share of the segments that there could have been in which all four channels were usable.
+    position
+        From `core.condition.shaft_readings.position_results`.
     """
-    found = _Bearing(unit, bearing, settings, kept, n_expected)
-    readings, budgets, dynamic = found.readings(last_growth)
+    found = _Bearing(unit, bearing, settings, kept, coverage)
+    readings, budgets, dynamic = found.readings(position)
     readings |= found.doubted(readings, budgets, dynamic)
     chosen = {
         axes: preferred_stiffness(readings, bearing.preference, axes) for axes in ("xx", "yy")
@@ -107,8 +100,6 @@ def bearing_readings(
         budgets,
         {axes: estimator for axes, (_, estimator) in chosen.items()},
         found.spectrum or NO_SPECTRUM,
-        found.n_segments,
-        found.coverage,
         found.evidence,
     )
 
@@ -122,11 +113,11 @@ class _Bearing:
         bearing: Bearing,
         settings: AnalysisSettings,
         kept: KeptSegments,
-        n_expected: int,
+        coverage: float,
     ) -> None:
         self._unit, self._bearing, self._settings = unit, bearing, settings
         self._segments = segments = list(kept.segments)
-        self._min_segments = kept.min_segments
+        self._min_segments, self._coverage = kept.min_segments, coverage
         ids = [channel.id for channel in unit.channels]
         rows = self._rows = [ids.index(id_) for id_ in bearing.channels]
         self._usable = np.array([s.order_usable[:, rows] for s in segments])  # (n, 2, 4)
@@ -139,8 +130,7 @@ class _Bearing:
         self.spectrum: CrossSpectrum | None = None
         if kept.frequency_hz is not None:
             self.spectrum = average(kept.frequency_hz, self._bins, self._usable[:, ORDER1])
-        self.n_segments = int(self._whole.sum())
-        self.coverage = self.n_segments / n_expected
+        self._n_segments = int(self._whole.sum())
         self._lines = self._order_lines()
         axes_quality = self._lines[ORDER1].axes_quality(unit.rotation_sense)
         self._doubts = worst((self._steadiness(), axes_quality))
@@ -154,7 +144,7 @@ class _Bearing:
         return Evidence.AMPLITUDE_AND_PHASE if phased else Evidence.AMPLITUDE_ONLY
 
     def readings(
-        self, last_growth: Growth | None
+        self, position: Found
     ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
         """All readings but the preferred stiffness, their budgets, and the film of `dynamic`."""
         unit, segments = self._unit, self._segments
@@ -163,7 +153,7 @@ class _Bearing:
         parts: list[Found] = [
             with_budgets({"speed_rpm": (speed.rpm, speed.budget)}),
             slow_results(segments, slow_channels(unit, self._bearing)),
-            position_results(unit, self._bearing, segments, last_growth),
+            position,
             self._order("order1_", ORDER1),
             with_budgets(self._lines[ORDER1].phases(self._line_quality), "order1_"),
             overall_readings(
@@ -267,7 +257,7 @@ class _Bearing:
         if self.spectrum is None:
             return dict.fromkeys(DYNAMIC_NAMES, missing(Reason.NOT_MEASURED)), {}, None
         settings, quality = self._settings.dynamic, self._line_quality(*range(len(self._rows)))
-        if isinstance(quality, Reading) or not self.n_segments:
+        if isinstance(quality, Reading) or not self._n_segments:
             reason = quality.quality if isinstance(quality, Reading) else quality
             nothing = None, (0.0, 0.0), bad(reason.reason), settings
             return dynamic_readings(self._bearing, *nothing)
@@ -348,7 +338,7 @@ class _Bearing:
             return missing(now.reason)
         if n_segments < self._min_segments:
             return worst([now, few] if self.spectrum is None else [few, now])
-        if self.coverage < self._settings.min_coverage:
+        if self._coverage < self._settings.min_coverage:
             return worst([now, uncertain(Reason.LOW_COVERAGE)])
         return now
 

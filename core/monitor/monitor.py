@@ -4,34 +4,15 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from core.condition.probe_axes import Growth
-from core.condition.shaft_readings import measured_growth
-from core.machine.unit import Bearing, Unit, bearings_with_new_references, require_same_machine
-from core.monitor.assessment import AnalysisSettings, Assessment, AveragingWindow, OrbitTrace
-from core.monitor.bearing_readings import bearing_readings
-from core.monitor.overall_readings import polled_readings, recent_readings
-from core.quality import worst
+from core.machine.unit import Unit, bearings_with_new_references, require_same_machine
+from core.monitor.assessment import AnalysisSettings, Assessment
+from core.monitor.refresh import Refresh
 from core.samples.blocks import BlockMisfitError, SampleBlock
 from core.samples.gaps import Gap, Reach, SampleAccount, outage, restart
 from core.samples.ring import Ring, Window
 from core.spectra.polls import PollTransform
 from core.spectra.segments import Segment, SegmentTransform
-from core.stiffness.order_line import AMPLITUDES
-from core.units import hz_from_rpm, ns_from_s
-
-ORBIT_TURNS = 3
-
-JUDGED = (
-    "order1_shaft_x_um_pk",
-    "order1_shaft_y_um_pk",
-    "order1_bearing_x_um_pk",
-    "order1_bearing_y_um_pk",
-    "stiffness_xx_n_per_m",
-    "stiffness_yy_n_per_m",
-)
-"""The readings whose worst quality is the quality of the assessment."""
 
 
 @dataclass(frozen=True)
@@ -159,7 +140,12 @@ class UnitMonitor:
         return list(self.steps(block))
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
-        """Take a block in and hand over the assessments that it completes, one bearing at a time.
+        """Take a block in and hand over the assessments that it completes, as `refreshes`."""
+        for refresh in self.refreshes(block):
+            yield refresh.assessment()
+
+    def refreshes(self, block: SampleBlock) -> Iterator[Refresh]:
+        """Take a block in and hand over what it completes, one bearing at a time.
 
         Parameters
         ----------
@@ -168,8 +154,8 @@ class UnitMonitor:
 
         Yields
         ------
-        One assessment for each bearing and each hop that the block completes; mostly none. They
-        must all be taken before the next block.
+        One assessment for each bearing and each hop that the block completes, not yet evaluated;
+        mostly none. They must all be taken before the next block.
 
         Raises
         ------
@@ -227,7 +213,7 @@ class UnitMonitor:
         if block.stop_index == self._ring.stop_index:
             self._reach = Reach(block.epoch, block.stop_index, block.stop_ns)
 
-    def _complete_segments(self) -> Iterator[Assessment]:
+    def _complete_segments(self) -> Iterator[Refresh]:
         start, n_samples = self._next_start or 0, self._transform.segment_samples
         while self._ring.holds(start, start + n_samples):
             window = self._ring.read(start, start + n_samples)
@@ -237,81 +223,31 @@ class UnitMonitor:
             n_results = segment.stop_index // self._transform.result_samples
             if n_results != self._n_results:
                 self._n_results = n_results
-                for bearing in self.unit.bearings:
-                    yield self._assess(bearing, segment, window)
+                yield from self._refreshes(segment, window)
+
+    def _refreshes(self, newest: Segment, window: Window) -> Iterator[Refresh]:
+        n_wanted, kept = self._transform.n_segments, self._transform.snapshot()
+        n_possible = 1 + (newest.first_index - self._first_start) // self._transform.hop_samples
+        for bearing in self.unit.bearings:
+            refresh = Refresh(
+                unit=self.unit,
+                bearing=bearing,
+                settings=self._settings,
+                kept=kept,
+                newest=window,
+                n_expected=min(n_wanted, n_possible),
+                n_voided=self._n_voided,
+                last_growth=self._growth.get(bearing.id),
+            )
+            if refresh.growth is not None:
+                self._growth[bearing.id] = refresh.growth
+            yield refresh
 
     def _note_start(self, start: int) -> None:
         self._starts.append(start)
         n_samples = 2 * self._transform.n_segments * self._transform.hop_samples
         while self._starts[0] <= start - n_samples:
             self._starts.popleft()
-
-    def _assess(self, bearing: Bearing, newest: Segment, window: Window) -> Assessment:
-        transform, first_index = self._transform, self._transform.segments[0].first_index
-        polled = transform.frequency_hz is None
-        n_possible = 1 + (newest.first_index - self._first_start) // transform.hop_samples
-        found = bearing_readings(
-            self.unit,
-            bearing,
-            self._settings,
-            transform,
-            min(transform.n_segments, n_possible),
-            self._growth.get(bearing.id),
-        )
-        growth = measured_growth(found.readings)
-        if growth is not None:
-            self._growth[bearing.id] = growth
-        rows = self._rows(bearing)
-        shares = {} if polled else zip(AMPLITUDES, newest.clipped_share[rows].tolist(), strict=True)
-        return Assessment(
-            unit=self.unit.id,
-            bearing=bearing.id,
-            time_ns=newest.stop_ns,
-            window=AveragingWindow(
-                epoch=newest.epoch,
-                first_index=first_index,
-                stop_index=newest.stop_index,
-                n_segments=found.n_segments,
-                n_segments_wanted=transform.n_segments,
-                n_voided=self._n_voided,
-                coverage=found.coverage,
-                duration_s=(newest.stop_index - first_index) / self.unit.rate_hz,
-            ),
-            speed_source=newest.speed.source,
-            quality=worst(r.quality for name, r in found.readings.items() if name in JUDGED),
-            readings=found.readings,
-            budgets=found.budgets,
-            estimators=found.estimators,
-            spectrum=found.spectrum,
-            orbit=None if polled else self._orbit(bearing, newest, window),
-            runout={
-                "shaft_x": newest.runout[bearing.shaft_x],
-                "shaft_y": newest.runout[bearing.shaft_y],
-            },
-            clipped_share=dict(shares),
-            evidence=found.evidence,
-            recent=(
-                polled_readings(list(transform.segments)[-transform.result_samples :], rows)
-                if polled
-                else recent_readings(newest, rows, self.unit.rate_hz)
-            ),
-        )
-
-    def _rows(self, bearing: Bearing) -> list[int]:
-        by_id = {c.id: n for n, c in enumerate(self.unit.channels)}
-        return [by_id[id_] for id_ in bearing.channels]
-
-    def _orbit(self, bearing: Bearing, newest: Segment, window: Window) -> OrbitTrace | None:
-        rows = self._rows(bearing)[:2]
-        if newest.speed.rpm.value is None or not newest.usable[rows].all():
-            return None
-        n_samples = round(ORBIT_TURNS / hz_from_rpm(newest.speed.rpm.value) * self.unit.rate_hz)
-        start = max(window.n_samples - n_samples, 0)
-        signs = np.array([[self.unit.channels[row].direction] for row in rows], dtype=np.float32)
-        traces = signs * window.samples[rows, start:]
-        traces -= traces.mean(axis=1, keepdims=True)
-        start_ns = window.start_ns + ns_from_s(start / window.rate_hz)
-        return OrbitTrace(start_ns, window.rate_hz, traces[0], traces[1])
 
 
 def _pieces(block: SampleBlock, n_most: int) -> Iterator[SampleBlock]:

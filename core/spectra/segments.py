@@ -1,6 +1,7 @@
 """Segments: each stretch of samples is transformed once, here, and averaged elsewhere."""
 
 import cmath
+import copy
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -188,6 +189,12 @@ class KeptSegments:
     def clear(self) -> None:
         """Drop all segments, after a restart of the sample count."""
         self.segments.clear()
+
+    def snapshot(self) -> "KeptSegments":
+        """The same segments, apart from those that follow."""
+        found = copy.copy(self)
+        found.segments = self.segments.copy()
+        return found
 
     def keep(self, segment: Segment) -> Segment:
         """Keep a segment, and drop what has left the averaging time."""

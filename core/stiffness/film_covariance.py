@@ -242,15 +242,14 @@ class BracketChanges:
     def per(self) -> FloatArray:
         """Change of the film's unknowns with each, (n, 2, 4)."""
         equations = self.fit.equations
-        moments = np.array([equations.moment(change) for change in self.stiffnesses])
-        return equations.solve(self.fit.weight, moments)
+        return equations.solve(self.fit.weight, equations.moment(self.stiffnesses))
 
     @cached_property
     def _left(self) -> ComplexArray:
         """What each leaves over once the film has followed it, (n_lines, n, 2 rows, 2)."""
         relative = (self.stiffnesses / self.fit.equations.bracket_n_per_m).T
         left: ComplexArray = relative[:, :, np.newaxis, np.newaxis] * self.fit.film[:, np.newaxis]
-        left -= np.stack([self.fit.equations.film(unknowns) for unknowns in self.per], axis=1)
+        left -= self.fit.equations.film(self.per)
         return left
 
     @cached_property

@@ -6,6 +6,7 @@ are the entries of the cross-spectrum matrix, so that no segment is needed a sec
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -99,10 +100,10 @@ class NormalEquations:
         return np.asarray(np.abs(self.bracket_n_per_m[:, np.newaxis]) ** 2 * power)
 
     def moment(self, stiffness_n_per_m: ComplexArray) -> FloatArray:
-        """Shaft motion times force of a bracket of some dynamic stiffness, (n_lines, 2, 4)."""
-        cross = stiffness_n_per_m[:, np.newaxis, np.newaxis] * self.cross
+        """Shaft motion times force of brackets of (..., n_lines), (..., n_lines, 2, 4)."""
+        cross = stiffness_n_per_m[..., np.newaxis, np.newaxis] * self.cross
         scale = self.ratio[:, np.newaxis, np.newaxis]
-        return np.concatenate([cross.real, scale * cross.imag], axis=2)
+        return np.concatenate([cross.real, scale * cross.imag], axis=-1)
 
     def solve(self, weight: FloatArray, right: FloatArray) -> FloatArray:
         """Unknowns of both rows, (..., 2, 4).
@@ -131,18 +132,21 @@ class NormalEquations:
         return np.maximum(left, 0.0)
 
     def film(self, unknowns: FloatArray) -> ComplexArray:
-        """Dynamic stiffness of a film at the lines, (n_lines, 2, 2)."""
-        damping = self.ratio[:, np.newaxis, np.newaxis] * unknowns[:, 2:]
-        film: ComplexArray = unknowns[:, :2] + 1j * damping
+        """Dynamic stiffness of films of (..., 2, 4) unknowns at the lines, (n_lines, ..., 2, 2)."""
+        ratio = self.ratio.reshape(-1, *(1,) * unknowns.ndim)
+        film: ComplexArray = unknowns[..., :2] + 1j * (ratio * unknowns[..., 2:])
         return film
 
     def signal_share(self, weight: FloatArray) -> float:
         """Smallest share of motion in the weighted shaft spectra, over directions and rows."""
-        noise, motion = (
-            gram[:, :2, :2].reshape(weight.shape[0], 4) for gram in (self.noise_gram, self.gram)
-        )
-        shares = zip(weight.T @ noise, weight.T @ motion, strict=True)
-        return min(1.0 - _largest_share(part, whole) for part, whole in shares)
+        noise, motion = ((weight.T @ power).tolist() for power in self._powers)
+        return min(1.0 - _largest_share(*row) for row in zip(noise, motion, strict=True))
+
+    @cached_property
+    def _powers(self) -> tuple[FloatArray, FloatArray]:
+        """Of the probes' noise and of the shaft's motion, each (n_lines, 2 × 2)."""
+        noise, motion = (gram[:, :2, :2].reshape(-1, 4) for gram in (self.noise_gram, self.gram))
+        return noise, motion
 
 
 def _gram(shaft: ComplexArray, ratio: FloatArray) -> FloatArray:
@@ -156,14 +160,14 @@ def _gram(shaft: ComplexArray, ratio: FloatArray) -> FloatArray:
     return gram
 
 
-def _largest_share(part: FloatArray, whole: FloatArray) -> float:
+def _largest_share(part: Sequence[float], whole: Sequence[float]) -> float:
     """Largest part in any direction of the whole, two symmetric (2, 2) matrices laid out flat."""
-    determinant = float(whole[0] * whole[3] - whole[1] ** 2)
-    if not determinant > ROUNDING * float(whole[0] * whole[3]):
+    determinant = whole[0] * whole[3] - whole[1] ** 2
+    if not determinant > ROUNDING * whole[0] * whole[3]:
         return 1.0
     # largest root of det(part - share · whole) = 0
-    mixed = float(part[0] * whole[3] + part[3] * whole[0] - 2.0 * part[1] * whole[1])
-    left = float(part[0] * part[3] - part[1] ** 2)
+    mixed = part[0] * whole[3] + part[3] * whole[0] - 2.0 * part[1] * whole[1]
+    left = part[0] * part[3] - part[1] ** 2
     root = math.sqrt(max(mixed**2 - 4.0 * determinant * left, 0.0))
     return (mixed + root) / (2.0 * determinant)
 

@@ -22,9 +22,6 @@ from service.settings.plant import PlantFile
 from service.settings.storage import StoreSettings
 from service.settings.units import UnitSettings
 
-ANALYSED_S = 10.0
-"""Length of the blocks of a recording that is analysed and raises no alarm."""
-
 
 def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
     """Create the writer of a recording of a unit; the first block decides on counts or values.

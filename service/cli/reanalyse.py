@@ -19,9 +19,9 @@ from service.app.recordings import selection_of
 from service.cli.offline.reanalysis import (
     LastAverages,
     assessment_document,
-    assessments,
     calibration_differences,
     is_full,
+    refreshes,
 )
 from service.cli.options import (
     PlantOption,
@@ -32,9 +32,13 @@ from service.cli.options import (
     option,
     progress,
 )
+from service.runtime.process import return_large_pieces
 from service.runtime.times import rfc3339
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
+
+BLOCK_S = 10.0
+"""Length of the blocks of a recording; without alarms to raise, long ones cost least."""
 
 
 class WindowChoice(StrEnum):
@@ -73,6 +77,7 @@ def reanalyse(
     """
     plant_file = load_plant_file(plant)
     choice = window or (WindowChoice.ALL if json_output else WindowChoice.LAST)
+    return_large_pieces()
     opened = open_recording(recording)
     settings = one_unit(plant_file, unit or opened.manifest.unit, plant)
     selection = selection_of(opened, settings)
@@ -82,7 +87,7 @@ def reanalyse(
         typer.echo(f"{recording}: {difference}; used is the {calibration} one", err=True)
     if calibration is CalibrationChoice.PLANT:
         selection = replace(selection, calibration=configured)
-    source = RecordingSource(opened, SystemClock(), selection)
+    source = RecordingSource(opened, SystemClock(), selection, block_s=BLOCK_S)
     machine = replace(machine_of(settings), rate_hz=opened.manifest.rate_hz)
     monitor = UnitMonitor(machine, analysis_of(plant_file.analysis))
     found = _chosen(source, monitor, choice, opened.manifest.n_samples)
@@ -96,13 +101,13 @@ async def _chosen(
 ) -> AsyncIterator[Assessment]:
     last = LastAverages()
     with progress("Analysing", n_samples) as bar:
-        async for assessment in assessments(source, monitor, bar.update):
+        async for refresh in refreshes(source, monitor, bar.update):
             if choice is WindowChoice.ALL:
-                yield assessment
+                yield refresh.assessment()
             else:
-                last.put(assessment)
-    for assessment in last.all():
-        yield assessment
+                last.put(refresh)
+    for refresh in last.all():
+        yield refresh.assessment()
 
 
 async def _print(found: AsyncIterator[Assessment], json_output: bool) -> int:
@@ -126,7 +131,7 @@ def _table(assessment: Assessment) -> Iterator[str]:
     segments = f"{found.n_segments} of {found.n_segments_wanted} segments"
     yield (
         f"\n{assessment.unit} {assessment.bearing}, {rfc3339(assessment.time_ns)},"
-        f" {segments}{'' if is_full(assessment) else ' (not a full average)'},"
+        f" {segments}{'' if is_full(found) else ' (not a full average)'},"
         f" {found.duration_s:.1f} s, {document['quality'].level}"
     )
     for reading in document["readings"].values():

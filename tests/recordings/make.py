@@ -18,7 +18,7 @@ from acquisition.delivery.blocks import BlockAssembler, RawBlock
 from core.monitor.assessment import Assessment
 from core.monitor.monitor import UnitMonitor
 from service.app.recordings import recording_writer, replay_source
-from service.cli.offline.reanalysis import assessments
+from service.cli.offline.reanalysis import refreshes
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import analysis_of, calibration_of, machine_of
 from service.settings.loading import load_plant_file
@@ -86,7 +86,7 @@ def record(unit: UnitSettings) -> Path:
 async def results(folder: Path, unit: UnitSettings, plant: PlantFile) -> list[Assessment]:
     source = replay_source(folder, unit, SystemClock(), None)
     monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
-    return [found async for found in assessments(source, monitor, lambda _: None)]
+    return [found.assessment() async for found in refreshes(source, monitor, lambda _: None)]
 
 
 def main() -> None:

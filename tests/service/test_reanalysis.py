@@ -16,13 +16,14 @@ from acquisition.recordings.reader import open_recording
 from acquisition.recordings.source import RecordingSource
 from core.monitor.assessment import AnalysisSettings, Assessment
 from core.monitor.monitor import UnitMonitor
+from core.monitor.refresh import Refresh
 from core.samples.blocks import Rejection
 from service.app.recordings import recording_writer, selection_of
 from service.cli.offline.reanalysis import (
     LastAverages,
     assessment_document,
-    assessments,
     calibration_differences,
+    refreshes,
 )
 from service.measuring.simulated_sources import simulated_feed
 from service.settings.core_values import calibration_of, machine_of
@@ -77,7 +78,7 @@ async def test_a_recording_analysed_equals_what_was_seen_live_to_the_last_bit(
     recording = open_recording(tmp_path / "run")
     source = RecordingSource(recording, stepped_clock, selection_of(recording, unit))
     monitor, n_passed = UnitMonitor(machine, ANALYSIS), []
-    again = [found async for found in assessments(source, monitor, n_passed.append)]
+    again = [found.assessment() async for found in refreshes(source, monitor, n_passed.append)]
 
     assert len(live) > 3 * 5
     reasons = {reading.quality.reason.value for a in live for reading in a.readings.values()}
@@ -88,28 +89,42 @@ async def test_a_recording_analysed_equals_what_was_seen_live_to_the_last_bit(
     assert sum(n_passed) == recording.manifest.n_samples
 
 
-def assessment(bearing: str, time_ns: int, n_segments: int, sample: Assessment) -> Assessment:
-    window = replace(sample.window, n_segments=n_segments, n_segments_wanted=4)
-    return replace(sample, bearing=bearing, time_ns=time_ns, window=window)
+@pytest.fixture
+def one(unit: UnitSettings, stepped_clock) -> Refresh:
+    monitor, feed = UnitMonitor(machine_of(unit), ANALYSIS), simulated_feed(unit, stepped_clock)
+    return next(monitor.refreshes(sample_block([feed.advance(1024)], calibration_of(unit))))
 
 
 @pytest.fixture
-def sample(unit: UnitSettings, stepped_clock) -> Assessment:
-    monitor, feed = UnitMonitor(machine_of(unit), ANALYSIS), simulated_feed(unit, stepped_clock)
-    return monitor.ingest(sample_block([feed.advance(1024)], calibration_of(unit)))[0]
+def sample(one: Refresh) -> Assessment:
+    return one.assessment()
+
+
+def averaged(one: Refresh, bearing: str, first_index: int, n_usable: int) -> Refresh:
+    """A refresh of four segments in which that many are usable."""
+    kept = one.kept.snapshot()
+    [segment] = kept.segments
+    usable = [np.full_like(segment.order_usable, n < n_usable) for n in range(4)]
+    kept.segments.clear()
+    kept.segments.extend(
+        replace(segment, first_index=first_index, order_usable=each) for each in usable
+    )
+    bearings = {bearing.id: bearing for bearing in one.unit.bearings}
+    return replace(one, bearing=bearings[bearing], kept=kept)
 
 
 @pytest.mark.parametrize(
     ("n_segments", "kept"), [((1, 2, 3), 2), ((1, 4, 4), 2), ((3, 4, 2), 1), ((4, 4, 0), 1)]
 )
 def test_the_last_full_average_is_kept_and_the_last_of_all_until_there_is_one(
-    sample: Assessment, n_segments: tuple[int, ...], kept: int
+    one: Refresh, n_segments: tuple[int, ...], kept: int
 ) -> None:
     last = LastAverages()
     for number, n in enumerate(n_segments):
-        last.put(assessment("UJB", number, n, sample))
-        last.put(assessment("LJB", 70 + number, 4, sample))
-    assert [(a.bearing, a.time_ns) for a in last.all()] == [("UJB", kept), ("LJB", 72)]
+        last.put(averaged(one, "UJB", number, n))
+        last.put(averaged(one, "LJB", 70 + number, 4))
+    found = [(a.bearing, a.window.first_index) for a in (each.assessment() for each in last.all())]
+    assert found == [("UJB", kept), ("LJB", 72)]
 
 
 def test_an_assessment_has_every_digit_in_json(sample: Assessment) -> None:

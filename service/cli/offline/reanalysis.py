@@ -4,8 +4,9 @@ from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from typing import Any
 
 from acquisition.source import SampleSource
-from core.monitor.assessment import Assessment
+from core.monitor.assessment import Assessment, AveragingWindow
 from core.monitor.monitor import UnitMonitor
+from core.monitor.refresh import Refresh
 from core.samples.calibration import UnitCalibration
 from service.api.routes.bearings import estimator_names, runout_names
 from service.api.values import QualityModel, reading_model, window_model
@@ -27,10 +28,10 @@ def assessment_document(assessment: Assessment) -> dict[str, Any]:
     }
 
 
-async def assessments(
+async def refreshes(
     source: SampleSource, monitor: UnitMonitor, passed: Callable[[int], None]
-) -> AsyncIterator[Assessment]:
-    """Yield all assessments of a finite source.
+) -> AsyncIterator[Refresh]:
+    """Yield all evaluations of a finite source; each one is assessed on request.
 
     Parameters
     ----------
@@ -44,30 +45,30 @@ async def assessments(
     """
     async with source.connect() as blocks:
         async for block in blocks:
-            for assessment in monitor.ingest(block):
-                yield assessment
+            for refresh in monitor.refreshes(block):
+                yield refresh
             passed(block.n_samples)
 
 
-def is_full(assessment: Assessment) -> bool:
+def is_full(averaged: AveragingWindow) -> bool:
     """Return whether the average has all its segments."""
-    return assessment.window.n_segments >= assessment.window.n_segments_wanted
+    return averaged.n_segments >= averaged.n_segments_wanted
 
 
 class LastAverages:
     """The last full average of each bearing, or the last average if none is full."""
 
     def __init__(self) -> None:
-        self._kept: dict[str, Assessment] = {}
+        self._kept: dict[str, Refresh] = {}
 
-    def put(self, assessment: Assessment) -> None:
-        """Add the next assessment."""
-        kept = self._kept.get(assessment.bearing)
-        if kept is None or is_full(assessment) or not is_full(kept):
-            self._kept[assessment.bearing] = assessment
+    def put(self, refresh: Refresh) -> None:
+        """Add the next evaluation."""
+        kept = self._kept.get(refresh.bearing.id)
+        if kept is None or is_full(refresh.averaged) or not is_full(kept.averaged):
+            self._kept[refresh.bearing.id] = refresh
 
-    def all(self) -> Iterable[Assessment]:
-        """Return one assessment for each bearing, in order of arrival."""
+    def all(self) -> Iterable[Refresh]:
+        """Return one evaluation for each bearing, in order of arrival."""
         return self._kept.values()
 
 

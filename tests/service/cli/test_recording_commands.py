@@ -20,7 +20,7 @@ from acquisition.recordings.source import RecordingSource
 from core.monitor.monitor import UnitMonitor
 from core.samples.blocks import SampleBlock
 from service.app.recordings import recording_writer, selection_of
-from service.cli.offline.reanalysis import assessment_document, assessments
+from service.cli.offline.reanalysis import assessment_document, refreshes
 from service.cli.record import ReconnectPolicy, record_blocks
 from service.measuring.simulated_sources import simulated_feed as feed_of
 from service.settings.core_values import analysis_of, calibration_of, machine_of
@@ -170,8 +170,8 @@ async def test_the_command_prints_every_assessment_of_the_analysis_to_the_last_d
     source = RecordingSource(opened, SystemClock(), selection_of(opened, unit))
     monitor = UnitMonitor(machine_of(unit), analysis_of(plant.analysis))
     expected = [
-        to_jsonable_python(assessment_document(found))
-        async for found in assessments(source, monitor, lambda _: None)
+        to_jsonable_python(assessment_document(found.assessment()))
+        async for found in refreshes(source, monitor, lambda _: None)
     ]
     assert len(expected) == 3 * 5
     assert json.loads(result.stdout) == expected

@@ -1,0 +1,149 @@
+"""`Refresh`: the evaluation of one bearing over the segments that are averaged at one moment."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from core.condition.probe_axes import Growth
+from core.condition.shaft_readings import measured_growth, measures_growth, position_results
+from core.machine.unit import Bearing, Unit
+from core.monitor.assessment import AnalysisSettings, Assessment, AveragingWindow, OrbitTrace
+from core.monitor.bearing_readings import bearing_readings
+from core.monitor.overall_readings import polled_readings, recent_readings
+from core.quality import worst
+from core.samples.ring import Window
+from core.spectra.segments import ORDER1, KeptSegments, Segment
+from core.stiffness.order_line import AMPLITUDES
+from core.uncertainty import Found
+from core.units import hz_from_rpm, ns_from_s
+
+ORBIT_TURNS = 3
+
+JUDGED = (
+    "order1_shaft_x_um_pk",
+    "order1_shaft_y_um_pk",
+    "order1_bearing_x_um_pk",
+    "order1_bearing_y_um_pk",
+    "stiffness_xx_n_per_m",
+    "stiffness_yy_n_per_m",
+)
+"""The readings whose worst quality is the quality of the assessment."""
+
+
+@dataclass(frozen=True)
+class Refresh:
+    """What one assessment is made of; it changes no more, so that the assessment may come later.
+
+    Parameters
+    ----------
+    kept
+        The segments or polls, at least one.
+    newest
+        Samples of the last one.
+    n_expected
+        How many segments there could have been.
+    n_voided
+        Segments begun and lost since the service started.
+    last_growth
+        Thermal growth of the gaps when it was last measured.
+    """
+
+    unit: Unit
+    bearing: Bearing
+    settings: AnalysisSettings
+    kept: KeptSegments
+    newest: Window
+    n_expected: int
+    n_voided: int
+    last_growth: Growth | None
+
+    @cached_property
+    def averaged(self) -> AveragingWindow:
+        """The samples that the assessment stands on."""
+        first, last = self.kept.segments[0], self._segment
+        usable = np.array([segment.order_usable[ORDER1] for segment in self.kept.segments])
+        n_segments = int(usable[:, self._rows].all(axis=1).sum())
+        return AveragingWindow(
+            epoch=last.epoch,
+            first_index=first.first_index,
+            stop_index=last.stop_index,
+            n_segments=n_segments,
+            n_segments_wanted=self.kept.n_segments,
+            n_voided=self.n_voided,
+            coverage=n_segments / self.n_expected,
+            duration_s=(last.stop_index - first.first_index) / self.unit.rate_hz,
+        )
+
+    @property
+    def growth(self) -> Growth | None:
+        """Thermal growth of the gaps, measured now."""
+        return measured_growth(self._position[0]) if measures_growth(self.bearing) else None
+
+    def assessment(self) -> Assessment:
+        """Evaluate the bearing."""
+        newest, rows, coverage = self._segment, self._rows, self.averaged.coverage
+        found = bearing_readings(
+            self.unit, self.bearing, self.settings, self.kept, coverage, self._position
+        )
+        return Assessment(
+            unit=self.unit.id,
+            bearing=self.bearing.id,
+            time_ns=newest.stop_ns,
+            window=self.averaged,
+            speed_source=newest.speed.source,
+            quality=worst(r.quality for name, r in found.readings.items() if name in JUDGED),
+            readings=found.readings,
+            budgets=found.budgets,
+            estimators=found.estimators,
+            spectrum=found.spectrum,
+            orbit=None if self._is_polled else self._orbit(rows[:2]),
+            runout={
+                "shaft_x": newest.runout[self.bearing.shaft_x],
+                "shaft_y": newest.runout[self.bearing.shaft_y],
+            },
+            clipped_share=self._clipped_share(),
+            evidence=found.evidence,
+            recent=(
+                polled_readings(list(self.kept.segments)[-self.kept.result_samples :], rows)
+                if self._is_polled
+                else recent_readings(newest, rows, self.unit.rate_hz)
+            ),
+        )
+
+    @property
+    def _segment(self) -> Segment:
+        return self.kept.segments[-1]
+
+    @property
+    def _is_polled(self) -> bool:
+        return self.kept.frequency_hz is None
+
+    @cached_property
+    def _rows(self) -> list[int]:
+        by_id = {c.id: n for n, c in enumerate(self.unit.channels)}
+        return [by_id[id_] for id_ in self.bearing.channels]
+
+    @cached_property
+    def _position(self) -> Found:
+        segments = list(self.kept.segments)
+        return position_results(self.unit, self.bearing, segments, self.last_growth)
+
+    def _clipped_share(self) -> Mapping[str, float]:
+        if self._is_polled:
+            return {}
+        shares = self._segment.clipped_share[self._rows].tolist()
+        return dict(zip(AMPLITUDES, shares, strict=True))
+
+    def _orbit(self, rows: list[int]) -> OrbitTrace | None:
+        newest, window = self._segment, self.newest
+        if newest.speed.rpm.value is None or not newest.usable[rows].all():
+            return None
+        n_samples = round(ORBIT_TURNS / hz_from_rpm(newest.speed.rpm.value) * self.unit.rate_hz)
+        start = max(window.n_samples - n_samples, 0)
+        signs = np.array([[self.unit.channels[row].direction] for row in rows], dtype=np.float32)
+        traces = signs * window.samples[rows, start:]
+        traces -= traces.mean(axis=1, keepdims=True)
+        start_ns = window.start_ns + ns_from_s(start / window.rate_hz)
+        return OrbitTrace(start_ns, window.rate_hz, traces[0], traces[1])
