@@ -42,9 +42,9 @@ class Epochs:
 
     What the adapter itself has counted, as the wraps of a narrow counter or restarts that the
     device did not report, is gone when its process ends. Such a count has a number of its own: the
-    second in which the adapter began, plus the restarts since, fewer than one a second. Only a device
-    that reports its epoch, and whose counter is wide enough to need no unwrapping, is on the same
-    axis before and after.
+    second in which the adapter began, plus the restarts since, fewer than one a second. Only
+    a device that reports its epoch, and whose counter is wide enough to need no unwrapping, is on
+    the same axis before and after.
 
     Parameters
     ----------
