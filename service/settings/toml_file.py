@@ -135,7 +135,8 @@ def sentence(
     """Return the message of a mistake."""
     key = "".join(_entry(part) for part in location).lstrip(".")
     found, value = _value(data, location)
-    shown = f"{key} = {_shown(value)}"
+    holds_tables = isinstance(value, list) and any(isinstance(each, dict) for each in value)
+    shown = key if holds_tables else f"{key} = {_shown(value)}"
     meaning = description(schema, location)
     if error["type"] == "extra_forbidden":
         return f"{shown}: unknown key; known here: {', '.join(known_keys(schema, location[:-1]))}"

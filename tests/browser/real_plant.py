@@ -97,7 +97,7 @@ class Plant(ExitStack):
 
     def add_accounts(self) -> None:
         """Add an account of each role, named after it, before anything is started."""
-        with access_of(self._plant_here(), "padwatch users add", creates=True) as access:
+        with access_of(self._plant_here(), creates=True) as access:
             people = AccountService(access, Hashing())
             for role in Role:
                 people.add(role.value, role, PASSWORD, time.time_ns())

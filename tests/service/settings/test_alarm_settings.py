@@ -285,7 +285,7 @@ def test_every_kind_names_a_rule_and_a_reading_that_exist(
         assert kind.rule in names_of(ServiceRules), kind.name
     parts = MagicMock()
     parts.oldest_wait_s, parts.depth, parts.capacity = 0.0, 0, 1
-    look = health_of([], parts, parts, parts, parts)
+    look = health_of([], *([parts] * 9))
     assert set(look().readings) == {kind.reading for kind in SERVICE_KINDS.values()} - {None}
     assert len(ALARM_KINDS) == len(units.ALARM_KINDS) + len(SERVICE_KINDS)
 
