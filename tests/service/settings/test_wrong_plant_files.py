@@ -64,7 +64,7 @@ BRACKET, SOFT = "bracket_stiffness_n_per_m", "bracket_stiffnes = 'soft'"
         ('g = "LJB"', 'g = "UJB"', f"{SIMULATION}bearing[2].bearing = 'UJB'", "used twice"),
         ('id = "UJB"', 'id = "GEN"', f"{UJB}id = 'GEN'", "UJB or LJB or TJB"),
         (f"{BRACKET} =", f"{SOFT}\n{BRACKET} =", f"{UJB}{SOFT}: unknown key", f"{BRACKET}, "),
-        ("[[unit.bearing]]", "[[unit.bearings]]", f"{UNIT_1}bearings = ", "bearings"),
+        ("[[unit.bearing]]", "[[unit.bearings]]", f"{UNIT_1}bearings: unknown key", "bearing, "),
         ("= 600.0", "= = 600.0", "not TOML: Invalid value (column", ""),
         ('"Unit 1, part load"', '"Unit 1', "not TOML", ""),
         ('name = "', 'name = "\\u001b[2J', "plant.name: must not have control characters", ""),

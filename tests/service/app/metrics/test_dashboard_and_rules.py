@@ -16,7 +16,7 @@ from service.cluster.consumer import consumer_metrics
 from service.cluster.replica_metrics import unit_metrics as replica_unit_metrics
 from service.live.live_view import LinkState
 
-DEPLOY = Path(__file__).parents[3] / "deploy"
+DEPLOY = Path(__file__).parents[4] / "deploy"
 DASHBOARD = json.loads((DEPLOY / "grafana" / "padwatch.json").read_text("utf-8"))
 GROUPS = yaml.safe_load((DEPLOY / "prometheus" / "padwatch-rules.yml").read_text("utf-8"))
 RULES = [rule for group in GROUPS["groups"] for rule in group["rules"]]

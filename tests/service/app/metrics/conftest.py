@@ -29,7 +29,7 @@ from service.settings.core_values import calibration_of
 from service.settings.loading import load_plant_file
 from service.settings.plant import PlantFile
 
-DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
+DEMO = Path(__file__).parents[4] / "deploy" / "demo.toml"
 BLOCK = 1024
 N_BLOCKS = 20
 PATIENCE_S = 240.0

@@ -102,7 +102,7 @@ async def test_an_upgrade_is_answered_as_a_plain_request(running, caplog) -> Non
     assert not caplog.records
 
 
-DEMO = Path(__file__).parents[3] / "deploy" / "demo.toml"
+DEMO = Path(__file__).parents[4] / "deploy" / "demo.toml"
 
 
 async def asked(host: str, came_to: str = "127.0.0.1") -> int:
