@@ -46,7 +46,7 @@ def daq(
         typer.Option(help="Read commands UNIT FAULT [COUNT] from standard input; its end ends it."),
     ] = False,
 ) -> None:
-    """Serve units over the protocol of their sources, at the addresses that these read.
+    """Serve units over the protocols of their sources, at the addresses in the plant file.
 
     Prints one JSON line with the address of each unit, then runs until Ctrl-C or SIGTERM.
     Unpaced, a device produces as fast as its reader reads.
@@ -103,7 +103,7 @@ class RunningDaq:
     endpoints
         Address of each unit, as keys and values of its source's settings.
     over
-        Events by unit, set when its recording has been played to the end.
+        Event of each unit, set at the end of its recording.
     gone
         Set when the process has ended.
     """
@@ -128,7 +128,7 @@ class RunningDaq:
 
 @contextmanager
 def held_lines(endpoints: Endpoints) -> Iterator[None]:
-    """Hold the pseudo-terminals of endpoints open, so that their names are not reused.
+    """Keep the pseudo-terminals of endpoints open, so that the system does not reuse their names.
 
     The system reuses the name of a terminal that no program has open. A reader that reconnects
     after its DAQ has ended would otherwise open, and lock, the terminal of another program.

@@ -52,14 +52,11 @@ NewRecording = Annotated[
 ]
 JsonOutput = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 
-FILE_ERRORS = (TomlFileError, TomlFileError)
-"""Errors that name file, line and key; exit code 2."""
-
 USAGE_ERRORS = (
     *(AccessRefusedError, NameRefusedError, PasswordRefusedError),
     *(ClosedError, CertificateError),
 )
-"""Errors that a second try does not cure; exit code 2."""
+"""Errors that persist on a second try; exit code 2."""
 
 FAILURES = (
     *(AcquisitionError, StoreError, BackupError, ReadingsError),
@@ -69,7 +66,7 @@ FAILURES = (
 
 
 class CommandError(Exception):
-    """A command cannot do its work; the message follows the name of the command.
+    """Failure of a command; the message is printed after the name of the command.
 
     Parameters
     ----------
@@ -89,7 +86,7 @@ class CommandGroup(TyperGroup):
         """Run the chosen command."""
         try:
             return super().invoke(ctx)
-        except FILE_ERRORS as error:
+        except TomlFileError as error:
             _end(str(error), 2)
         except CommandError as error:
             _end(f"{_command_name(ctx)}: {error}", error.code)

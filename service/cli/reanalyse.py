@@ -1,4 +1,4 @@
-"""`padwatch reanalyse`: the analysis of a recording, the same as live."""
+"""`padwatch reanalyse`: analyse a recording as live samples are analysed."""
 
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import replace
@@ -42,7 +42,7 @@ BLOCK_S = 10.0
 
 
 class WindowChoice(StrEnum):
-    """Results that are printed."""
+    """Choice of the results that are printed."""
 
     LAST = "last"
     ALL = "all"

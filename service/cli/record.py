@@ -1,4 +1,4 @@
-"""`padwatch record`: the samples of one unit into a recording."""
+"""`padwatch record`: record the samples of one unit."""
 
 import asyncio
 import random
@@ -33,7 +33,7 @@ from service.settings.sources.devices import ModbusVectorSettings
 MAX_SECONDS = 7 * 86_400.0
 
 RETRY_S = 0.5
-"""Longest wait before a lost link is opened again, as in the service."""
+"""Maximum delay before a lost link is reopened, as in the service."""
 
 
 def record(
@@ -76,7 +76,7 @@ def record(
 
 
 class ReconnectPolicy:
-    """Waits before a lost link is opened again, until the planned end of the recording."""
+    """Delay before each attempt to reopen a lost link; no attempts after the planned end."""
 
     def __init__(self, seconds: float, clock: Clock) -> None:
         self._clock = clock

@@ -112,7 +112,7 @@ def set_reference(
 ) -> None:
     """Set the reference of a bearing from now on; a running service applies it within seconds.
 
-    Earlier references are kept. Results that are stored already do not change.
+    Earlier references are kept. Stored results do not change.
     """
     plant = load_plant_file(plant_file)
     machine = machine_of(one_unit(plant, unit, plant_file))

@@ -1,4 +1,4 @@
-"""`padwatch replay`: recordings through the whole service, straight or over a real wire."""
+"""`padwatch replay`: play recordings through the whole service, directly or over a real link."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

@@ -113,7 +113,7 @@ STEPS = 1000
 
 @store_app.callback()
 def store() -> None:
-    """Keep `check` a command of its own."""
+    """Keep `check` a subcommand; typer would drop the name of an only command."""
 
 
 @store_app.command()
@@ -151,14 +151,14 @@ def _lines(plant: PlantFile, found: Sequence[Finding]) -> Iterator[str]:
     yield f"{store_name(plant)}: CORRUPT: {summary}"
 
 
-readings_app = command_group("Readings of the films, out of the store.")
+readings_app = command_group("Export the stored readings of the films.")
 
 Time = Annotated[str | None, option("Such as 2025-01-01T00:00:00Z.")]
 
 
 @readings_app.callback()
 def readings() -> None:
-    """Readings of the films, out of the store."""
+    """Export the stored readings of the films."""
 
 
 @readings_app.command()

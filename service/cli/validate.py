@@ -1,4 +1,4 @@
-"""`padwatch validate`: the tables of the paper beside padwatch's results."""
+"""`padwatch validate`: compare the tables of the paper with padwatch's results."""
 
 import json
 from collections.abc import Iterable, Iterator

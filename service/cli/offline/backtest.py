@@ -38,7 +38,7 @@ from service.store.documents import to_json
 
 YEAR_NS = 365.25 * DAY_NS
 MAX_PERIOD_RATIO = 2.0
-"""Largest ratio of a reading's nominal period to the time between readings without a warning."""
+"""Ratio of a reading's nominal period to the time between readings that raises a warning."""
 
 
 @dataclass
@@ -78,7 +78,7 @@ def run_back_test(
     rules: BackTestRules,
     advanced: Callable[[int], object] = lambda _: None,
 ) -> BackTestResult:
-    """Learn and decide over all histories.
+    """Learn the baselines of all histories and decide on the later readings.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def _add_unit(
 
 
 def _doubts_of(run: BearingRun) -> Iterator[str]:
-    """Yield doubts about baselines, and the reason if the bearing never warmed up."""
+    """Yield the reasons to doubt the baselines of a bearing, such as cold oil throughout."""
     place = " ".join(run.place)
     for p in run.periods:
         if p.doubt:
@@ -288,7 +288,7 @@ def time_ns_of(text: str) -> int:
     Raises
     ------
     ValueError
-        If it is not ISO 8601 or has no offset from UTC, which would have to be guessed.
+        If the text is not ISO 8601 or has no offset from UTC.
     """
     try:
         moment = datetime.fromisoformat(text)
@@ -305,7 +305,7 @@ def event_of(text: str) -> MachineEvent:
     Raises
     ------
     ValueError
-        If it has another form.
+        If the text has another form.
     """
     found = _EVENT.fullmatch(text.strip())
     names = [found["unit"], found["bearing"]] if found else []

@@ -67,7 +67,7 @@ class Learning:
     until_ns: int | None = None
 
     def end_ns(self, begin_ns: int, is_first: bool) -> int:
-        """Return the end of learning that begins at a time."""
+        """Return the end of the learning period that begins at `begin_ns`."""
         if is_first and self.until_ns is not None:
             return self.until_ns
         return begin_ns + round(self.days * DAY_NS)
@@ -80,9 +80,9 @@ class Period:
     Parameters
     ----------
     begin, learned, end
-        Rows from `begin` to `learned` are learned from, rows to `end` are compared.
+        The baseline is learned from rows `begin` to `learned`, and compared with rows up to `end`.
     event
-        Machine event at its beginning; empty for the first.
+        Machine event at the beginning of the period; empty for the first period.
     """
 
     version: int
@@ -118,13 +118,13 @@ class BackTestRules:
     Parameters
     ----------
     operating
-        Shares and times; `rated` replaces its rated figures.
+        Operating limits; `rated` replaces their rated figures.
     rated
         Speed in r/min and power in MW by unit; needed for files without operating states.
     bracket_n_per_m
-        Stiffness of brackets where known.
+        Stiffness of each bracket, if known.
     author, created_ns, estimator
-        Stored with the baselines.
+        Author, time and estimator that are stored with the baselines.
     """
 
     learning: Learning
@@ -141,7 +141,7 @@ class BackTestRules:
 
 @dataclass(frozen=True, eq=False)
 class PeriodRun:
-    """A period with its baseline, and its decisions by direction.
+    """Period with its baseline and its decisions by direction.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ class PeriodRun:
     doubt
         Reason why the service would not accept the baseline by itself; empty if it would.
     far
-        Number of readings far from the baseline, in words; empty if there are none.
+        Text with the number of readings far from the baseline; empty if there are none.
     decided
         Decisions from row `period.learned` on.
     """

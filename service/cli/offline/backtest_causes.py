@@ -21,7 +21,7 @@ class UnitCauses:
     Parameters
     ----------
     runs
-        Runs of all its bearings. Only times at which all have readings are used.
+        Runs of all bearings of the unit. Only times with a reading of every bearing are used.
     """
 
     def __init__(self, unit: str, runs: Sequence[BearingRun], rules: BackTestRules) -> None:
@@ -41,7 +41,7 @@ class UnitCauses:
         self.responses = [self._learned(period) for period in self._periods]
 
     def of(self, bearing: str, direction: str, time_ns: int) -> Attribution:
-        """Return the cause of an alarm, judged with readings up to a time."""
+        """Return the cause of an alarm, judged from the readings up to a given time."""
         if not self._has_amplitudes:
             return NO_AMPLITUDES
         last = int(np.searchsorted(self._time_ns, time_ns, side="right"))

@@ -11,10 +11,10 @@ import pyarrow.compute as pc
 from core.arrays import TimeArray
 
 MAX_NAMED = 10
-"""Rows named in an error."""
+"""Maximum number of rows named in an error."""
 
 MAX_SHOWN = 40
-"""Characters of a wrong value that are shown."""
+"""Maximum number of characters of a wrong value that are shown."""
 
 
 class RowProblems:
@@ -82,7 +82,7 @@ PER_BEARING = (
 AMPLITUDES = ("shaft_um_pk", "bearing_um_pk")
 NUMBERS = (*STIFFNESS, *PER_BEARING, *AMPLITUDES)
 REQUIRED = (*NAMES, *STIFFNESS, "eccentricity_ratio", "oil_temperature_c")
-"""Columns that a file must have beside the time; missing numbers of the others are NaN."""
+"""Required columns besides the time; missing numbers of the other columns are NaN."""
 
 TEXTS = (*NAMES, *OPTIONAL_NAMES)
 HEADINGS = (TIME, *NAMES, *NUMBERS, *OPTIONAL_NAMES)
@@ -97,7 +97,7 @@ MAX_ROWS = 40_000_000
 
 
 class ReadingsError(ValueError):
-    """A file of readings that cannot be used; the message names the place."""
+    """Invalid file of readings; the message names the lines or rows."""
 
 
 def check_headings(headings: Sequence[str]) -> None:

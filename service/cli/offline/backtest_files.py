@@ -33,7 +33,7 @@ from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.films import FilmStore
 
 MAX_NAMES = 2000
-"""Different names in a column: 200 units of at most 8 bearings."""
+"""Maximum number of different names in a column: 200 units of at most 8 bearings."""
 
 IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 """Name of a unit or bearing, as in plant files."""
@@ -56,7 +56,7 @@ def read_histories(
     Raises
     ------
     ReadingsError
-        If it is not valid; names the file and lines (CSV) or rows (Parquet), counted from 1.
+        If the file is invalid; the message names lines (CSV) or rows (Parquet), counted from 1.
     """
     try:
         if not stat.S_ISREG(path.stat().st_mode):

@@ -140,7 +140,7 @@ def _check_numbers(columns: Mapping[str, Any], problems: RowProblems) -> None:
 
 
 def _by_place(columns: Mapping[str, Any]) -> list[tuple[Place, _Rows]]:
-    """Return the rows of each bearing, in their order."""
+    """Return the row numbers of each bearing, in file order."""
     unit, bearing = (columns[key].indices.to_numpy() for key in ("unit", "bearing"))
     key = unit.astype(np.int64) * len(columns["bearing"].dictionary) + bearing
     order = np.argsort(key, kind="stable")
@@ -183,7 +183,7 @@ def _merged(columns: Mapping[str, Any], rows: _Rows, problems: RowProblems) -> B
         return found
 
     def one(key: str, column: npt.NDArray[Any] | None) -> FloatArray:
-        """Return (n,) values of either direction; both must agree where both have a row."""
+        """Return (n,) values common to both directions; they must agree where both have a row."""
         x, y = both(column)
         differs = ~((x == y) | np.isnan(x) & np.isnan(y))
         wrong = np.isin(slots[1], slots[0]) & differs[slots[1]]

@@ -26,16 +26,16 @@ class _Part(BaseModel):
 
 
 class ChangeReport(_Part):
-    """A change of stiffness with its uncertainty."""
+    """Change of a stiffness, with its uncertainty."""
 
     percent: float
     """Change from the baseline under the same condition."""
 
     u_percent: float
-    """Standard uncertainty of the change, for the mean of a healthy film."""
+    """Standard uncertainty of the change if the film is healthy."""
 
     time_scale_h: float
-    """Running hours averaged over."""
+    """Averaging time, in running hours."""
 
 
 class ConditionReport(_Part):
@@ -59,7 +59,7 @@ class CauseReport(_Part):
 
 
 class AlarmReport(_Part):
-    """An alarm."""
+    """Alarm of the back-test, with its largest change and its probable cause."""
 
     unit: str
     bearing: str
@@ -72,19 +72,19 @@ class AlarmReport(_Part):
     """Time of the first danger."""
 
     end: str | None
-    """Time of return; null if it lasted to the end of readings or the next machine event."""
+    """Time of return; null if the alarm lasted to the next machine event or the last reading."""
 
     baseline_version: int
     raised: ChangeReport
     largest: ChangeReport
     condition: ConditionReport
-    """Condition when it was raised."""
+    """Operating condition when the alarm was raised."""
 
     cause: CauseReport
-    """Cause when it was raised."""
+    """Probable cause when the alarm was raised."""
 
     later_cause: CauseReport
-    """Cause judged with the readings of the next 24 hours."""
+    """Probable cause, judged with the readings of the following 24 hours."""
 
 
 class SupportReport(_Part):
@@ -92,11 +92,11 @@ class SupportReport(_Part):
 
     version: int
     event: str
-    """Machine event at its beginning; empty for the first."""
+    """Machine event at the beginning of the period; empty for the first period."""
 
     learned_from: str
     learned_until: str
-    """End of the readings that were learned from, exclusive."""
+    """End of the learning period, exclusive."""
 
     is_learned: bool
     """False if there were too few readings."""
@@ -118,10 +118,10 @@ class FilmReport(_Part):
     bearing: str
     direction: str
     rows: int
-    """Rows of the file."""
+    """Number of rows of the file."""
 
     learning: int
-    """Readings of learning periods; the others are counted by verdict."""
+    """Number of readings in learning periods; all other readings are counted by verdict."""
 
     verdicts: dict[str, int]
     judged_percent: float | None
@@ -157,7 +157,7 @@ class BackTestReport(_Part):
 
 @dataclass(frozen=True)
 class AlarmStretch:
-    """An alarm as rows of its decisions.
+    """Alarm as a range of rows of the decisions.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ class AlarmStretch:
     level
         Highest level.
     danger
-        First row of danger; None if it never was a danger.
+        First row at level danger; None if the alarm stayed at alert.
     largest
         Row of the largest change.
     """

@@ -23,13 +23,13 @@ from service.cli.offline.backtest_cells import MAX_ROWS, ReadingsError, check_he
 
 CHUNK_BYTES = 4_000_000
 MAX_LINE_BYTES = 16_384
-"""Longest line, for a hundred columns; padwatch's own lines have 300 bytes at most."""
+"""Maximum length of a line, enough for a hundred columns; exported lines have up to 300 bytes."""
 
 _BOM = b"\xef\xbb\xbf"
 
 
 Lines = tuple[bytes, TimeArray]
-"""Text of consecutive lines, and the (n,) numbers in the file of those that are not empty."""
+"""Text of consecutive lines, and the (n,) line numbers of the non-empty ones."""
 
 
 def checked_lines(stream: BinaryIO) -> Iterator[Lines]:
@@ -153,7 +153,7 @@ def _trimmed(table: Any) -> Any:
 MAGIC = b"PAR1"
 _ROWS = 65_536
 _BUFFER_BYTES = 1_000_000
-"""Buffer of each column; without it a whole row group would be in memory."""
+"""Size of the buffer of a column; without a buffer, a whole row group is read into memory."""
 
 
 def parquet_batches(stream: BinaryIO) -> Iterator[tuple[Any, int]]:

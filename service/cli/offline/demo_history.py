@@ -137,7 +137,7 @@ def _deviation(
 
 
 def _trends(history: StiffnessHistory, estimator: Estimator) -> dict[str, FloatArray]:
-    """Return the simulated columns of the store's layout."""
+    """Return the simulated trends as columns of the store."""
     columns = {
         "speed_rpm": history.speed_rpm,
         "power_mw": history.power_mw,

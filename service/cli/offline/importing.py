@@ -44,9 +44,9 @@ from service.settings.units import UnitSettings
 
 
 class CanLogDecoder:
-    """Decoder of logged CAN frames; the blocks are those of a CAN source at the time of the log.
+    """Decoder of logged CAN frames into the blocks that a CAN source would have delivered.
 
-    Samples without a time stamp of the device get the time of the log.
+    Samples without a device time stamp get the time of the log.
 
     Raises
     ------
@@ -186,7 +186,7 @@ def _decoded(
 
 
 def _with_all_slow(block: RawBlock, job: ImportJob, unit: UnitSettings) -> RawBlock:
-    """Return the block with all slow channels; those that are not in the file are NaN."""
+    """Return the block with all slow channels; slow channels that the file lacks are NaN."""
     found = dict(zip((column.id for column in job.slow), block.slow, strict=True))
     return replace(block, slow=tuple(found.get(c.id, math.nan) for c in unit.slow_channel))
 

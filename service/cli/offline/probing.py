@@ -38,14 +38,14 @@ PAIR_TYPES = (NumberType.INT32, NumberType.UINT32, NumberType.FLOAT32)
 
 @dataclass(frozen=True)
 class RegisterLook:
-    """One register in all types and byte orders.
+    """Register decoded in every type and byte order.
 
     Parameters
     ----------
     singles
-        int16 and uint16, in both byte orders, by name.
+        Values as int16 and uint16 in both byte orders, by name.
     pairs
-        Types of two registers in each byte order; empty for the last register.
+        Values of types of two registers in each byte order; empty for the last register.
     plausible
         Byte orders in which the pair is a plausible float.
     """
@@ -59,7 +59,7 @@ class RegisterLook:
 
 @dataclass(frozen=True)
 class ValueLook:
-    """One value of a register map.
+    """Value of a register map with its raw registers.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class ValueLook:
 
 @dataclass(frozen=True)
 class RingChannelLook:
-    """Counts of one channel in the newest slot of a block ring, and its state by the device."""
+    """Counts of a channel in the newest slot of a block ring, and its state by the device."""
 
     channel: int
     ok: bool
@@ -99,7 +99,7 @@ class RingLook:
         State of the newest slot: "whole", "torn" (being written), "damaged" (wrong checksum) or
         "blank" (not written since the device started).
     start_ns
-        Device time of its first sample, UTC nanoseconds since 1970.
+        Device time of the first sample, UTC nanoseconds since 1970.
     slow
         Slow values; None for missing ones.
     """

@@ -1,4 +1,4 @@
-"""Analysis of a recording as of live samples, with results in the models of the API."""
+"""Analysis of a recording by the live monitor, with results in the models of the API."""
 
 from collections.abc import AsyncIterator, Callable, Iterable, Sequence
 from typing import Any
@@ -14,7 +14,7 @@ from service.runtime.times import rfc3339
 
 
 def assessment_document(assessment: Assessment) -> dict[str, Any]:
-    """Return an assessment with its parts in the models of the API's ``latest``, to all digits."""
+    """Return an assessment as a JSON document, in the models of the API's ``latest``."""
     return {
         "unit": assessment.unit,
         "bearing": assessment.bearing,
@@ -80,7 +80,7 @@ def calibration_differences(
     Parameters
     ----------
     ids
-        Waveform channels, the same in both.
+        Ids of the waveform channels, common to both calibrations.
     """
     words = []
     for id_, then, now in zip(ids, recorded.channels, configured.channels, strict=True):

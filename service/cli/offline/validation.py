@@ -61,7 +61,7 @@ class SimulatedRow:
 
 @dataclass(frozen=True)
 class MeasuredRow:
-    """A measurement in X direction with the stiffness the paper derives from it, as printed."""
+    """Measurement in X direction and the stiffness that the paper derives from it, as printed."""
 
     table: int | str
     condition: str
@@ -141,7 +141,7 @@ N_CONDITIONS = 5
 
 @dataclass(frozen=True)
 class Row:
-    """A printed figure and the figure of padwatch.
+    """Figure printed in the paper beside the figure of padwatch.
 
     Parameters
     ----------
