@@ -243,42 +243,6 @@ async def test_a_wrong_stamp_is_flagged_and_a_reset_begins_a_new_epoch(server, d
     assert (after.epoch, after.first_index) == (before.epoch + 2, 0)
 
 
-async def test_a_frozen_device_stands_still_for_that_many_slots(server, device, source):
-    async with source.connect() as stream:
-        await anext(stream)
-        server.inject("freeze", 5)
-        device.produce(5)
-        assert device.newest == 0
-        with pytest.raises(LinkError, match="stand still"):
-            await anext(stream)
-    device.produce(1)
-    async with source.connect() as stream:
-        assert (await anext(stream)).first_index == 50
-
-
-@pytest.mark.parametrize(
-    ("fault", "error", "complaint"),
-    [
-        ("exception", LinkError, r"exception 4 \(device failure\)"),
-        ("exception_2", ConfigError, r"exception 2 \(illegal address\)"),
-        ("exception_11", LinkError, "exception 11"),
-        ("cut", LinkError, "closed the connection"),
-        ("silent", LinkError, r"no answer within 1\.0 s"),
-    ],
-)
-async def test_a_reply_that_fails_ends_the_connection_and_loses_nothing(
-    fault, error, complaint, server, device, source
-):
-    async with source.connect() as stream:
-        await anext(stream)
-        server.inject(fault)
-        device.produce(1)
-        with pytest.raises(error, match=complaint):
-            await anext(stream)
-    async with source.connect() as stream:
-        assert (await anext(stream)).first_index == 50
-
-
 @pytest.mark.parametrize("fault", ["shift_map", "word_order"])
 async def test_a_reply_from_a_wrong_map_is_read_again_and_never_believed(
     fault, server, device, source
