@@ -88,7 +88,7 @@ async def scrape(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource
 def evidence_metrics(captures: Captures, evidence: EvidenceCollector) -> Iterator[Metric]:
     """Yield the families of captures and evidence."""
     counts = (
-        ("captures_written", "Captures of samples alarm_context alarms.", captures.n_written),
+        ("captures_written", "Captures of samples around alarms.", captures.n_written),
         ("captures_failed", "Attempts to write such captures in vain.", captures.n_failed),
         ("evidence_written", "Bundles of evidence of alarms.", evidence.n_written),
         ("evidence_failed", "Attempts to write such bundles in vain.", evidence.n_failed),
