@@ -44,7 +44,7 @@ class ChannelLimits:
 
     @classmethod
     def of(cls, channels: Iterable[tuple[float, float, float, float]]) -> "ChannelLimits":
-        """Return limits from (full scale, unit per volt, lowest, highest OK voltage) of channels."""
+        """Return limits from (full scale, unit per volt, lowest, highest OK voltage)."""
         columns = np.array(list(channels), dtype=np.float64).reshape(-1, 4)
         return cls(*(column[:, np.newaxis] for column in columns.T))
 
