@@ -8,14 +8,14 @@ from core.units import ns_from_s
 
 
 class Clock(Protocol):
-    """Wall clock time, monotonic time and sleep."""
+    """Clock with wall clock time, monotonic time and sleep."""
 
     def now_ns(self) -> int:
         """Return the wall clock time in UTC nanoseconds since 1970; it may be set."""
         ...
 
     def monotonic_s(self) -> float:
-        """Return monotonic time in seconds, for deadlines and durations."""
+        """Return monotonic time in seconds from an arbitrary start; for deadlines and durations."""
         ...
 
     async def sleep(self, duration_s: float) -> None:

@@ -121,7 +121,7 @@ class Limits:
         return value < (self._highest_low + self._lowest_high) / 2.0
 
     def of(self, level: AlarmLevel | None, value: float = math.inf) -> float | None:
-        """Return the limit of a level on the side of a value; without a level, the mildest."""
+        """Return a level's limit on the side of a value; without a level, the first limit."""
         if self.is_low(value):
             alert, danger = self.alert_below, self.danger_below
         else:

@@ -82,7 +82,7 @@ _MAX_BINS = 360
 _MIN_BINS = 6
 
 _HOST_STEP_S = 0.5
-"""Smallest step of the host clock that counts as setting; time synchronisation slews the clock."""
+"""Step of the host clock above which the clock counts as set; synchronisation only slews."""
 
 
 class ArrivalModel:
@@ -228,7 +228,7 @@ class HostStamps:
 
 
 _MAX_INTERFACE_DRIFT = 100e-6
-"""Largest relative drift of the interface clock."""
+"""Largest relative drift of the interface clock against the host clock."""
 
 _MAX_EARLY_S = 0.5
 _MAX_LATE_S = 5.0

@@ -190,7 +190,7 @@ def _in_cells(block: SampleBlock, length: int) -> SampleBlock:
 _TOLERANCE = ClockTolerance()
 
 _POSSIBLE_NS = range(946_684_800 * NS_PER_S, 4_102_444_800 * NS_PER_S)
-"""Years 2000 to 2100. A jump of a clock out of this range (1904, 1970, 2106) is a failure."""
+"""Plausible device times, 2000 to 2100; a jump out of them (1904, 1970, 2106) is a failure."""
 
 
 class StampCheck:

@@ -56,7 +56,7 @@ _SLOW: dict[str, dict[str, tuple[float, float]]] = {
 
 
 def canonical(unit: str) -> str:
-    """Return the canonical spelling of a unit; an unknown unit is returned unchanged."""
+    """Return the canonical spelling of a unit; an unknown unit is only stripped of spaces."""
     return _CANONICAL.get(unit.strip(), unit.strip())
 
 

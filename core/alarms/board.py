@@ -43,7 +43,7 @@ RESTARTED, NO_LONGER_WATCHED = "restarted", "no_longer_watched"
 
 
 class AlarmBoard:
-    """Collection of alarms, initially inactive, with their rules; collects news in event order."""
+    """Set of alarms with their rules, initially inactive; records all events in order."""
 
     def __init__(self, watched: Iterable[Watch] = ()) -> None:
         watches = list(watched)
@@ -84,14 +84,14 @@ class AlarmBoard:
         }
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Unshelve the alarms whose shelving time has expired; return the news."""
+        """Unshelve alarms with expired shelving; return the changed alarms with their events."""
         for id_, alarm in self._alarms.items():
             if alarm.shelf is not None:
                 self._note(id_, *expire(alarm, host_ns))
         return self.drain_news()
 
     def operate(self, id_: str, action: Action, host_ns: int) -> list[AlarmNews]:
-        """Apply an action of a person to an alarm; return the news.
+        """Apply an action of a person; return the changed alarm with its events.
 
         Raises
         ------
@@ -138,7 +138,7 @@ class AlarmBoard:
         return self.drain_news()
 
     def drain_news(self) -> list[AlarmNews]:
-        """Return and clear the news since the last call."""
+        """Return the changed alarms and their events since the last call, and clear the list."""
         news, self._news = self._news, []
         return news
 

@@ -68,7 +68,7 @@ def interrupted(alarm: Alarm) -> Alarm:
 
 
 def shown_again(alarm: Alarm) -> Alarm:
-    """Return a no longer hidden alarm, unacknowledged if active (ISA-18.2, G or H to B)."""
+    """Return an alarm after hiding has ended; unacknowledged if active (ISA-18.2, G/H to B)."""
     return replace(alarm, is_acknowledged=alarm.is_acknowledged and alarm.level is None)
 
 

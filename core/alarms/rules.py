@@ -97,7 +97,7 @@ class LimitRule:
         return (*possible, self.limits) if counts and self.limits is not None else possible
 
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
-        """Return the worst judgement by all limits that may be valid; on a tie, the lowest limit's.
+        """Return the worst judgement by the limits that may be valid; of equal ones, the strictest.
 
         Without valid limits the condition is unknown, so a suppressed alarm does not return.
         """

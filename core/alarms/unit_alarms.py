@@ -102,7 +102,7 @@ class UnitAlarms(AlarmBoard):
     def take(
         self, block: SampleBlock, assessments: Iterable[Assessment], host_ns: int
     ) -> list[AlarmNews]:
-        """Judge new assessments, the channels of a block, and the device clock; return the news."""
+        """Judge new assessments, the channels of a block and the device clock; return changes."""
         if self._is_repeated(block):
             return []
         for assessment in assessments:
@@ -140,13 +140,13 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def link(self, is_connected: bool, reason: str | None, host_ns: int) -> list[AlarmNews]:
-        """Update the link alarm and return the news."""
+        """Update the link alarm; return the changed alarm with its events."""
         self._link = (is_connected, reason)
         self._take_link(host_ns)
         return self.drain_news()
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Judge the link and unshelve expired alarms at a host time; return the news."""
+        """Judge the link and unshelve expired alarms at a host time; return the changed alarms."""
         self._take_link(host_ns)
         return super().tick(host_ns)
 

@@ -39,7 +39,7 @@ def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[str
 
 
 SPELL_DAYS = 8
-"""Length of a spell; longer than the correlation time of the readings of a healthy bearing."""
+"""Block length in days for standard errors; longer than the correlation of healthy readings."""
 
 MIN_SPELLS = 3
 

@@ -90,7 +90,7 @@ def bisquare(standardised: FloatArray) -> FloatArray:
 
 
 def absolute_quantile_std(deviation: FloatArray) -> float:
-    """Return the larger standard deviation from the 50 % and 75 % quantiles of |deviation|."""
+    """Return a standard deviation about zero from the 50 % and 75 % quantiles; the larger one."""
     if deviation.size == 0:
         return 0.0
     half, three_quarters = np.quantile(np.abs(deviation), (0.5, 0.75))

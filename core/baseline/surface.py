@@ -105,7 +105,7 @@ def attitude_terms(conditions: FilmConditions) -> FloatArray:
 
 @dataclass(frozen=True)
 class Surface:
-    """Surface with its coefficients."""
+    """Fitted surface: shape, constant offset and spline coefficients."""
 
     shape: SurfaceShape
     offset: float

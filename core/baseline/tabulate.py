@@ -61,9 +61,7 @@ def tabulate(
             CellStatistics(
                 **vars(content),
                 cell=cell,
-                scatter=max(
-                    float(np.median(fit.group_std)), MIN_SCATTER
-                ),  # until `with_scatter` replaces it
+                scatter=max(float(np.median(fit.group_std)), MIN_SCATTER),  # preliminary
                 lasting=0.0,
                 surface_std=float(std[row]),
                 node_std=nodes[row],

@@ -229,9 +229,7 @@ class _Residuals:
         angle = np.radians(self.readings.attitude_deg[self.row])
         outward = np.stack([np.cos(angle) ** 2, np.sin(angle) ** 2])[: len(pair)]
         matrix = np.eye(len(pair)) + np.einsum("in,jn->nij", self.readings.rise[pair], outward)
-        deviation = np.nan_to_num(
-            self.readings.deviation[pair]
-        )  # an unknown deviation counts as no change
+        deviation = np.nan_to_num(self.readings.deviation[pair])  # unknown counts as 0
         gain = np.zeros_like(self.readings.ln_k)
         gain[pair] = np.linalg.solve(matrix, -deviation.T[:, :, np.newaxis])[:, :, 0].T
         return gain

@@ -92,7 +92,7 @@ class FilmMemory:
 
 @dataclass(frozen=True)
 class FilmNews:
-    """New reading of a film with its findings and decisions in x and y."""
+    """Newly judged reading of a film with its findings and decisions in x and y."""
 
     reading: FilmReading
     findings: tuple[FilmFinding, FilmFinding]
@@ -104,7 +104,7 @@ MAX_RECENT = 4 * MEAN_READINGS
 
 
 class FilmJudge:
-    """Judge of the films of one unit, with its active baselines and decisions.
+    """Change detection for the films of one unit, with active baselines and decisions.
 
     `brackets_n_per_m` is the bracket stiffness by bearing.
 
@@ -140,9 +140,7 @@ class FilmJudge:
             self._baselines[bearing] = baseline
         begun = decisions or (INITIAL_DECISION,) * len(DIRECTIONS)
         for direction, decision in zip(DIRECTIONS, begun, strict=True):
-            self._decisions[bearing, direction] = _timeless(
-                decision
-            )  # its times may be of another clock
+            self._decisions[bearing, direction] = _timeless(decision)  # clocks may differ
 
     @property
     def decided(self) -> tuple[FilmDecision, ...]:

@@ -50,7 +50,7 @@ class FilmWatch:
         self.judge.restore(memory.decided)
 
     def take(self, assessments: Sequence[Assessment]) -> tuple[list[Assessment], list[FilmNews]]:
-        """Update with the assessments of all bearings.
+        """Update operation and films with the assessments of all bearings.
 
         Returns
         -------

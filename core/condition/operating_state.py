@@ -188,7 +188,7 @@ def _passed(
     hysteresis: float,
     rated: float,
 ) -> tuple[bool, bool] | None:
-    """Return which of two limits are exceeded; the hysteresis needs a known `before`."""
+    """Return whether each of two limits is exceeded, with hysteresis if `before` is known."""
     if math.isnan(value):
         return None
     lower, upper = (
@@ -232,7 +232,7 @@ class OilSettling:
     has_settled: bool = False
 
     def step(self, operation: Operation, oil_c: float, limits: OperatingLimits) -> "OilSettling":
-        """Return the settling after one temperature (NaN if missing) and its updated operation."""
+        """Return the settling after one temperature (NaN if missing) and its operation step."""
         now_ns = operation.last_ns
         if now_ns is None or operation.at_speed_from_ns is None:
             return NOT_AT_SPEED

@@ -13,7 +13,7 @@ HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 @dataclass(frozen=True)
 class AlarmCount:
-    """Number of alarms on the list.
+    """Number of alarms by state.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class AlarmList(Protocol):
 
     @property
     def revision(self) -> int:
-        """Number that changes with every change of an alarm."""
+        """Revision number; changes with every change of an alarm."""
         ...
 
     @property
@@ -67,7 +67,7 @@ class AlarmList(Protocol):
         ...
 
     def alarm(self, id_: str) -> Alarm:
-        """Return an alarm. Raises `LookupError` if it does not exist."""
+        """Return the alarm with an id. Raises `LookupError` if it does not exist."""
         ...
 
     def is_judged(self, alarm: Alarm) -> bool:
@@ -79,7 +79,7 @@ class AlarmList(Protocol):
         ...
 
     def count(self) -> AlarmCount:
-        """Return the number of alarms."""
+        """Return the number of alarms by state."""
         ...
 
 

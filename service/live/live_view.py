@@ -120,7 +120,7 @@ class LiveView:
     def set_received(
         self, block: SampleBlock, account: SampleAccount, sampled_s: float | None = None
     ) -> None:
-        """Set the newest block of a unit, which arrived at ``sampled_s``; default: now."""
+        """Set the newest block of a unit; ``sampled_s`` is its arrival time, by default now."""
         if block.unit not in self._blocks:
             most = HELD_SAMPLES // max(block.counts.shape[0], 1)
             self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))
@@ -135,7 +135,7 @@ class LiveView:
         )
 
     def set_assessment(self, assessment: Assessment, sampled_s: float | None = None) -> None:
-        """Set the newest result, of samples that arrived at ``sampled_s``; default: now."""
+        """Set the newest result; ``sampled_s`` is the arrival of its samples, by default now."""
         self.revision += 1
         key = (assessment.unit, assessment.bearing)
         since_s = self._clock.monotonic_s() if sampled_s is None else sampled_s

@@ -70,7 +70,7 @@ class SampleWindow:
         return None if channel is None else self.samples.get(channel)
 
     def mean_of(self, slow_channel: str | None) -> Reading:
-        """Return the mean of a slow channel."""
+        """Return the mean reading of a slow channel; missing without such a channel."""
         return self.slow.get(slow_channel or "", missing(Reason.NOT_MEASURED))
 
 
