@@ -228,7 +228,8 @@ class HostStamps:
 
 
 _MAX_INTERFACE_DRIFT = 100e-6
-"""Largest relative drift of the interface clock against the host clock."""
+"""Largest relative drift of the interface clock; the rest of a total of three times this value is
+allowed for the device clock."""
 
 _MAX_EARLY_S = 0.5
 _MAX_LATE_S = 5.0

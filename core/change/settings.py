@@ -14,7 +14,8 @@ MIN_SIGNIFICANCE = 3.0
 
 ALERT_MARGIN, DANGER_MARGIN = 1.0, 3.0
 """Number of standard uncertainties by which a change must exceed its limit. A loss of 5 % must be
-detected within two weeks, with an uncertainty of 0.7 %. An alert precedes a danger by far."""
+detected within two weeks, with an uncertainty of 0.7 %. An alert is raised long before a
+danger."""
 
 
 @dataclass(frozen=True)
