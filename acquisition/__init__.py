@@ -1,1 +1,1 @@
-"""Plant protocols on one side, :class:`core.samples.blocks.SampleBlock` on the other."""
+"""Adapters that convert data of plant protocols to :class:`core.samples.blocks.SampleBlock`."""

@@ -1,4 +1,4 @@
-"""Time as an argument: the program gets the system's, tests get their own."""
+"""Clocks, passed as arguments: the system clock, or a simulated clock in tests."""
 
 import asyncio
 import time
@@ -8,44 +8,44 @@ from core.units import ns_from_s
 
 
 class Clock(Protocol):
-    """Wall time, steady time and waiting."""
+    """Clock with wall clock time, monotonic time and sleep."""
 
     def now_ns(self) -> int:
-        """UTC nanoseconds since 1970; may step."""
+        """Return the wall clock time in UTC nanoseconds since 1970; it may be set."""
         ...
 
     def monotonic_s(self) -> float:
-        """Seconds that never step; for deadlines and durations."""
+        """Return monotonic time in seconds from an arbitrary start; for deadlines and durations."""
         ...
 
     async def sleep(self, duration_s: float) -> None:
-        """Wait."""
+        """Wait for a duration."""
         ...
 
 
 class SystemClock:
-    """The clock of the machine padwatch runs on."""
+    """System clock of the host."""
 
     def now_ns(self) -> int:
-        """UTC nanoseconds since 1970."""
+        """Return the wall clock time in UTC nanoseconds since 1970."""
         return time.time_ns()
 
     def monotonic_s(self) -> float:
-        """Seconds since an arbitrary start."""
+        """Return monotonic time in seconds since an arbitrary start."""
         return time.monotonic()
 
     async def sleep(self, duration_s: float) -> None:
-        """Give the event loop to others for this long."""
+        """Suspend the current task for a duration."""
         await asyncio.sleep(duration_s)
 
 
 class FastClock:
-    """A clock that runs at a multiple of another one's pace; for replays.
+    """Clock that runs faster or slower than a reference clock by a constant factor; for replays.
 
     Parameters
     ----------
     speed
-        Seconds of this clock in a second of the other, above 0.
+        Seconds of this clock per second of the reference clock; above 0.
 
     Raises
     ------
@@ -60,13 +60,13 @@ class FastClock:
         self._start_ns, self._start_s = clock.now_ns(), clock.monotonic_s()
 
     def now_ns(self) -> int:
-        """UTC nanoseconds since 1970, had it always run at this pace since it was made."""
+        """Return the time at creation plus the scaled elapsed time, UTC nanoseconds since 1970."""
         return self._start_ns + ns_from_s(self.monotonic_s())
 
     def monotonic_s(self) -> float:
-        """Its own seconds since it was made."""
+        """Return the scaled seconds since creation."""
         return (self._clock.monotonic_s() - self._start_s) * self._speed
 
     async def sleep(self, duration_s: float) -> None:
-        """Wait for this many of its own seconds."""
+        """Wait for a duration in scaled seconds."""
         await self._clock.sleep(duration_s / self._speed)

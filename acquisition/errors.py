@@ -1,11 +1,11 @@
-"""Errors of sources, by what the caller should do.
+"""Errors of sample sources, classified by the required action of the caller.
 
 ::
 
     AcquisitionError
-    ├─ ConfigError   can never work     → stop trying this source, tell the operator
-    ├─ LinkError     not answering now  → wait, retry
-    └─ FrameError    a wrong frame      → drop it, count it
+    ├─ ConfigError   configuration cannot work  → do not retry; report to the operator
+    ├─ LinkError     device does not respond    → wait, retry
+    └─ FrameError    invalid frame              → drop and count
 """
 
 
@@ -14,12 +14,12 @@ class AcquisitionError(Exception):
 
 
 class ConfigError(AcquisitionError):
-    """The settings and the device can never fit together: wrong magic, version or channel count."""
+    """The settings do not match the device, such as wrong magic, version or channel count."""
 
 
 class LinkError(AcquisitionError):
-    """The device does not answer now; trying later is reasonable."""
+    """The device does not respond; a later attempt may succeed."""
 
 
 class FrameError(AcquisitionError):
-    """The device sent a reply or frame that cannot be right."""
+    """The device sent an invalid reply or frame."""

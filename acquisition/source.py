@@ -1,4 +1,4 @@
-"""`SampleSource`: the port through which samples enter padwatch."""
+"""`SampleSource`: interface of all sources of samples."""
 
 from collections.abc import AsyncIterator, Mapping
 from contextlib import AbstractAsyncContextManager
@@ -10,33 +10,33 @@ from core.samples.blocks import SampleBlock
 class SampleSource(Protocol):
     """Source of the samples of one unit.
 
-    A source may be connected again after it was left; the sample index then shows what it missed.
-    It neither retries nor logs: the runner does both, once for all sources.
+    A source may be reconnected after its context was left; the sample index then contains the gap.
+    A source does not retry and does not log; the runner does both for all sources.
     """
 
     def connect(self) -> AbstractAsyncContextManager[AsyncIterator[SampleBlock]]:
-        """Open the link; leaving the context closes it.
+        """Open the link and iterate over sample blocks; leaving the context closes the link.
 
         Raises
         ------
         LinkError
-            If trying later is reasonable; raised on entering or while iterating.
+            If a later attempt may succeed; raised on entering or while iterating.
         ConfigError
-            If the device can never deliver what is configured.
+            If the device cannot deliver the configured channels.
         """
         ...
 
 
 @runtime_checkable
 class RefusesFrames(Protocol):
-    """Source that counts the frames it refuses before they become samples."""
+    """Source that counts the frames that it rejects."""
 
     @property
     def refused_frames(self) -> Mapping[str, int]:
-        """Frames since the start that were not used, by reason."""
+        """Number of rejected frames since the start, by reason."""
         ...
 
 
 def refused_frames_of(source: SampleSource) -> Mapping[str, int]:
-    """Refused frames of a source by reason; empty if it does not count them."""
+    """Return the rejected frames of a source by reason; empty if it does not count them."""
     return source.refused_frames if isinstance(source, RefusesFrames) else {}

@@ -1,5 +1,5 @@
-"""Numerics and rules of bearing watch: plain values in, plain values out.
+"""Numerics and rules of padwatch: pure functions on plain values.
 
-Nothing in this package imports an event loop, a clock, a file, a socket, a framework or a logger;
-``make check`` holds that line.
+No module in this package imports an event loop, a clock, a file, a socket, a framework or a logger;
+``make check`` verifies this.
 """

@@ -1,4 +1,4 @@
-"""Array types: real signals and complex phasors differ, so that mixing them is a type error."""
+"""Array types. Real signals and complex phasors have different types."""
 
 from typing import TypeAlias
 
@@ -6,20 +6,20 @@ import numpy as np
 import numpy.typing as npt
 
 CountArray: TypeAlias = npt.NDArray[np.int16]
-"""Raw converter counts."""
+"""Raw counts of an analog-to-digital converter."""
 
 SampleArray: TypeAlias = npt.NDArray[np.float32]
-"""Samples in engineering units as they travel through the house."""
+"""Samples in engineering units, as passed between components."""
 
 RawArray: TypeAlias = CountArray | SampleArray
-"""What a device delivers: counts of its converter, or engineering units it has made itself."""
+"""Samples as a device delivers them: converter counts, or values in engineering units."""
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
-"""Real numbers that are calculated with."""
+"""Real numbers for calculations."""
 
 ComplexArray: TypeAlias = npt.NDArray[np.complex128]
-"""Phasors and transforms."""
+"""Complex phasors and spectra."""
 
 
 TimeArray: TypeAlias = npt.NDArray[np.int64]
-"""Nanoseconds since 1970, UTC."""
+"""Times in nanoseconds since 1970, UTC."""

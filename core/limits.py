@@ -1,4 +1,4 @@
-"""Levels, limits, zones and delays, by which alarms and changes of films are judged."""
+"""Alarm levels, limits, zones, judgements and delay timers, for alarms and film changes."""
 
 import math
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from core.quality import Reading, Reason
 
 
 class AlarmLevel(IntEnum):
-    """How urgent an alarm is: its priority."""
+    """Priority of an alarm."""
 
     ALERT = 1
     DANGER = 2
@@ -18,22 +18,22 @@ class AlarmLevel(IntEnum):
 
 @dataclass(frozen=True)
 class Judgement:
-    """What an alarm watches, judged at one moment.
+    """Judgement of the condition that an alarm monitors, at one time.
 
     Parameters
     ----------
     level
-        Level whose limit is passed, if any. While the condition is unknown, the last known level.
+        Level whose limit is exceeded, or None. For an unknown condition, the last known level.
     is_known
-        Whether the condition could be judged; if not, it is neither active nor returned.
+        Whether the condition could be judged; an unknown condition neither raises nor clears.
     value, limit
-        Value and the limit that it was compared with, where there are numbers.
+        Value and the limit it was compared with; None for a judgement without numbers.
     reason
-        Why, in a word; "ok" if no limit is passed.
+        Reason as a code word; "ok" if no limit is exceeded.
     suppressed_by
-        Why the alarm is suppressed by design; None if it is not.
+        Reason why the alarm is suppressed by design; None if it is not suppressed.
     point
-        Operating condition under which a limit was passed, if known.
+        Operating condition under which a limit was exceeded, if known.
     """
 
     level: AlarmLevel | None = None
@@ -46,19 +46,19 @@ class Judgement:
 
 
 WITHIN = Judgement()
-"""Within limits, without a value."""
+"""Judgement within limits, without a value."""
 
 
 NEVER_JUDGED = Judgement(is_known=False, reason="waiting_for_data")
 
 
 def unknown(reason: str, suppressed_by: str | None = None) -> Judgement:
-    """A judgement while the condition is unknown."""
+    """Return the judgement of an unknown condition."""
     return Judgement(is_known=False, reason=reason, suppressed_by=suppressed_by)
 
 
 MAYBE_TOO_LOW = (Reason.SPEED_IMPLAUSIBLE,)
-"""Reasons of doubt with which a reading may be too low, as it was read beside its line."""
+"""Reasons for which a reading may be too low: the 1× bin of a wrong speed misses the line."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +68,11 @@ class Limits:
     Parameters
     ----------
     alert, danger
-        Upper limits, above zero and rising; None if there is no such level. One limit is given.
+        Upper limits, above zero and rising; None if unused. At least one limit is given.
     deadband
-        How far inside a limit a value must be for its level to end.
+        Distance inside the limit that a value must reach for an active level to end.
     alert_below, danger_below
-        Lower limits.
+        Lower limits; None if unused.
     """
 
     alert: float | None = None
@@ -91,12 +91,12 @@ class Limits:
         return max(low, default=None)
 
     def is_within(self, value: float) -> bool:
-        """Whether a value passes no limit."""
+        """Whether a value exceeds no limit."""
         high, low = self._lowest_high, self._highest_low
         return (high is None or value <= high) and (low is None or value >= low)
 
     def passed(self, value: float, held: AlarmLevel | None) -> AlarmLevel | None:
-        """The worst level whose limit a value passes; a held level ends inside its deadband."""
+        """Return the worst exceeded level; a held level ends only beyond the deadband."""
         levels = [
             level
             for level, high, low in zip(
@@ -115,13 +115,13 @@ class Limits:
         return too_high or (low is not None and value < low + deadband)
 
     def is_low(self, value: float) -> bool:
-        """Whether a value is nearer to its lower limits."""
+        """Whether a value is nearer to the lower limits than to the upper limits."""
         if self._highest_low is None or self._lowest_high is None:
             return self._highest_low is not None
         return value < (self._highest_low + self._lowest_high) / 2.0
 
     def of(self, level: AlarmLevel | None, value: float = math.inf) -> float | None:
-        """The limit of a level on the side of a value; of none, the one that is passed first."""
+        """Return a level's limit on the side of a value; without a level, the first limit."""
         if self.is_low(value):
             alert, danger = self.alert_below, self.danger_below
         else:
@@ -131,18 +131,17 @@ class Limits:
         return danger if level is AlarmLevel.DANGER else alert
 
     def reason(self, level: AlarmLevel | None, value: float) -> str:
-        """What a level means, in a word."""
+        """Return the reason of a level as a code word."""
         if level is None:
             return "ok"
         return "below_limit" if self.is_low(value) else "above_limit"
 
 
 def judge(reading: Reading, limits: Limits, held: AlarmLevel | None) -> Judgement:
-    """Compare a reading with limits, after a judgement with the level `held`.
+    """Compare a reading with limits; `held` is the level of the previous judgement.
 
-    A reading at an implausible speed may be too low: it can raise an alarm but not clear it. A
-    shaft at standstill has no vibration: its alarms are suppressed and do not return, since the
-    speed itself may be wrong.
+    A reading at an implausible speed may be too low: it can raise an alarm but not clear it. At
+    standstill the alarms are suppressed but not cleared, because the speed reading may be wrong.
     """
     value = reading.value
     if value is None:
@@ -161,12 +160,12 @@ ZONES = {AlarmLevel.ALERT: "zone_c", AlarmLevel.DANGER: "zone_d"}
 
 @dataclass(frozen=True)
 class ZoneLimits(Limits):
-    """Zones as limits: C is an alert, D a danger; A and B, from `zone_b` on, are within limits."""
+    """Vibration zones as limits: C is alert, D is danger. Zone B begins above `zone_b`."""
 
     zone_b: float = 0.0
 
     def reason(self, level: AlarmLevel | None, value: float) -> str:
-        """The zone."""
+        """Return the name of the zone."""
         if level is None:
             return "zone_a" if value <= self.zone_b else "zone_b"
         return ZONES[level]
@@ -174,14 +173,14 @@ class ZoneLimits(Limits):
 
 @dataclass(frozen=True)
 class DelayTimer:
-    """On-delay and off-delay of a level.
+    """Timer for the on-delay and off-delay of an alarm level.
 
     Parameters
     ----------
     opposed_ns
-        Known time for which the condition has contradicted `is_on` without interruption.
+        Accumulated known time for which the condition has differed from `is_on`.
     last_ns
-        Time of the newest contradiction; None if nothing was known since.
+        Newest time at which the condition differed; None after a pause.
     """
 
     is_on: bool = False
@@ -196,10 +195,10 @@ class DelayTimer:
         off_delay_ns: int,
         elapsed_ns: int | None = None,
     ) -> "DelayTimer":
-        """Update with the condition of now.
+        """Return the timer updated with the present condition `wanted`.
 
-        A contradiction stands for the known time since the one before, unless it is given; a clock
-        that was put back adds nothing.
+        Each call with a differing condition adds `elapsed_ns`, by default the time since the
+        previous such call, or 0 if the clock was set back.
         """
         if wanted == self.is_on:
             return ON if wanted else INACTIVE
@@ -211,7 +210,7 @@ class DelayTimer:
         return DelayTimer(self.is_on, opposed_ns, now_ns)
 
     def paused(self) -> "DelayTimer":
-        """The timer while the condition is unknown: pending, with no time passing."""
+        """Return the timer paused while the condition is unknown; the accumulated time is kept."""
         return self if self.last_ns is None else replace(self, last_ns=None)
 
 

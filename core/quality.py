@@ -1,4 +1,4 @@
-"""Quality of a value after OPC UA: good, uncertain or bad, with the reason."""
+"""Quality of a value, modelled on OPC UA: good, uncertain or bad, with a reason."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -6,7 +6,7 @@ from enum import IntEnum, StrEnum
 
 
 class Level(IntEnum):
-    """Ordered from best to worst, so that the worst of several is their maximum."""
+    """Quality level, ordered from best to worst, so that the maximum is the worst level."""
 
     GOOD = 0
     UNCERTAIN = 1
@@ -14,7 +14,7 @@ class Level(IntEnum):
 
 
 class Reason(StrEnum):
-    """Why a value is not simply good. The names appear in the API and in the store."""
+    """Reason for a quality level. The names are used in the API and in the database."""
 
     OK = "ok"
     WAITING_FOR_DATA = "waiting_for_data"
@@ -48,7 +48,7 @@ class Reason(StrEnum):
 
 @dataclass(frozen=True)
 class Quality:
-    """A level with the reason for it."""
+    """Quality level with its reason."""
 
     level: Level
     reason: Reason
@@ -58,37 +58,37 @@ GOOD = Quality(Level.GOOD, Reason.OK)
 
 
 def uncertain(reason: Reason) -> Quality:
-    """Quality of a value that is shown with doubt."""
+    """Return the quality of a doubtful value that may be shown."""
     return Quality(Level.UNCERTAIN, reason)
 
 
 def bad(reason: Reason) -> Quality:
-    """Quality of a value that must not be shown."""
+    """Return the quality of a value that must not be shown."""
     return Quality(Level.BAD, reason)
 
 
 def worst(qualities: Iterable[Quality]) -> Quality:
-    """Quality of a value derived from several: the worst of them, the first among equals."""
+    """Return the worst quality, the first one on a tie; good if there are none."""
     return max(qualities, key=lambda quality: quality.level, default=GOOD)
 
 
 @dataclass(frozen=True)
 class Reading:
-    """One number with its quality; a bad reading has no number at all.
+    """Value with its quality; a bad reading has no value.
 
     Parameters
     ----------
     u_random, u_systematic
-        Standard uncertainties in the unit of the value, where they are known. The random part
-        differs from one result to the next; the systematic part stays as long as transducers and
-        bracket do, and cancels in a channel's own trend.
+        Standard uncertainties in the unit of the value; None if unknown. The random part differs
+        from one result to the next. The systematic part is constant as long as transducers and
+        brackets are unchanged, and cancels in the trend of a channel.
     interval_95
-        Coverage interval of 95 %, where it is known.
+        95 % coverage interval; None if unknown.
 
     Raises
     ------
     ValueError
-        If a bad reading carries a number or a usable one lacks it.
+        If a bad reading has a value, or a usable reading has none.
     """
 
     value: float | None
@@ -103,18 +103,18 @@ class Reading:
 
 
 def missing(reason: Reason) -> Reading:
-    """A reading without a number, and why."""
+    """Return a bad reading without a value, for a reason."""
     return Reading(None, bad(reason))
 
 
 NOT_MEASURED = missing(Reason.NOT_MEASURED)
-"""Reading of a slow channel that a block does not have."""
+"""Reading of a slow channel that is missing in a block."""
 
 
 def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = None) -> Reading:
-    """Mean of the usable readings, or the newest unusable one if they are less than half.
+    """Return the mean of the usable readings, or the newest unusable one if most are unusable.
 
-    Weights, such as numbers of samples, are equal if not given.
+    The weights, such as numbers of samples, are equal by default. Readings count by weight.
     """
     weights = [1.0] * len(readings) if weights is None else weights
     counted = [
@@ -125,17 +125,17 @@ def mean_reading(readings: Sequence[Reading], weights: Sequence[float] | None = 
     if 2.0 * sum(weight for _, weight in counted) < sum(weights):
         return next(reading for reading in reversed(readings) if reading.value is None)
     quality = worst(reading.quality for reading in readings if reading.value is not None)
-    # about the newest value, so that a reading that stands still stays the same to the last bit
+    # relative to the newest value, so that the mean of constant readings is exact to the last bit
     newest = counted[-1][0]
     shift = sum(weight * (value - newest) for value, weight in counted)
     return Reading(newest + shift / sum(weight for _, weight in counted), quality)
 
 
 def current_mean(readings: Sequence[Reading], *, is_grazed: bool = False) -> Reading:
-    """Mean of the usable readings, or the newest reading if that one is unusable.
+    """Return the mean of the usable readings, or the newest reading if it is unusable.
 
-    For readings of minutes that are shown as the present: a channel that has just failed has none,
-    unless its newest reading is missing only for a few clipped samples (`is_grazed`).
+    For readings over minutes that are shown as present values. A channel that has just failed has
+    no value, unless only a few clipped samples made its newest reading unusable (`is_grazed`).
     """
     newest = readings[-1]
     usable = [reading for reading in readings if reading.value is not None]

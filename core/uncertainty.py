@@ -1,7 +1,7 @@
-"""Uncertainty of a result as a budget (JCGM 100:2008, "GUM"), random and systematic kept apart.
+"""Uncertainty budgets with random and systematic contributions (JCGM 100:2008, "GUM").
 
-Random contributions differ from one averaging time to the next; systematic ones stay, and cancel
-in a channel's own trend. A budget lists both and combines them.
+Random contributions differ from one averaging time to the next. Systematic contributions are
+constant and cancel in the trend of a channel. A budget lists and combines both.
 """
 
 import math
@@ -20,30 +20,30 @@ CONFIDENCE = 0.95
 
 
 class Distribution(StrEnum):
-    """What is known about a contribution besides its width."""
+    """Probability distribution of a contribution."""
 
     NORMAL = "normal"
     UNIFORM = "uniform"
 
 
 class Kind(StrEnum):
-    """Whether a contribution changes from one averaging time to the next."""
+    """Kind of contribution: random between averaging times, or systematic (constant)."""
 
     RANDOM = "random"
     SYSTEMATIC = "systematic"
 
 
 class BudgetLine(NamedTuple):
-    """One contribution to the uncertainty of a result.
+    """Contribution of one input quantity to the uncertainty of a result.
 
     Parameters
     ----------
     width
-        Standard uncertainty if normal, half-width if uniform; in the unit of what contributes.
+        Standard uncertainty if normal, half-width if uniform, in the unit of the input quantity.
     sensitivity
-        Change of the result per unit of what contributes.
+        Change of the result per unit of the input quantity.
     freedoms
-        Degrees of freedom of a width that was itself estimated; infinite if it was stated.
+        Degrees of freedom of an estimated width; infinite for a stated width.
     """
 
     name: str
@@ -55,25 +55,25 @@ class BudgetLine(NamedTuple):
 
     @property
     def standard(self) -> float:
-        """Standard uncertainty of what contributes (GUM, 4.3.7)."""
+        """Standard uncertainty of the input quantity (GUM, 4.3.7)."""
         return (
             self.width / math.sqrt(3.0) if self.distribution is Distribution.UNIFORM else self.width
         )
 
     @property
     def contribution(self) -> float:
-        """Standard uncertainty of the result by this alone, in its unit."""
+        """Standard uncertainty of the result due to this input quantity, in the result's unit."""
         return abs(self.sensitivity) * self.standard
 
 
 @dataclass(frozen=True)
 class Budget:
-    """A result with everything that makes it uncertain.
+    """Uncertainty budget: a result with all contributions to its uncertainty.
 
     Parameters
     ----------
     bounded_interval
-        95 % interval of a result that is not normal because it lies between bounds; None of others.
+        95 % interval of a bounded, non-normal result; None for other results.
     """
 
     value: float
@@ -82,12 +82,12 @@ class Budget:
 
     @property
     def random(self) -> float:
-        """Standard uncertainty by what changes from one averaging time to the next."""
+        """Standard uncertainty due to the random contributions."""
         return _root_sum(line for line in self.lines if line.kind is Kind.RANDOM)
 
     @property
     def systematic(self) -> float:
-        """Standard uncertainty by what stays."""
+        """Standard uncertainty due to the systematic contributions."""
         return _root_sum(line for line in self.lines if line.kind is Kind.SYSTEMATIC)
 
     @property
@@ -97,11 +97,11 @@ class Budget:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Interval that holds the truth with 95 %."""
+        """95 % coverage interval."""
         return self.bounded_interval or _interval(self.value, self.lines)
 
     def reading(self, quality: Quality) -> Reading:
-        """The result with its standard uncertainties and interval."""
+        """Return the result as a reading with its standard uncertainties and interval."""
         parts = [(line.kind, line.contribution, line.freedoms) for line in self.lines]
         random = math.sqrt(sum(part**2 for kind, part, _ in parts if kind is Kind.RANDOM))
         systematic = math.sqrt(sum(part**2 for kind, part, _ in parts if kind is Kind.SYSTEMATIC))
@@ -111,27 +111,27 @@ class Budget:
 
 
 def random_line(name: str, standard: float, freedoms: float = math.inf) -> BudgetLine:
-    """Contribution of spectral statistics, in the unit of the result."""
+    """Return a random, normal contribution in the unit of the result."""
     return BudgetLine(name, Kind.RANDOM, Distribution.NORMAL, standard, 1.0, freedoms)
 
 
 def systematic_line(name: str, half_width: float, sensitivity: float) -> BudgetLine:
-    """Contribution with known limits only, uniformly distributed."""
+    """Return a systematic, uniformly distributed contribution with a given half-width."""
     return BudgetLine(name, Kind.SYSTEMATIC, Distribution.UNIFORM, half_width, sensitivity)
 
 
 def coverage_factor(lines: Sequence[BudgetLine], confidence: float = CONFIDENCE) -> float:
-    """Half-width of an interval, by default of 95 %, over the combined standard uncertainty.
+    """Return the coverage factor of an interval: half-width over combined standard uncertainty.
 
-    Student's distribution with the effective degrees of freedom of Welch and Satterthwaite (GUM,
-    G.4.1); 1.96 when all widths are known.
+    It is the quantile of Student's distribution with the effective degrees of freedom of Welch and
+    Satterthwaite (GUM, G.4.1); 1.96 for 95 % if all widths are stated.
     """
     parts = [(line.contribution, line.freedoms) for line in lines]
     return _coverage_factor(parts, confidence, math.sqrt(sum(part**2 for part, _ in parts)))
 
 
 def _coverage_factor(parts: Sequence[tuple[float, float]], confidence: float, root: float) -> float:
-    """The same of contributions with their degrees of freedom, and the root of their squares."""
+    """Return the coverage factor for contributions with their degrees of freedom and root sum."""
     fourth = sum(part**4 / freedoms for part, freedoms in parts)
     freedoms = root**4 / fourth if fourth > 0.0 else math.inf
     quantile = 0.5 + confidence / 2.0
@@ -144,7 +144,7 @@ def _half_width(parts: Sequence[tuple[float, float]]) -> float:
 
 
 def proportional(value: float, budget: Budget) -> Budget:
-    """Budget of a value that is in an exactly known proportion to the result of another."""
+    """Return the budget of a value that is exactly proportional to the result of a budget."""
     factor = value / budget.value
     lines = (line._replace(sensitivity=factor * line.sensitivity) for line in budget.lines)
     return Budget(value, tuple(lines))
@@ -166,11 +166,11 @@ MIN_EFFECTIVE = 2.0
 
 
 def effective_number(values: FloatArray) -> float:
-    """Number of independent values with as much information as these (n,), at least 2 of 2 or more.
+    """Return the effective number of independent values (n,); at least 2 for two or more values.
 
-    Segments overlap, and what they show wanders: neighbours share much. For a first-order process
-    ``n (1 - r) / (1 + r)`` are left, r the correlation of neighbours (Bayley and Hammersley 1946);
-    negative ones are taken for chance.
+    Values of overlapping segments are correlated. The effective number for a first-order process is
+    ``n (1 - r) / (1 + r)``, with the correlation r of successive values (Bayley and Hammersley
+    1946). A negative r is set to 0.
     """
     if values.size <= MIN_EFFECTIVE:
         return float(values.size)
@@ -186,12 +186,12 @@ def mean_budget(
     systematic: tuple[BudgetLine, ...] = (),
     sensitivity: float = 1.0,
 ) -> Budget | None:
-    """Uncertainty of a mean of values (n,), oldest first, or of what is calculated from one.
+    """Return the budget of a mean of values (n,), oldest first, or of a result derived from it.
 
     Returns
     -------
-    None where fewer than two values are known, or where they never differ: a transmitter that
-    repeats itself does not show how well it measures.
+    None for fewer than two values, and for constant values: the repeated value of a transmitter
+    contains no information about its uncertainty.
     """
     known = np.asarray(values, dtype=np.float64)
     if known.size < MIN_EFFECTIVE or not np.ptp(known) > 0.0:
@@ -202,19 +202,19 @@ def mean_budget(
 
 
 def numbers(readings: Sequence[Reading]) -> FloatArray:
-    """Of those that have one."""
+    """Return the values of the readings that have a value (n,)."""
     return np.array([r.value for r in readings if r.value is not None], np.float64)
 
 
 Budgeted = tuple[Reading, Budget | None]
-"""A reading with its budget; None if its uncertainty is not known."""
+"""Reading with its budget; the budget is None if the uncertainty is unknown."""
 
 Found = tuple[dict[str, Reading], dict[str, Budget]]
-"""Readings with their uncertainties, and the budgets of those that have one, by quantity."""
+"""Readings with their uncertainties, and the known budgets, both by quantity."""
 
 
 def with_budgets(found: Mapping[str, Budgeted], prefix: str = "") -> Found:
-    """State the uncertainty of readings that have a number and a budget, by prefixed name."""
+    """Return readings with uncertainties from their budgets, and the budgets, by prefixed name."""
     readings: dict[str, Reading] = {}
     budgets: dict[str, Budget] = {}
     for name, (reading, budget) in found.items():

@@ -1,4 +1,4 @@
-"""The only place where signal units (µm, mm/s, r/min) meet mechanical units (SI)."""
+"""Unit conversions between signal units (µm, r/min) and SI units."""
 
 import math
 
@@ -8,30 +8,30 @@ DAY_NS = 86_400 * NS_PER_S
 
 
 def hz_from_rpm(speed_rpm: float) -> float:
-    """Frequency of one turn."""
+    """Return the 1× frequency of a running speed."""
     return speed_rpm / 60.0
 
 
 def rpm_from_hz(frequency_hz: float) -> float:
-    """Running speed whose 1× frequency is given."""
+    """Return the running speed for a 1× frequency."""
     return frequency_hz * 60.0
 
 
 def rad_s_from_rpm(speed_rpm: float) -> float:
-    """Angular speed of a shaft."""
+    """Return the angular speed of a shaft, rad/s."""
     return speed_rpm * 2.0 * math.pi / 60.0
 
 
 def um_from_m(length_m: float) -> float:
-    """Metres to micrometres."""
+    """Convert metres to micrometres."""
     return length_m * 1e6
 
 
 def s_from_ns(duration_ns: int) -> float:
-    """Nanoseconds to seconds; for durations, since a float cannot hold a date to the nanosecond."""
+    """Convert a duration from nanoseconds to seconds; a float is too inexact for dates."""
     return duration_ns / NS_PER_S
 
 
 def ns_from_s(duration_s: float) -> int:
-    """Seconds to nanoseconds, rounded to the nearest."""
+    """Convert seconds to nanoseconds, rounded to the nearest integer."""
     return round(duration_s * NS_PER_S)

@@ -1,1 +1,1 @@
-"""What all wires share once their bytes are decoded: blocks, times, freshness."""
+"""Shared parts of all adapters after decoding: blocks, time stamps, polling, units."""

@@ -1,7 +1,7 @@
-"""When samples arrive, and what follows for their times and for the device's clock.
+"""Estimation of sample times and of the device clock from arrival times.
 
-Samples can arrive late, never early. The least delay therefore shows how a device's clock stands
-against the host's, and how late a sample is; all of this module follows from that.
+Samples can arrive late, but not early. The smallest observed delay therefore gives the offset
+between device clock and host clock, and the delay of each sample is relative to it.
 """
 
 import math
@@ -17,14 +17,14 @@ from core.units import NS_PER_S, ns_from_s
 
 @dataclass(frozen=True)
 class Arrival:
-    """A moment by both clocks of the host.
+    """Time of an arrival by both clocks of the host.
 
     Parameters
     ----------
     host_ns
-        UTC nanoseconds, by the clock that may be set.
+        Wall clock time, UTC nanoseconds; the clock may be set.
     steady_s
-        Seconds, by the clock that never steps.
+        Monotonic time, seconds.
     """
 
     host_ns: int
@@ -32,32 +32,32 @@ class Arrival:
 
     @classmethod
     def now(cls, clock: Clock) -> "Arrival":
-        """Now."""
+        """Return the present time by both clocks."""
         return cls(clock.now_ns(), clock.monotonic_s())
 
     def step_s_since(self, before: "Arrival") -> float:
-        """Seconds by which the host's clock was set forward between two moments."""
+        """Return the seconds by which the wall clock was set forward since another arrival."""
         return (self.host_ns - before.host_ns) / NS_PER_S - (self.steady_s - before.steady_s)
 
 
 _MAX_RISE_S = 1.0
-"""Time at once for which the least delay is forgotten."""
+"""Longest elapsed time that increases the smallest delay in one step."""
 
 
 class LeastDelay:
-    """Least delay of samples on their way to the host; it counts as no delay.
+    """Smallest transmission delay of samples, the zero point of their lateness.
 
-    It is forgotten as fast as two clocks may drift apart.
+    The stored minimum increases with time by the largest clock drift.
 
     Parameters
     ----------
     max_drift
-        Share by which the samples may come too slowly.
+        Largest fraction by which the samples may be slower than the host clock.
 
     Attributes
     ----------
     least_s
-        The least delay, seconds; None before the first.
+        Smallest delay, seconds; None before the first sample.
     """
 
     def __init__(self, max_drift: float) -> None:
@@ -66,7 +66,7 @@ class LeastDelay:
         self.least_s: float | None = None
 
     def late_s(self, delay_s: float, now_s: float) -> float:
-        """Take a delay in; return how late that is, below zero if none before was as small."""
+        """Add a delay; return its excess over the previous minimum, negative for a new minimum."""
         if self.least_s is None:
             self.least_s, self._at_s = delay_s, now_s
         passed_s = min(max(0.0, now_s - self._at_s), _MAX_RISE_S)
@@ -77,25 +77,25 @@ class LeastDelay:
 
 _BIN_S = 10.0
 _MAX_BINS = 360
-"""An hour: long against the jitter of polls, short against the day of a crystal's temperature."""
+"""One hour: long compared with poll jitter, short compared with daily temperature changes."""
 
 _MIN_BINS = 6
 
 _HOST_STEP_S = 0.5
-"""A host's clock that is kept right is slewed; one that moves so much at once has been set."""
+"""Step of the host clock above which the clock counts as set; synchronisation only slews."""
 
 
 class ArrivalModel:
-    """Offset of stamps by the host's wall clock, and drift of sampling by its steady one.
+    """Estimator of the device clock: offset from wall clock time, drift from monotonic time.
 
-    Of every ten seconds only the block that came with the least delay counts; a line through these
-    gives the drift, its scatter the uncertainty. If the host's clock is set, both begin anew: the
-    offset is another one, and a host that was suspended has counted no time meanwhile.
+    Of every ten seconds, only the block with the smallest delay is used. The slope of a regression
+    line through these blocks is the drift; the residuals give its uncertainty. If the host clock is
+    set, estimation restarts: the offset has changed, and monotonic time stops during suspend.
 
     Parameters
     ----------
     rate_hz
-        Nominal samples per second.
+        Nominal sampling rate.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -109,12 +109,12 @@ class ArrivalModel:
         self._drift: tuple[float, float] | None = None
 
     def add(self, epoch: int, stop_index: int, stop_ns: int | None, arrived: Arrival) -> None:
-        """Note that all samples up to an index had arrived.
+        """Add the arrival of all samples before an index.
 
         Parameters
         ----------
         stop_ns
-            Time of that index by the device's stamps; None if it does not stamp.
+            Time of that index by the device stamps; None without device stamps.
         """
         if epoch != self._epoch or self._was_set(arrived):
             self._begin(epoch, stop_index, arrived.steady_s)
@@ -135,7 +135,7 @@ class ArrivalModel:
                 self._offset_ns[-1] = max(self._offset_ns[-1], offset_ns)
 
     def device_clock(self, n_faults: int = 0) -> DeviceClock:
-        """Return offset and drift as far as they are known now."""
+        """Return the present offset and drift of the device clock; None if unknown."""
         offset_ns = max(list(self._offset_ns)[-_MIN_BINS:], default=None)
         drift = None if self._drift is None else -1e6 * self._drift[0]
         return DeviceClock(
@@ -156,7 +156,7 @@ class ArrivalModel:
 
 
 def _slope(points: deque[tuple[float, float]]) -> tuple[float, float] | None:
-    """Slope of a straight line and its standard uncertainty, by least squares."""
+    """Return the least-squares slope of a line and its standard uncertainty."""
     if len(points) < _MIN_BINS:
         return None
     host_s, delay_s = np.array(points).T
@@ -168,23 +168,23 @@ def _slope(points: deque[tuple[float, float]]) -> tuple[float, float] | None:
 
 
 _MAX_SLEW = 200e-6
-"""Share by which host stamps may run faster or slower: twice what a poor crystal is off."""
+"""Largest relative rate change of host stamps: twice the error of a poor crystal."""
 
 _STEP_NS = NS_PER_S
-"""Stamps that are further off than this do not follow a drift: the host's clock was set."""
+"""Error of a stamp above which drift is excluded: the host clock was set."""
 
 
 class HostStamps:
-    """Stamps of samples that the device does not stamp: a line through their arrivals.
+    """Host time stamps for devices without time stamps, on a line fitted to the arrival times.
 
-    It is smooth, always rises and is bent every ten seconds towards the least delay of these by
-    changing its slope, never by a jump. Only if the host's clock was set, or the device counts
-    anew, does it begin again.
+    The line is continuous and always increases. Every ten seconds, its slope is adjusted towards
+    the smallest delay in these ten seconds. The line restarts only if the host clock was set or a
+    new epoch began.
 
     Parameters
     ----------
     rate_hz
-        Nominal samples per second.
+        Nominal sampling rate.
     """
 
     def __init__(self, rate_hz: float) -> None:
@@ -197,7 +197,7 @@ class HostStamps:
         self._least_delay_ns: int | None = None
 
     def add(self, epoch: int, stop_index: int, arrived_ns: int) -> None:
-        """Note that the sample before an index had arrived; to be called before `start_ns`."""
+        """Add the arrival of the samples before an index; call it before `start_ns`."""
         delay_ns = arrived_ns - self.start_ns(stop_index)
         if epoch != self._epoch or delay_ns < -_STEP_NS:
             self._begin(epoch, stop_index, arrived_ns)
@@ -212,7 +212,7 @@ class HostStamps:
             self._bend(stop_index, self._least_delay_ns)
 
     def start_ns(self, index: int) -> int:
-        """Time of a sample, UTC nanoseconds since 1970; rises with the index within an epoch."""
+        """Return the time of a sample, UTC ns since 1970; increases with the index in an epoch."""
         return self._ns + round((index - self._index) * self._period_ns * self._slope)
 
     def _begin(self, epoch: int, index: int, at_ns: int) -> None:
@@ -220,7 +220,7 @@ class HostStamps:
         self._index, self._ns, self._least_delay_ns = index, at_ns, None
 
     def _bend(self, index: int, late_ns: int) -> None:
-        """From here on run so that the line meets the least delay in ten seconds."""
+        """Change the slope so that the line reaches the smallest delay in ten seconds."""
         at_ns = self.start_ns(index)
         share = late_ns / (_BIN_S * NS_PER_S)
         self._slope = 1.0 + min(max(share, -_MAX_SLEW), _MAX_SLEW)
@@ -228,19 +228,20 @@ class HostStamps:
 
 
 _MAX_INTERFACE_DRIFT = 100e-6
-"""Of the interface's crystal; what is left of three times that is for the device's."""
+"""Largest relative drift of the interface clock; the rest of a total of three times this value is
+allowed for the device clock."""
 
 _MAX_EARLY_S = 0.5
 _MAX_LATE_S = 5.0
-"""Frames that have waited for longer than this are taken for those of a clock that was set."""
+"""Delay of a frame above which the interface clock counts as set."""
 
 _MAX_STILL_S = 0.05
-"""Frames of one moment are read within this."""
+"""Longest time between reading frames with the same stamp."""
 
 
 @dataclass(frozen=True)
 class _Pair:
-    """A stamp and when its frame was read."""
+    """Interface stamp of a frame and the time when the frame was read."""
 
     stamp_s: float
     read: Arrival
@@ -251,11 +252,11 @@ class _Pair:
 
 
 class InterfaceClock:
-    """Converts stamps of an interface, whose clock may begin anywhere, to the host's clocks.
+    """Conversion of the stamps of an interface, with arbitrary start, to the host clocks.
 
-    The least difference between reading a frame and its stamp counts as no delay. A stamp that
-    runs backwards, repeats or jumps is not used; the moment of reading replaces it. Two in a row
-    that fit each other show that the interface's clock has begun anew.
+    The smallest difference between reading time and stamp counts as zero delay. A stamp that
+    regresses, repeats or jumps is replaced by the reading time. Two consecutive such stamps that
+    are consistent with each other indicate a restart of the interface clock.
     """
 
     def __init__(self) -> None:
@@ -264,14 +265,14 @@ class InterfaceClock:
         self._delay = LeastDelay(_MAX_INTERFACE_DRIFT)
 
     def arrival(self, stamp_s: float, read: Arrival) -> tuple[Arrival, StampFault | None]:
-        """Return when a frame came, and what was wrong with its stamp.
+        """Return the arrival time of a frame, and the fault of its stamp or None.
 
         Parameters
         ----------
         stamp_s
-            By the interface.
+            Stamp of the interface, seconds.
         read
-            When it was read.
+            Time when the frame was read.
         """
         if not math.isfinite(stamp_s) or stamp_s <= 0.0:
             return read, StampFault.REPEATED  # an interface without stamps sends 0

@@ -1,4 +1,4 @@
-"""The last stage of every adapter: stamps checked, blocks cut and joined on their grid."""
+"""Last stage of every adapter: checking of time stamps and assembly of sample blocks."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -23,28 +23,28 @@ from core.samples.calibration import UnitCalibration
 from core.units import NS_PER_S, ns_from_s
 
 MIN_BLOCK_S = 0.25
-"""Length of blocks where no sample is missing and no pause ends them."""
+"""Minimum length of blocks without missing samples or pauses."""
 
 _STAMP_NS = 1000
-"""Resolution of a stamp. Every profile can carry it, and slow values in single precision, so that a
-recording has the same numbers when it is replayed over any wire."""
+"""Resolution of a time stamp. All protocols can transfer this resolution, and slow values in single
+precision, so that replays of a recording over any protocol have equal values."""
 
 
 @dataclass(frozen=True)
 class RawBlock:
-    """Consecutive samples as a device delivers them, with one set of values beside them.
+    """Consecutive samples as delivered by a device, with one value of each slow channel.
 
     Parameters
     ----------
     counts
-        (n_channels, n_samples) int16 counts of the converter; or, from a device that has none,
-        float32 engineering units, not a number where the device has no sample.
+        int16 converter counts (n_channels, n_samples), or, from a device without counts, float32
+        engineering units, with NaN for missing samples.
     start_ns
-        Time of the first sample, by the device's stamps or by the host's clock.
+        Time of the first sample, by the device stamps or by the host clock.
     ok
-        (n_channels,) the device's own verdict on each channel.
+        Whether the device reports each channel as OK (n_channels,).
     slow
-        One value for each configured slow channel, NaN where the device has none.
+        Value of each configured slow channel; NaN if missing.
     """
 
     epoch: int
@@ -58,7 +58,7 @@ class RawBlock:
 
     @property
     def n_samples(self) -> int:
-        """Samples per channel."""
+        """Number of samples per channel."""
         return int(self.counts.shape[1])
 
     @property
@@ -68,7 +68,7 @@ class RawBlock:
 
 
 def sample_block(raws: Sequence[RawBlock], calibration: UnitCalibration) -> SampleBlock:
-    """Raw blocks that follow each other as one block with a cell for each."""
+    """Return consecutive raw blocks as one sample block with a cell for each."""
     first = raws[0]
     if len(raws) == 1:
         counts, side = first.counts, SideValues.of(first.start_ns, first.ok, first.slow)
@@ -91,7 +91,7 @@ def sample_block(raws: Sequence[RawBlock], calibration: UnitCalibration) -> Samp
 
 
 def cells_of(block: SampleBlock) -> Iterator[RawBlock]:
-    """The cells of a block as raw blocks, without what another device measures."""
+    """Yield the cells of a block as raw blocks, without slow values of other devices."""
     side = block.side
     stops = [*side.starts[1:].tolist(), block.n_samples]
     columns = (side.starts.tolist(), stops, side.start_ns.tolist(), side.ok.T.tolist())
@@ -109,18 +109,18 @@ def cells_of(block: SampleBlock) -> Iterator[RawBlock]:
 
 
 class BlockJoiner:
-    """Joins consecutive blocks into whole cells, which begin at multiples of their length.
+    """Joiner of consecutive blocks into cells that start at multiples of the cell length.
 
-    However a wire has cut them, the same samples make the same cells. Only where samples are
-    missing, or where the device restarts, is a cell shorter. It is OK where all that it is made of
-    is, and has the slow values of its first sample.
+    The cells do not depend on the block lengths of the protocol. A cell is shorter only where
+    samples are missing or the device restarted. A channel of a cell is OK if it is OK in all parts;
+    the slow values are those at the first sample.
 
     Parameters
     ----------
     cell_samples
-        Samples of each channel in a cell.
+        Number of samples per channel in a cell.
     min_samples
-        Whole cells of fewer samples are held until others follow, or until `release`.
+        Minimum number of samples of a block; fewer are held until more follow, or `release`.
     """
 
     def __init__(self, cell_samples: int, min_samples: float = 0.0) -> None:
@@ -128,21 +128,21 @@ class BlockJoiner:
         self._parts: list[SampleBlock] = []
 
     def put(self, block: SampleBlock) -> list[SampleBlock]:
-        """Take what a device delivered; return the blocks that this completes, in order."""
+        """Add a block of a device; return the completed blocks in order."""
         done = [] if self._continued_by(block) else self.flush()
         self._parts.append(block)
         return done if self.n_whole < self._min_samples else done + self.release()
 
     @property
     def n_whole(self) -> int:
-        """Samples in the whole cells that are held."""
+        """Number of held samples in complete cells."""
         if not self._parts:
             return 0
         stop_index = self._parts[-1].stop_index
         return max(0, stop_index - stop_index % self._cell - self._parts[0].first_index)
 
     def release(self) -> list[SampleBlock]:
-        """Return the whole cells that are held, when nothing follows on them for a while."""
+        """Return the held complete cells; for a pause in the data."""
         n_whole = self.n_whole
         if not n_whole:
             return []
@@ -152,7 +152,7 @@ class BlockJoiner:
         return [_in_cells(whole.from_sample(0, n_whole), self._cell)]
 
     def flush(self) -> list[SampleBlock]:
-        """Return the block that is not complete, when nothing follows on it."""
+        """Return all held samples, including an incomplete cell; for the end of the data."""
         parts, self._parts = self._parts, []
         return [_in_cells(joined(parts), self._cell)] if parts else []
 
@@ -161,7 +161,7 @@ class BlockJoiner:
 
 
 def _follows(before: SampleBlock, block: SampleBlock) -> bool:
-    """Whether a block continues another one, without anything missing or refused in between."""
+    """Whether a block continues `before` without missing or rejected samples in between."""
     return (
         not block.rejected
         and block.epoch == before.epoch
@@ -171,7 +171,7 @@ def _follows(before: SampleBlock, block: SampleBlock) -> bool:
 
 
 def _in_cells(block: SampleBlock, length: int) -> SampleBlock:
-    """The same block in cells that begin at multiples of a length, with stamps that wires carry."""
+    """Return a block with cells at multiples of a length, and stamps rounded to `_STAMP_NS`."""
     side, first_cut = block.side, -block.first_index % length or length
     starts = np.concatenate([[0], np.arange(first_cut, block.n_samples, length)])
     start_ns, ok, slow = side.start_ns, side.ok, side.slow
@@ -190,20 +190,20 @@ def _in_cells(block: SampleBlock, length: int) -> SampleBlock:
 _TOLERANCE = ClockTolerance()
 
 _POSSIBLE_NS = range(946_684_800 * NS_PER_S, 4_102_444_800 * NS_PER_S)
-"""From 2000 to 2100: a clock that leaves it (1904, 1970, 2106) was not set but has failed."""
+"""Plausible device times, 2000 to 2100; a jump out of them (1904, 1970, 2106) is a failure."""
 
 
 class StampCheck:
-    """Compares each block's stamp with the sample index, which is exact.
+    """Check of time stamps against the sample index, which is exact.
 
-    A stamp that does not fit is replaced by the one that follows from the last good stamp, and the
-    block names the fault. Two in a row that agree with each other show that the device's clock
-    was set: from then on they are believed, unless they have left the years of 2000 to 2100.
+    A wrong stamp is replaced by extrapolation from the last good stamp, and the block states the
+    fault. Two consecutive wrong stamps that agree with each other indicate that the device clock
+    was set: they are accepted, unless they leave the years 2000 to 2100.
 
     Attributes
     ----------
     n_faults
-        Stamps that were not used.
+        Number of stamps that were not used.
     """
 
     def __init__(self) -> None:
@@ -212,7 +212,7 @@ class StampCheck:
         self.n_faults = 0
 
     def check(self, block: SampleBlock) -> tuple[SampleBlock, StampFault | None]:
-        """Return the block with stamps that can be used, and what was first wrong with its own."""
+        """Return the block with corrected stamps, and the first fault of its own stamps or None."""
         side, index = block.side, block.first_index + block.side.starts
         if side.n_cells > 1 and self._all_fit(block, index):
             return block, None
@@ -226,7 +226,7 @@ class StampCheck:
         return replace(block, side=side), faults[0]
 
     def _checked(self, stamp: "_Stamp") -> tuple[int, StampFault | None]:
-        """Time of a cell, and what is wrong with its own stamp."""
+        """Return the time of a cell, and the fault of its own stamp or None."""
         good, doubted = self._good, self._doubted
         if good is None or stamp.epoch != good.epoch:
             self._believe(stamp)
@@ -242,7 +242,7 @@ class StampCheck:
         return good.start_ns + _expected_ns(good, stamp), fault
 
     def _all_fit(self, block: SampleBlock, index: npt.NDArray[np.int64]) -> bool:
-        """Whether all stamps of a block fit beyond doubt; if so, believe them at once."""
+        """Whether all stamps of a block fit within the tolerance; accept them if so."""
         good, times_ns = self._good, block.side.start_ns
         if good is not None and good.epoch == block.epoch:
             index = np.concatenate([[good.first_index], index])
@@ -286,19 +286,19 @@ def _fault(before: _Stamp, after: _Stamp) -> StampFault | None:
 
 
 class BlockAssembler:
-    """Checks stamps and joins what a device delivers into blocks.
+    """Assembler of sample blocks from raw blocks of a device, with checked time stamps.
 
-    An adapter keeps one for as long as it lives, across connections: an unfinished block may be
-    finished by the next one.
+    An adapter uses one assembler across all its connections, because the next connection may
+    complete an unfinished block.
 
     Parameters
     ----------
     stamped
-        Whether ``start_ns`` of the raw blocks comes from the device rather than from the host.
+        Whether ``start_ns`` of the raw blocks is a device stamp, not a host stamp.
     samples_when_asked
-        Whether the device samples when the host polls it: it then has no rate that could drift.
+        Whether the device samples only when polled, and so has no sampling rate that could drift.
     min_block_s
-        Shorter blocks of a device that sends all the time are held until more has come, or until
+        Minimum length of blocks; shorter blocks are held until more samples arrive, or until
         `release`.
     """
 
@@ -320,7 +320,7 @@ class BlockAssembler:
         self._fault: StampFault | None = None
 
     def note_fault(self, fault: StampFault) -> None:
-        """Mark the next block: a stamp beside those of its samples was not used."""
+        """Count a fault of a stamp other than a sample stamp; mark the next block with it."""
         self._stamps.n_faults += 1
         self._fault = fault
 
@@ -332,29 +332,29 @@ class BlockAssembler:
         *,
         has_stamp: bool = True,
     ) -> list[SampleBlock]:
-        """Take the next raw block; return the sample blocks that it completes.
+        """Add the next raw block; return the completed sample blocks.
 
         Parameters
         ----------
         arrived
-            When its last sample had arrived; None where nothing arrives, as from a recording: the
-            device's clock is then not judged.
+            Arrival time of the last sample; None for a recording, whose device clock is not
+            judged.
         held_s
-            For how long the device had had that sample by then.
+            Time for which the device had held the last sample before its arrival.
         has_stamp
-            Whether this block has one of the device's stamps, if the device stamps at all.
+            Whether this block has a device stamp, if the device provides stamps.
         """
         return self._joined([self._checked(raw, arrived, held_s, has_stamp)])
 
     def take_together(
         self, raws: Sequence[RawBlock], arrived: Arrival | None = None, read_for_s: float = 0.0
     ) -> list[SampleBlock]:
-        """Take raw blocks that came together: the device has held all but the last for longer.
+        """Add raw blocks that arrived together; the device held earlier blocks for longer.
 
         Parameters
         ----------
         read_for_s
-            Time since the device reported which is the newest of them.
+            Time since the device reported the newest block.
         """
         blocks: list[SampleBlock] = []
         n_after = sum(raw.n_samples for raw in raws)
@@ -364,20 +364,20 @@ class BlockAssembler:
         return self._joined(blocks)
 
     def take_block(self, block: SampleBlock) -> list[SampleBlock]:
-        """Take a recorded block, as `take` does."""
+        """Add a recorded block; return the completed sample blocks."""
         return self._joined([self._marked(*self._stamps.check(block))])
 
     @property
     def holds_whole_cells(self) -> bool:
-        """Whether `release` would return anything."""
+        """Whether `release` would return a block."""
         return self._joiner.n_whole > 0
 
     def release(self) -> list[SampleBlock]:
-        """Return the whole cells that are held, when the device has paused or its link is lost."""
+        """Return the held complete cells; for a pause of the device or a lost link."""
         return self._with_clock(self._joiner.release())
 
     def flush(self) -> list[SampleBlock]:
-        """Return what is left at the end, as of a recording."""
+        """Return all held samples; for the end of the data, as of a recording."""
         return self._joiner.flush()
 
     def _checked(
@@ -395,7 +395,7 @@ class BlockAssembler:
         return replace(block, stamp_fault=fault) if fault else block
 
     def _joined(self, blocks: Sequence[SampleBlock]) -> list[SampleBlock]:
-        """Blocks that these complete, as long as they follow each other."""
+        """Return the blocks completed by these blocks; runs of consecutive blocks are joined."""
         cuts = [n for n in range(1, len(blocks)) if not _follows(blocks[n - 1], blocks[n])]
         runs = itertools.pairwise([0, *cuts, len(blocks)])
         done = [b for run in runs if blocks for b in self._joiner.put(joined(blocks[slice(*run)]))]

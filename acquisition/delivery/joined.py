@@ -1,4 +1,4 @@
-"""`JoinedSource`: waveforms from one device, slow values from another."""
+"""`JoinedSource`: waveforms of one device combined with slow values of another device."""
 
 from collections.abc import AsyncGenerator, AsyncIterator, Mapping
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
@@ -12,27 +12,27 @@ from core.samples.calibration import UnitCalibration
 
 
 class SlowValues(Protocol):
-    """A device that is asked for slow values while another one sends waveforms."""
+    """Device that is polled for slow values while another device sends waveforms."""
 
     def watch(self) -> AbstractAsyncContextManager[None]:
-        """Ask it again and again until the context is left; losing it ends nothing.
+        """Poll the device until the context is left; a lost device raises no error.
 
-        The first time, entering waits for its first answer, or until it is known that there is
-        none; later it does not, for a device that is away must not hold up waveforms.
+        The first call waits on entering for the first reply or failure. Later calls do not wait,
+        so that an unreachable device does not delay waveforms.
         """
         ...
 
     def current(self) -> Mapping[str, Reading]:
-        """The newest value of each slow channel that it measures; a reason where it is too old."""
+        """Return the newest reading of each slow channel; a stale reading has no value."""
         ...
 
 
 class JoinedSource:
-    """Puts the current slow values onto each block of another source.
+    """Source that adds the current slow values of a second device to each waveform block.
 
-    A slow device that is lost, or faulty, is no reason to lose waveforms: its values are then
-    missing, with the reason. It is read only while waveforms come, so that attempts to
-    reach the other device do not connect to it each time.
+    If the slow device is lost or faulty, its values are missing with a reason, and the waveforms
+    continue. The slow device is polled only while the waveform source is connected, so that retries
+    of the waveform link do not reconnect it.
     """
 
     def __init__(self, source: SampleSource, slow: SlowValues) -> None:
@@ -40,7 +40,7 @@ class JoinedSource:
 
     @property
     def refused_frames(self) -> Mapping[str, int]:
-        """Frames that the source of the waveforms has not used, by reason."""
+        """Number of rejected frames of the waveform source, by reason."""
         return refused_frames_of(self._source)
 
     @asynccontextmanager
@@ -50,7 +50,7 @@ class JoinedSource:
         Raises
         ------
         LinkError, ConfigError
-            As the source of the waveforms does.
+            As raised by the waveform source.
         """
         async with self._source.connect() as blocks, self._slow.watch():
             joined = self._joined(blocks)
@@ -67,12 +67,12 @@ class JoinedSource:
 
 
 def only_slow(calibration: UnitCalibration, ids: frozenset[str]) -> UnitCalibration:
-    """Calibration of the slow channels that another device measures, without waveforms."""
+    """Return the calibration of only the slow channels `ids`, which a second device measures."""
     slow = tuple(channel for channel in calibration.slow if channel.id in ids)
     return replace(calibration, channels=(), slow=slow)
 
 
 def without_slow(calibration: UnitCalibration, ids: frozenset[str]) -> UnitCalibration:
-    """Calibration of the device that sends the waveforms, and what it measures itself."""
+    """Return the calibration of the waveform device, without the slow channels `ids`."""
     slow = tuple(channel for channel in calibration.slow if channel.id not in ids)
     return replace(calibration, slow=slow)

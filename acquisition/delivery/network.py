@@ -1,7 +1,7 @@
-"""Host names and cancellation where a name server or a library would block a task.
+"""Host name resolution and task cancellation that name servers or libraries cannot block.
 
-The event loop's own look-up takes a thread of the pool that the store uses too, and keeps it until
-the name servers fail, even if its caller has given up.
+The name resolution of the event loop occupies a thread of the default pool, which the database also
+uses, until the name servers time out, even after its caller was cancelled.
 """
 
 import asyncio
@@ -10,23 +10,23 @@ import socket
 import threading
 
 MAX_ADDRESSES = 4
-"""Most addresses of one name that are tried."""
+"""Maximum number of addresses used per host name."""
 
 
 class NameLookUp:
-    """Looks up one name; at most one look-up is under way, however often it is called for."""
+    """Resolver of one host name; concurrent calls share one look-up."""
 
     def __init__(self, host: str, port: int) -> None:
         self._host, self._port = host, port
         self._asking: asyncio.Future[list[str]] | None = None
 
     async def addresses(self) -> list[str]:
-        """Addresses in the order in which to try them.
+        """Return the addresses in the order in which to try them.
 
         Raises
         ------
         OSError
-            If there are none.
+            If the name cannot be resolved.
         """
         if _is_address(self._host):
             return [self._host]
@@ -38,25 +38,25 @@ class NameLookUp:
                 target=_look_up,
                 args=(self._host, self._port, loop, self._asking),
                 name=f"look up {self._host}",
-                daemon=True,  # it must not hold up the end of the program either
+                daemon=True,  # must not delay the end of the program
             ).start()
         return await asyncio.shield(self._asking)
 
 
 class KnownAddresses:
-    """Addresses of a name as they were found last, until newer ones are found."""
+    """Cache of the last resolved addresses of a host name."""
 
     def __init__(self, host: str, port: int) -> None:
         self._look_up = NameLookUp(host, port)
         self._found: list[str] = []
 
     async def within(self, limit_s: float) -> list[str]:
-        """Addresses in the order in which to try them, after this time at the latest.
+        """Return the addresses within a time limit; the last known ones if resolution fails.
 
         Raises
         ------
         OSError
-            If there have never been any.
+            If resolution fails and no address is known.
         """
         try:
             async with asyncio.timeout(limit_s):
@@ -82,7 +82,7 @@ def _look_up(
     try:
         loop.call_soon_threadsafe(_answer, answer, found)
     except RuntimeError:
-        return  # the program has ended meanwhile
+        return  # the event loop is closed at the end of the program
 
 
 def _answer(answer: "asyncio.Future[list[str]]", found: list[str] | OSError) -> None:
@@ -95,7 +95,7 @@ def _answer(answer: "asyncio.Future[list[str]]", found: list[str] | OSError) -> 
 
 
 def _retrieve(answer: "asyncio.Future[list[str]]") -> None:
-    """Retrieve an error whose caller has given up, or asyncio logs it as never retrieved."""
+    """Retrieve the error of a cancelled caller; asyncio logs unretrieved errors."""
     if not answer.cancelled():
         answer.exception()
 
@@ -109,25 +109,26 @@ def _is_address(host: str) -> bool:
 
 
 def n_stops() -> int:
-    """Number of times that the current task was cancelled.
+    """Return the number of pending cancellation requests of the current task.
 
-    Before Python 3.13 a task group that fails while its task waits for it leaves its count behind.
+    Before Python 3.13, a task group that fails while its task waits for it does not reset its own
+    request.
     """
     task = asyncio.current_task()
     return 0 if task is None else task.cancelling()
 
 
 def let_stop_through(n_before: int = 0) -> None:
-    """Raise the cancellation that a library has swallowed.
+    """Raise a cancellation that a library has suppressed.
 
-    Before Python 3.12 `asyncio.wait_for` loses a cancellation if what it waits for comes at the
-    same moment (CPython issue 86296); the task would then never end. To be called after every wait
-    of a library that uses it.
+    Before Python 3.12, `asyncio.wait_for` loses a cancellation if the awaited result arrives at the
+    same time (CPython issue 86296), so the task would never end. Call this function after every
+    wait of a library that uses `wait_for`.
 
     Parameters
     ----------
     n_before
-        `n_stops` before the wait, where the task has waited for task groups of its own.
+        `n_stops` before the wait, for tasks that use task groups.
     """
     if n_stops() > n_before:
         raise asyncio.CancelledError

@@ -1,4 +1,4 @@
-"""When devices are polled, and when a device that answers counts as lost all the same."""
+"""Poll timing, and detection of devices that respond with stale data."""
 
 import math
 
@@ -6,24 +6,24 @@ from acquisition.clock import Clock
 from acquisition.errors import LinkError
 
 _EARLY = 1e-6
-"""Share of a period by which rounding may put a tick before its time."""
+"""Fraction of a period by which rounding may make a tick early."""
 
 _SHARES: tuple[float, float] = ((3.0 - 5.0**0.5) / 2.0, (5.0**0.5 - 1.0) / 2.0)
-"""Of a turn: multiples of the golden section fill an interval most evenly (Weyl 1916)."""
+"""Golden section fractions: their multiples modulo 1 are most evenly distributed (Weyl 1916)."""
 
 
 class PollClock:
-    """Ticks at multiples of a period since the first one, counted across connections.
+    """Clock of poll ticks at multiples of a period since the first tick, across connections.
 
     Parameters
     ----------
     period_s
-        Above 0.
+        Period of the ticks; above 0.
 
     Attributes
     ----------
     epoch
-        Second of the first tick, UTC: another one in each run of the program.
+        Time of the first tick, UTC seconds since 1970; identifies a run of the program.
     """
 
     def __init__(self, clock: Clock, period_s: float) -> None:
@@ -33,10 +33,10 @@ class PollClock:
         self.epoch = 0
 
     async def next(self) -> int:
-        """Wait for the next tick and return its number; the first one is due at once.
+        """Wait for the next tick and return its number; the first tick is immediate.
 
-        A tick whose time has passed is never returned, so that polls do not pile up; the jump in
-        the number is what was missed.
+        Ticks whose time has passed are skipped, so that polls do not accumulate. The gap in the
+        numbers is the number of missed ticks.
         """
         if self._origin_s is None:
             self._origin_s = self._clock.monotonic_s()
@@ -50,17 +50,17 @@ class PollClock:
         return self._last
 
     def _now(self) -> float:
-        """Time since the first tick, in ticks."""
+        """Return the time since the first tick, in ticks."""
         return (self._clock.monotonic_s() - (self._origin_s or 0.0)) / self._period_s
 
 
 def incommensurate_period_s(longest_s: float, slot_s: float) -> float:
-    """Longest period up to a limit in which polls of a ring meet a slot at all of its ages.
+    """Return the longest poll period up to a limit that is incommensurate with the slot duration.
 
-    A slot shows when its last sample was taken only to a poll that comes as it is finished. Where
-    period and slot have a small ratio, as 0.25 s and 50 samples at 600 Hz have, polls meet all
-    slots at the same age; while a device drifts through a whole slot it then seems not to drift at
-    all, and after that to jump.
+    A poll of a ring buffer measures the time of a slot's last sample only if it coincides with the
+    end of the slot. If period and slot have a simple ratio, as 0.25 s and 50 samples at 600 Hz,
+    all polls see slots of the same age: a drifting device then appears not to drift until it has
+    drifted by a whole slot, and then to jump.
     """
     if slot_s <= longest_s:
         return slot_s * _golden_up_to(longest_s / slot_s)
@@ -78,12 +78,12 @@ def _golden_from(ratio: float) -> float:
 
 
 class Freshness:
-    """Watches something of a device that must change from time to time.
+    """Watchdog for a value of a device that must change, such as a heartbeat.
 
     Parameters
     ----------
     what
-        In words; example: "the heartbeat".
+        Name of the value for messages; example: "the heartbeat".
     stale_after_s
         Longest time without a change.
     """
@@ -95,17 +95,17 @@ class Freshness:
         self._stood_still = False
 
     def opened(self, now_s: float) -> None:
-        """Note a new connection: the time restarts unless the last one was lost to stale data."""
+        """Restart the timeout for a new connection, unless stale data ended the previous one."""
         if not self._stood_still:
             self._since_s = now_s
 
     def note(self, alive: bytes, now_s: float) -> None:
-        """Note what was found.
+        """Update the watchdog with the present value.
 
         Raises
         ------
         LinkError
-            If it has not changed for too long.
+            If the value has not changed for longer than `stale_after_s`.
         """
         if alive != self._seen:
             self._seen, self._since_s, self._stood_still = alive, now_s, False

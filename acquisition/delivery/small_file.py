@@ -1,4 +1,4 @@
-"""Read a whole small file: settings, a calibration sheet, a DBC."""
+"""Reading of small files, such as settings, calibration sheets and DBC files."""
 
 import errno
 import stat
@@ -6,13 +6,13 @@ from pathlib import Path
 
 
 def read_small_file(path: Path, max_bytes: int) -> bytes:
-    """Read a whole file.
+    """Return the content of a file of limited size.
 
     Raises
     ------
     OSError
-        If it cannot be read, is no regular file (a pipe would be waited for without end), or is
-        larger than allowed; `strerror` says which.
+        If the file cannot be read, is not a regular file (reading a pipe would block), or is larger
+        than `max_bytes`; `strerror` states the reason.
     """
     mode = path.stat().st_mode
     if stat.S_ISDIR(mode):

@@ -1,4 +1,4 @@
-"""Units as files and DBCs write them, and their factors to those of channels; none is guessed."""
+"""Spellings of units in files and DBC files, and conversion to the units of channels."""
 
 import re
 from collections.abc import Iterable
@@ -35,7 +35,7 @@ UNIT_OF = {
     Measurand.ACCELERATION_M_S2: "m/s2",
     Measurand.KEY_PHASE_V: "V",
 }
-"""Engineering units of waveform channels, spelt so that every tool can print them."""
+"""Engineering unit of each measurand of waveform channels, in ASCII."""
 
 _LENGTH_UM = {"um": 1.0, "mm": 1e3, "m": 1e6, "mil": 25.4}
 _WAVEFORMS = {
@@ -56,32 +56,32 @@ _SLOW: dict[str, dict[str, tuple[float, float]]] = {
 
 
 def canonical(unit: str) -> str:
-    """The one spelling that padwatch uses for a unit; an unknown unit stays as it is."""
+    """Return the canonical spelling of a unit; an unknown unit is only stripped of spaces."""
     return _CANONICAL.get(unit.strip(), unit.strip())
 
 
 def known_unit(spelling: str) -> str | None:
-    """The unit that a spelling stands for; None if it is unknown."""
+    """Return the canonical unit of a spelling; None if unknown."""
     return _CANONICAL.get(spelling)
 
 
 def spellings(unit: str) -> str:
-    """All spellings of a unit, for a message."""
+    """Return all spellings of a unit as text for a message."""
     return ", ".join(f'"{spelling}"' for spelling in _SAME[unit])
 
 
 def waveform_factor(measurand: Measurand, unit: str, unit_per_v: float) -> float:
-    """Engineering units of a channel per unit of a file.
+    """Return the factor from the unit of a file to the engineering unit of a channel.
 
     Parameters
     ----------
     unit_per_v
-        Engineering units per volt, of the channel's calibration.
+        Engineering units per volt, from the calibration of the channel.
 
     Raises
     ------
     ConfigError
-        If the unit is not one of this quantity.
+        If the unit does not belong to the measurand.
     """
     known = _WAVEFORMS[measurand] | {volt: v * unit_per_v for volt, v in _VOLTS.items()}
     if canonical(unit) not in known:
@@ -90,12 +90,12 @@ def waveform_factor(measurand: Measurand, unit: str, unit_per_v: float) -> float
 
 
 def slow_conversion(channel_unit: str, unit: str) -> tuple[float, float]:
-    """Factor and offset from the unit of a file to that of a slow channel.
+    """Return factor and offset from the unit of a file to the unit of a slow channel.
 
     Raises
     ------
     ConfigError
-        If there is none.
+        If there is no conversion.
     """
     known = _SLOW[channel_unit]
     if canonical(unit) not in known:
@@ -104,18 +104,18 @@ def slow_conversion(channel_unit: str, unit: str) -> tuple[float, float]:
 
 
 def unit_in(heading: str) -> str | None:
-    """The unit that a heading states after its name, as in ``shaft x [um]``; else None."""
+    """Return the unit in brackets at the end of a heading, as in ``shaft x [um]``, or None."""
     found = re.search(r"\[([^\[\]]{1,16})\]\s*$", heading)
     return found[1] if found and found[1].strip() in _CANONICAL else None
 
 
 def require_unit(place: object, found: str | None, mapped: str) -> None:
-    """Refuse a column whose own unit is not the one it is mapped with; one without any passes.
+    """Check that the unit of a column, if stated, equals the unit in the mapping.
 
     Raises
     ------
     ConfigError
-        With both units.
+        If the units differ; the message states both.
     """
     if found and found.strip() and canonical(found) != canonical(mapped):
         raise ConfigError(

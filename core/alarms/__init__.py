@@ -1,4 +1,4 @@
 """Alarms of a unit after ISA-18.2 / IEC 62682: kinds, rules, life cycle, operation, statistics.
 
-Kinds of alarms about the service itself are the service's own.
+The service layer defines the kinds of alarms about the service itself.
 """

@@ -1,4 +1,4 @@
-"""`Alarm` and `AlarmEvent`: one alarm at one moment, and one line of its history."""
+"""`Alarm` and `AlarmEvent`: state of an alarm at one time, and one entry of its history."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +10,7 @@ from core.limits import INACTIVE, NEVER_JUDGED, AlarmLevel, DelayTimer, Judgemen
 
 
 class AlarmState(StrEnum):
-    """Where an alarm stands in its life cycle (ISA-18.2, 5.4: states A to H, latches apart)."""
+    """State of an alarm in its life cycle (ISA-18.2, 5.4: states A to H, except latched states)."""
 
     NORMAL = "normal"
     UNACKNOWLEDGED = "unacknowledged"
@@ -22,19 +22,19 @@ class AlarmState(StrEnum):
 
 
 PLANT = "plant"
-"""Unit of alarms about the service. No unit may have this name."""
+"""Unit name of alarms about the service. No generating unit may have this name."""
 
 
 @dataclass(frozen=True)
 class AlarmIdentity:
-    """Identity of an alarm, the same as long as the plant file names its parts alike.
+    """Identity of an alarm; stable while the plant file keeps the ids of units and their parts.
 
     Parameters
     ----------
     unit
-        Unit, or `PLANT` for alarms about the service.
+        Id of the unit, or `PLANT` for alarms about the service.
     subject
-        Id of a channel or bearing, or the subject of its kind, such as "device".
+        Id of a channel or bearing, or the fixed subject of the alarm kind, such as "device".
     kind
         Name of an `AlarmKind`.
     """
@@ -45,18 +45,18 @@ class AlarmIdentity:
 
     @cached_property
     def id(self) -> str:
-        """Id in one word, fit for a URL."""
+        """Id string "unit:subject:kind", usable in a URL."""
         return f"{self.unit}:{self.subject}:{self.kind}"
 
 
 @dataclass(frozen=True)
 class Hold:
-    """Who has taken an alarm off the list, and why.
+    """Person who shelved an alarm or took it out of service, with reason and time.
 
     Parameters
     ----------
     until_ns
-        When it ends by itself, host time; None if never.
+        Host time at which the hold expires; None if it does not expire.
     """
 
     actor: str
@@ -67,14 +67,15 @@ class Hold:
 
 @dataclass(frozen=True)
 class AlarmRule:
-    """Delays and latch of an alarm.
+    """Delays and latching of an alarm.
 
     Parameters
     ----------
     on_delay_ns, off_delay_ns
-        Known time without contradiction before a level counts, or ceases to.
+        Time for which the condition must be present without interruption before a level becomes
+        active, or absent before it ends. Time with unknown condition does not count.
     is_latching
-        Whether the alarm stays active after its condition has gone, until it is reset.
+        Whether the alarm stays active after its condition has ended, until it is reset.
     """
 
     on_delay_ns: int = 0
@@ -84,32 +85,32 @@ class AlarmRule:
 
 @dataclass(frozen=True)
 class Alarm:
-    """One alarm at one moment.
+    """State of one alarm at one time.
 
     Parameters
     ----------
     level
-        Level after delays and latch; None if the alarm is not active.
+        Level after delays and latch; None if the alarm is inactive.
     occurrence
-        Number of times that it was raised or rose in level; acknowledged by this number.
+        Number of times that the alarm was raised or escalated. Acknowledging refers to it.
     is_acknowledged
         Whether this occurrence is acknowledged.
     raised_ns
-        Start of this occurrence.
+        Start time of this occurrence.
     raised_at
-        Operating condition at that time, if known.
+        Operating condition at the start of this occurrence, if known.
     n_events
-        Number of its events, and of the newest event.
+        Number of events of the alarm, equal to the number of the newest event.
     condition
         Newest judgement.
     suppressed_by
-        Why it is suppressed by design; None if it is not.
+        Reason why the alarm is suppressed by design; None if it is not suppressed.
     shelf, outage
-        Who has shelved it or taken it out of service, if anyone.
+        Hold of a shelved alarm, and of an alarm that is out of service; else None.
     is_latched
-        Whether only its latch holds its level.
+        Whether the alarm is active only because of its latch.
     timers
-        Delays of alert and danger.
+        Delay timers of the levels alert and danger.
     """
 
     identity: AlarmIdentity
@@ -128,7 +129,7 @@ class Alarm:
 
     @property
     def state(self) -> AlarmState:
-        """State of the life cycle: out of service, shelved or suppressed come before all others."""
+        """State in the life cycle; out of service, shelved and suppressed take precedence."""
         if self.outage is not None:
             return AlarmState.OUT_OF_SERVICE
         if self.shelf is not None:
@@ -142,7 +143,7 @@ class Alarm:
 
     @cached_property
     def is_settled_inactive(self) -> bool:
-        """Whether one more condition that is known and within limits leaves it unchanged."""
+        """Whether another known condition within limits leaves the alarm unchanged."""
         return (
             self.level is None
             and self.condition.is_known
@@ -153,7 +154,7 @@ class Alarm:
 
 
 class AlarmChange(StrEnum):
-    """What happened to an alarm."""
+    """Kind of change in an alarm's history."""
 
     RAISED = "raised"
     ESCALATED = "escalated"
@@ -174,25 +175,25 @@ class AlarmChange(StrEnum):
 
 
 ANNOUNCED = (AlarmChange.RAISED, AlarmChange.ESCALATED)
-"""The changes that begin a new occurrence."""
+"""Changes that start a new occurrence."""
 
 
 @dataclass(frozen=True)
 class AlarmEvent:
-    """A transition of an alarm, or another entry of its history.
+    """Entry in the history of an alarm, such as a transition or a comment.
 
     Parameters
     ----------
     number
-        Number among this alarm's events, from 1 without gaps.
+        Sequence number among the events of this alarm, from 1 without gaps.
     level
         Level after the event, or before it if the alarm has returned or was reset.
     time_ns
-        Time of the samples that decided; host time of an action or of the link.
+        Time of the samples that caused the event; host time for actions and link events.
     actor
-        Person who acted; empty if none did.
+        Person who performed the action; empty for automatic events.
     reason
-        Why, in a word or in the words of the actor.
+        Reason as a code word, or in the words of the actor.
     """
 
     identity: AlarmIdentity
@@ -212,7 +213,7 @@ class AlarmEvent:
 
 @dataclass(frozen=True)
 class AlarmNews:
-    """An alarm with its newest events."""
+    """Changed alarm with the events that changed it."""
 
     alarm: Alarm
     events: Sequence[AlarmEvent]
@@ -226,7 +227,7 @@ def changed(
     actor: str = "",
     reason: str = "",
 ) -> tuple[Alarm, AlarmEvent]:
-    """The alarm after a change, with the number of its events counted up, and the event."""
+    """Return the alarm after a change, with its event count incremented, and the event."""
     after = replace(after, n_events=before.n_events + 1)
     event = AlarmEvent(
         identity=after.identity,

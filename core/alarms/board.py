@@ -1,4 +1,4 @@
-"""`AlarmBoard`: alarms with their rules, and what is kept of a unit's alarms across a restart."""
+"""`AlarmBoard`: alarms with their rules. `AlarmMemory`: alarm state saved for a restart."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,16 +14,16 @@ from core.quality import Reason
 
 @dataclass(frozen=True)
 class AlarmMemory:
-    """State of the alarms of a unit, with their delays, from which another process continues.
+    """State of the alarms of a unit, with their delay timers, for continuing in another process.
 
     Parameters
     ----------
     segment_faults
-        Faults of channels that only segments show, by channel.
+        Channel faults that were detected from segments, by channel.
     points
-        Newest operating condition of each bearing with its time, by bearing.
+        Newest operating condition of each bearing and its time, by bearing.
     stop
-        Epoch and index up to which blocks were judged.
+        Epoch and sample index at the end of the newest judged block; None before the first block.
     """
 
     alarms: tuple[Alarm, ...]
@@ -35,7 +35,7 @@ class AlarmMemory:
 
 
 def is_same_occurrence(one: Alarm, other: Alarm) -> bool:
-    """Whether an alarm has neither been raised nor returned between two moments."""
+    """Whether two states of an alarm have the same level and occurrence number."""
     return (one.level, one.occurrence) == (other.level, other.occurrence)
 
 
@@ -43,7 +43,7 @@ RESTARTED, NO_LONGER_WATCHED = "restarted", "no_longer_watched"
 
 
 class AlarmBoard:
-    """Owns some alarms, inactive at first, and their rules. News is in the order of events."""
+    """Set of alarms with their rules, initially inactive; records all events in order."""
 
     def __init__(self, watched: Iterable[Watch] = ()) -> None:
         watches = list(watched)
@@ -53,14 +53,14 @@ class AlarmBoard:
 
     @property
     def alarms(self) -> Sequence[Alarm]:
-        """All of them, whatever their state."""
+        """All alarms, in any state."""
         return list(self._alarms.values())
 
     def __contains__(self, id_: str) -> bool:
         return id_ in self._alarms
 
     def alarm(self, id_: str) -> Alarm:
-        """Look one up. Raises `KeyError` if there is no such alarm."""
+        """Return the alarm with an id. Raises `KeyError` if there is no such alarm."""
         return self._alarms[id_]
 
     def update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
@@ -70,13 +70,13 @@ class AlarmBoard:
             self.record(watch.id, condition, now_ns)
 
     def record(self, id_: str, condition: Judgement, now_ns: int) -> None:
-        """Update an alarm, also with the value of a condition within limits."""
+        """Update an alarm in every case, so that it also stores the value within limits."""
         self._note(id_, *update(self._alarms[id_], condition, now_ns, self._rules[id_]))
 
     def pause(self, spared: str | None = None) -> None:
-        """Stop all delays up to now, except those of one kind of alarm.
+        """Pause all delay timers, except those of the alarm kind `spared`.
 
-        The clock was set and does not show how much time passed, or samples are missing.
+        Call it when samples are missing or the clock was set, so that the elapsed time is unknown.
         """
         self._alarms = {
             id_: alarm if alarm.identity.kind == spared else interrupted(alarm)
@@ -84,21 +84,21 @@ class AlarmBoard:
         }
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """End the shelving of alarms whose time is up."""
+        """Unshelve alarms with expired shelving; return the changed alarms with their events."""
         for id_, alarm in self._alarms.items():
             if alarm.shelf is not None:
                 self._note(id_, *expire(alarm, host_ns))
         return self.drain_news()
 
     def operate(self, id_: str, action: Action, host_ns: int) -> list[AlarmNews]:
-        """Apply an action of a person.
+        """Apply an action of a person; return the changed alarm with its events.
 
         Raises
         ------
         KeyError
             If there is no such alarm.
         ActionRefusedError
-            As `operate` does.
+            If the action does not fit the state of the alarm.
         """
         self._note(id_, *operate(self._alarms[id_], action, host_ns))
         return self.drain_news()
@@ -106,18 +106,18 @@ class AlarmBoard:
     def restore(
         self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
     ) -> list[AlarmNews]:
-        """Continue after a restart: active alarms stay active, their conditions are unknown.
+        """Restore alarms after a restart: active alarms stay active with unknown condition.
 
-        An alarm without a rule returns to normal, and stays on the list until acknowledged.
+        An alarm without a rule returns to normal and stays on the list until acknowledged.
 
         Parameters
         ----------
         stored
-            Alarms after their newest events.
+            Alarms as stored with their newest events.
         memory
-            State at the last block, if no sample is missing since: condition and delays of its
-            alarms continue. Their stored form may be newer, by actions of people or, without
-            samples, by the link. Alarms without a rule are left out.
+            State at the last block, if no samples have been lost since. Its conditions and delay
+            timers continue. A stored alarm may be newer than the memory because of an action or
+            a link event. Alarms in the memory that have no rule are ignored.
         """
         kept = memory.alarms if memory else ()
         remembered = {a.identity.id: a for a in kept if a.identity.id in self._rules}
@@ -138,7 +138,7 @@ class AlarmBoard:
         return self.drain_news()
 
     def drain_news(self) -> list[AlarmNews]:
-        """Return and forget the news since the last call."""
+        """Return the changed alarms and their events since the last call, and clear the list."""
         news, self._news = self._news, []
         return news
 
@@ -149,7 +149,7 @@ class AlarmBoard:
 
 
 def _merged(kept: Alarm, stored: Alarm) -> Alarm:
-    """A kept alarm with the changes of newer events."""
+    """Return an alarm from the memory, updated from the stored alarm if that has newer events."""
     if stored.n_events <= kept.n_events:
         return kept
     if stored.identity.kind == LINK_LOST and not is_same_occurrence(kept, stored):

@@ -1,4 +1,4 @@
-"""Judgements of channels, of 1× vectors, and of the device's clock."""
+"""Judgements of channels, of 1× vectors and of the device clock."""
 
 import cmath
 import math
@@ -14,26 +14,26 @@ from core.quality import NOT_MEASURED, Level, Quality, Reading, Reason, missing,
 from core.samples.blocks import DeviceClock
 
 COVERAGE = 1.96
-"""Standard uncertainties on each side of a value that hold the truth with 95 %."""
+"""Coverage factor of a 95 % interval of a normal distribution."""
 
 SENSOR_FAULTS = (Reason.DEAD, Reason.STUCK, Reason.CLIPPED)
-"""Faults of a channel that only a whole segment shows."""
+"""Channel faults that can be detected only from a whole segment."""
 
 
 def fault_judgement(fault: str | None) -> Judgement:
-    """Alert for a fault; within limits without one."""
+    """Return an alert if there is a fault, otherwise a judgement within limits."""
     return WITHIN if fault is None else Judgement(AlarmLevel.ALERT, reason=fault)
 
 
 def channel_judgement(
     quality: Quality, segment_fault: Reason | None, clipped_percent: float | None = None
 ) -> Judgement:
-    """Whether a waveform channel is OK, by its newest samples and its newest segment.
+    """Judge a waveform channel by the quality of its newest samples and its newest segment.
 
     Parameters
     ----------
     clipped_percent
-        Share of clipped samples of that segment, %.
+        Percentage of clipped samples in the newest segment.
     """
     fault = segment_fault if quality.level is Level.GOOD else quality.reason
     found = fault_judgement(fault)
@@ -45,14 +45,14 @@ def channel_judgement(
 def fault_after_segment(
     fault: Reason | None, amplitude: Reading, has_wrong_sign: bool | None
 ) -> Reason | None:
-    """Fault of a channel after a segment, which may show a fault or that there is none.
+    """Return the fault of a channel after a new segment: kept, newly detected, or None if cleared.
 
     Parameters
     ----------
     amplitude
-        1× amplitude of the channel.
+        1× amplitude of the channel in that segment.
     has_wrong_sign
-        Whether the stiffness of its direction shows a reversed transducer; None if unknown.
+        Whether the stiffness in this direction indicates reversed polarity; None if unknown.
     """
     if amplitude.value is None and amplitude.quality.reason in SENSOR_FAULTS:
         return amplitude.quality.reason
@@ -64,35 +64,35 @@ def fault_after_segment(
 
 
 def offset_reading(clock: DeviceClock | None) -> Reading:
-    """Absolute offset of a device's time stamps from the host's clock, s."""
+    """Return the absolute offset of the device time stamps from the host clock, s."""
     if clock is None or clock.offset_s is None:
         return NOT_MEASURED
     return Reading(abs(clock.offset_s))
 
 
 def drift_reading(clock: DeviceClock | None) -> Reading:
-    """Absolute drift of a device's sampling that exceeds its uncertainty, parts per million."""
+    """Return the part of the absolute sampling-rate drift that exceeds its uncertainty, ppm."""
     if clock is None or clock.drift_ppm is None or clock.u_drift_ppm is None:
         return missing(Reason.WAITING_FOR_DATA)
     return Reading(max(0.0, abs(clock.drift_ppm) - COVERAGE * clock.u_drift_ppm))
 
 
 CLOCK_READINGS = {"clock_offset": offset_reading, "clock_drift": drift_reading}
-"""What is judged of a device's clock, by kind of alarm."""
+"""Function that returns the judged reading of the device clock, by alarm rule."""
 
 NO_REFERENCE, NO_PHASE = "no_reference", "no_phase"
 AMPLITUDE_ONLY = {"ok": "amplitude_change_only", "above_limit": "amplitude_change_above_limit"}
-"""Reasons of a judgement without a phase."""
+"""Reasons of a judgement by amplitude only, by the reason of the comparison with the limits."""
 
 
 @dataclass(frozen=True)
 class OrderVector:
-    """A 1× vector; its phase, by which it leads the key-phase, is None where it is not known.
+    """1× vector; the phase is the lead over the key-phase pulse, None if unknown.
 
     Raises
     ------
     ValueError
-        If the amplitude is not a number of zero or more, or the phase no number.
+        If the amplitude is negative or not finite, or the phase is not finite.
     """
 
     amplitude_um_pk: float
@@ -105,25 +105,25 @@ class OrderVector:
             raise ValueError(f"phase {self.phase_deg:g} must be a number")
 
     def change_um_pk(self, other: "OrderVector") -> float:
-        """Length of the difference, or the difference of the lengths if a phase is missing."""
+        """Return the length of the vector difference; without a phase, the amplitude difference."""
         if self.phase_deg is None or other.phase_deg is None:
             return abs(self.amplitude_um_pk - other.amplitude_um_pk)
         return abs(self.phasor_um_pk - other.phasor_um_pk)
 
     @property
     def phasor_um_pk(self) -> complex:
-        """The vector; its phase is 0 if it is not known."""
+        """Complex phasor of the vector; an unknown phase counts as 0."""
         return cmath.rect(self.amplitude_um_pk, math.radians(self.phase_deg or 0.0))
 
 
 @dataclass(frozen=True)
 class VectorReference:
-    """The 1× vectors of a bearing that is well, in one operating state.
+    """Reference 1× vectors of a healthy bearing in one operating state.
 
     Parameters
     ----------
     vectors
-        By place: "shaft_x", "shaft_y", "bearing_x", "bearing_y", as far as they are known.
+        Known vectors by measuring point: "shaft_x", "shaft_y", "bearing_x", "bearing_y".
     """
 
     unit: str
@@ -139,12 +139,12 @@ def vector_judgement(
     point: OperatingPoint,
     held: AlarmLevel | None,
 ) -> Judgement:
-    """Judge how far a 1× vector has moved from where it was when all was well.
+    """Judge the change of a 1× vector from its reference.
 
-    A crack, a loose part or a rub can turn the vector and leave its length as it was, so that the
-    length of the complex difference is judged. Without a phase only the difference of the lengths
-    is known, which is never more than that: it may raise an alarm, but does not clear one where the
-    reference has a phase. The source of the watch is the place, such as "shaft_x".
+    A crack, a loose part or a rub can turn the vector without a change of its amplitude, so the
+    length of the complex difference is judged. Without a phase, only the amplitude difference is
+    known. It never exceeds the length of the complex difference, so it can raise an alarm but not
+    clear an alarm whose reference has a phase. `watch.source` is the measuring point ("shaft_x").
     """
     place = watch.source
     amplitude = readings[f"order1_{place}_um_pk"]

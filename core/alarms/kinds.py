@@ -1,4 +1,4 @@
-"""`ALARM_KINDS`: the kinds of alarms of a unit, and the alarms that rules make of it."""
+"""`ALARM_KINDS`: table of the alarm kinds of a unit. `watches_of`: alarms that a unit has."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -13,37 +13,38 @@ from core.machine.unit import Unit
 from core.quality import Reading
 
 CHANNEL_NOT_OK, LINK_LOST = "channel_not_ok", "link_lost"
-"""Kinds that are known by name beyond this table."""
+"""Names of alarm kinds that other modules refer to."""
 
 OIL_TEMPERATURE, TIME_STAMPS = "oil_temperature", "time_stamps"
-"""Names of a kind and of its rule alike."""
+"""Names that an alarm kind and its rule share."""
 
 CHANNEL, BEARING, DEVICE, LINK = "channel", "bearing", "device", "link"
-"""Subjects of alarms: a channel or bearing, named by its id; the device or the link of a unit."""
+"""Subject types of alarms: a channel or bearing, given by its id, or a unit's device or link."""
 
 
 @dataclass(frozen=True)
 class AlarmKind:
-    """One kind of alarm. Rules, API, plant file, mail and dashboard read its fields here.
+    """Kind of alarm. Rules, API, plant file, mail and dashboard use its fields.
 
     Parameters
     ----------
     name
-        Part of the identity of an alarm. It is stored and never changes.
+        Name in the identity of an alarm. It is stored in the database and must not change.
     label
-        Words for people, beginning with a capital.
+        Display name, with a capital first letter.
     unit
-        Unit of the alarm's value; None if it has no value.
+        Unit of measurement of the alarm's value; None if the alarm has no value.
     subject
-        `CHANNEL` or `BEARING` if the alarm is about one of them, else the subject itself.
+        `CHANNEL` or `BEARING` for alarms of each channel or bearing, else the fixed subject.
     rule
-        Its rule: a key of `BearingRules`, or a field of `UnitRules`.
+        Name of the rule: a key of `BearingRules`, or a field of `UnitRules`.
     reading
-        Reading of an assessment that is compared with limits; for a 1× vector, its place.
+        Name of the assessed reading that is compared with limits; for a 1× vector, its measuring
+        point.
     needs
-        Part that a bearing must have: a field of `Bearing` that is not None.
+        Field of `Bearing` that must not be None for the bearing to have this alarm.
     advice
-        What to do about it, for alarms about the way of samples into padwatch.
+        Recommended action, for alarms about data acquisition.
     """
 
     name: str
@@ -57,12 +58,12 @@ class AlarmKind:
 
 
 def kind_table(*kinds: AlarmKind) -> Mapping[str, AlarmKind]:
-    """Kinds by name, in the given order."""
+    """Return a read-only table of alarm kinds by name, in the given order."""
     return MappingProxyType({kind.name: kind for kind in kinds})
 
 
 def _pair(rule: str, unit: str, *texts: str) -> Iterable[AlarmKind]:
-    """Kinds in x and in y; braces in name, label, reading and need stand for the axis."""
+    """Yield the kinds for x and for y; braces in the texts are replaced by the axis."""
     for axis in "xy":
         name, label, *rest = (text.format(axis) for text in texts)
         yield AlarmKind(name, label, unit, BEARING, rule, *rest)
@@ -155,31 +156,31 @@ ALARM_KINDS = kind_table(
         advice="Find out why the device does not answer; padwatch connects again by itself.",
     ),
 )
-"""All kinds of a unit's alarms. Alarms of one bearing are judged in this order."""
+"""All alarm kinds of a unit. The alarms of a bearing are judged in this order."""
 
 FILM_KINDS = tuple(kind.name for kind in ALARM_KINDS.values() if kind.rule == "films")
-"""Kinds of alarms about the film, in the order of a film's findings: x, y."""
+"""Names of the film-stiffness alarm kinds, in the order of a film's findings: x, y."""
 
 FAST = ("shaft_order1", "shaft_overall", "bearing_overall")
-"""Rules about what may change within seconds. Zones are for steady operation (ISO 20816-1)."""
+"""Rules for values that can change within seconds. Zones need steady operation (ISO 20816-1)."""
 
 VECTORS = ("shaft_change", "bearing_change")
 """Rules that compare 1× vectors with references."""
 
 WAVEFORM_CHANNEL, SLOW_CHANNEL = "channel", "slow_channel"
-"""Rules of the kind "channel_not_ok", by what the channel delivers."""
+"""Rules of the kind "channel_not_ok" for waveform channels and for slow channels."""
 
 
 @dataclass(frozen=True)
 class Watch:
-    """An alarm that a unit or the service can have.
+    """Definition of an alarm that a unit or the service can have.
 
     Parameters
     ----------
     source
-        What is judged: a channel, a reading, the place of a vector, or the subject itself.
+        Name of the judged channel, reading or measuring point, or the subject itself.
     group
-        Name of its rule, by which alarms are judged together.
+        Name of the rule; alarms with the same rule are judged together.
     """
 
     identity: AlarmIdentity
@@ -194,7 +195,7 @@ class Watch:
         return self.identity.id
 
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
-        """Compare a reading with the limits. Raises `TypeError` if the alarm has none."""
+        """Compare a reading with the limits. Raises `TypeError` for an alarm without limits."""
         if self.limits is None:
             raise TypeError(f"{self.id} has no limits")
         return self.limits.judge(reading, point, held)
@@ -203,14 +204,14 @@ class Watch:
 def watch(
     identity: AlarmIdentity, rule: AlarmRule | LimitRule, source: str, group: str = ""
 ) -> Watch:
-    """The alarm that a rule makes."""
+    """Return the definition of an alarm with a rule, which may include limits."""
     if isinstance(rule, LimitRule):
         return Watch(identity, rule.rule, source, group, rule)
     return Watch(identity, rule, source, group)
 
 
 def watches_of(unit: Unit, rules: UnitRules) -> list[Watch]:
-    """The alarms that rules make of a unit, each of them once."""
+    """Return the definitions of all alarms of a unit for its rules, without duplicates."""
     watches: list[Watch] = []
 
     def add(kind: AlarmKind, subject: str, source: str, group: str, own: BearingRules) -> None:

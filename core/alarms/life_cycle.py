@@ -1,7 +1,7 @@
-"""What the plant does to an alarm (ISA-18.2): judgements in, transitions out.
+"""Alarm transitions caused by the plant (ISA-18.2), computed from judgements.
 
-No function reads a clock: rules on data receive the times of the samples, so that the same samples
-lead to the same events however fast they are replayed.
+No function reads a clock. Times are sample times, so a replay of the same samples produces the same
+events at any speed.
 """
 
 from dataclasses import replace
@@ -15,10 +15,10 @@ Timers = tuple[DelayTimer, DelayTimer]
 def update(
     alarm: Alarm, condition: Judgement, now_ns: int, rule: AlarmRule
 ) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """Update an alarm with the newest finding.
+    """Update an alarm with the newest judgement; return the alarm and its new events.
 
-    While the condition is unknown, an active alarm stays active and a pending one pending, with its
-    delay stopped. While it is suppressed, level and value stay those that were known last.
+    While the condition is unknown, an active alarm stays active, and a pending alarm stays pending
+    with its delay paused. The level and value of an unknown condition are the last known ones.
     """
     events: list[AlarmEvent] = []
 
@@ -63,29 +63,29 @@ def update(
 
 
 def interrupted(alarm: Alarm) -> Alarm:
-    """The alarm where samples are missing: the time in between counts for no delay."""
+    """Return the alarm with paused delays, for a gap in the samples."""
     return replace(alarm, timers=_paused(alarm.timers))
 
 
 def shown_again(alarm: Alarm) -> Alarm:
-    """The alarm when it is no longer hidden: announced anew if active (ISA-18.2, G or H to B)."""
+    """Return an alarm after hiding has ended; unacknowledged if active (ISA-18.2, G/H to B)."""
     return replace(alarm, is_acknowledged=alarm.is_acknowledged and alarm.level is None)
 
 
 def restored(alarm: Alarm) -> Alarm:
-    """The alarm after a restart: active if it was active; nothing is pending."""
+    """Return the alarm after a restart: an active alarm stays active, pending delays are reset."""
     level = None if alarm.is_latched else alarm.level
     alert, danger = (ON if (level or 0) >= each else INACTIVE for each in AlarmLevel)
     return replace(alarm, timers=(alert, danger))
 
 
 def standing_level(timers: Timers) -> AlarmLevel | None:
-    """The worst level whose condition counts now, apart from the latch."""
+    """Return the worst level whose delay timer is on, regardless of the latch."""
     return max((n for n, t in zip(AlarmLevel, timers, strict=True) if t.is_on), default=None)
 
 
 def _raised(alarm: Alarm, level: AlarmLevel, now_ns: int) -> Alarm:
-    """The alarm in a new occurrence, which must be acknowledged."""
+    """Return the alarm with a new, unacknowledged occurrence."""
     held = alarm.level
     return replace(
         alarm,

@@ -1,4 +1,4 @@
-"""What people do to an alarm, and what their shelving does when its time is up."""
+"""Actions of people on an alarm, and the expiry of shelving."""
 
 from dataclasses import dataclass, replace
 from typing import TypeAlias
@@ -8,12 +8,12 @@ from core.alarms.life_cycle import shown_again, standing_level
 from core.units import NS_PER_S
 
 CLOCK_MARGIN_NS = 60 * NS_PER_S
-"""By how much a clock may be earlier than when an alarm was shelved: hosts differ by less, and NTP
-steps by less."""
+"""Largest accepted step back of the clock behind the time of shelving. Clock differences between
+hosts and steps by NTP are smaller."""
 
 
 class ActionRefusedError(ValueError):
-    """An action that does not fit the state of the alarm; the message says why."""
+    """Error for an action that does not fit the alarm's state; the message states the reason."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Acknowledge:
 
 @dataclass(frozen=True)
 class Shelve:
-    """Take an alarm off the list for a while."""
+    """Remove an alarm from the list until a given time."""
 
     actor: str
     reason: str
@@ -36,14 +36,14 @@ class Shelve:
 
 @dataclass(frozen=True)
 class Unshelve:
-    """End the shelving of an alarm before its time."""
+    """End the shelving of an alarm before it expires."""
 
     actor: str
 
 
 @dataclass(frozen=True)
 class TakeOutOfService:
-    """Take an alarm off the list until further notice, as for maintenance."""
+    """Remove an alarm from the list without an end time, for example for maintenance."""
 
     actor: str
     reason: str
@@ -51,21 +51,21 @@ class TakeOutOfService:
 
 @dataclass(frozen=True)
 class ReturnToService:
-    """Put an alarm that is out of service back on the list."""
+    """Return an alarm that is out of service to the list."""
 
     actor: str
 
 
 @dataclass(frozen=True)
 class Reset:
-    """Release the latch of an alarm whose condition has gone."""
+    """Release the latch of an alarm whose condition has ended."""
 
     actor: str
 
 
 @dataclass(frozen=True)
 class Comment:
-    """Add a comment; the alarm stays as it is."""
+    """Add a comment without a change of the alarm's state."""
 
     actor: str
     text: str
@@ -77,7 +77,7 @@ Action: TypeAlias = (
 
 
 def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """Apply an action of a person at a host time; one that changes nothing has no event.
+    """Apply an action of a person at a host time; an action without effect adds no event.
 
     Raises
     ------
@@ -129,11 +129,11 @@ def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[Ala
 
 
 def expire(alarm: Alarm, now_ns: int) -> tuple[Alarm, tuple[AlarmEvent, ...]]:
-    """End the shelving of an alarm when its time is up, by the host's clock.
+    """End the shelving of an alarm when it has expired by the host clock.
 
-    It ends as well where that clock is earlier than when the alarm was shelved: the clock was set
-    back, and the end lies too far ahead by as much. So an alarm is never hidden for longer from now
-    on than it was shelved for, and a minute.
+    Shelving also ends if the host clock is more than `CLOCK_MARGIN_NS` earlier than the time of
+    shelving: the clock was set back, so the expiry time is too late by the same amount. An alarm is
+    therefore hidden for at most the shelving time plus one minute.
     """
     shelf = alarm.shelf
     if shelf is None:

@@ -1,4 +1,4 @@
-"""Rules of alarms: limits by operating condition, delays, and what is watched on a unit."""
+"""Alarm rules of a unit: limits by operating condition, delays, monitored quantities."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,14 +17,14 @@ EVERY_STATE = frozenset(OperatingState)
 States = frozenset[OperatingState]
 
 Range = tuple[float, float]
-"""From the first, up to but not including the second."""
+"""Half-open interval: the lower bound is included, the upper bound is excluded."""
 
 
 @dataclass(frozen=True)
 class Region:
-    """Operating states and ranges of the other conditions; None where any value will do.
+    """Operating states, and ranges of the operating condition; None for an unrestricted range.
 
-    A condition cell is a region whose ranges are the cell's bounds. Attitudes are within 0 to 360.
+    A condition cell is a region with the bounds of the cell. Attitude angles are within 0° to 360°.
     """
 
     states: States = EVERY_STATE
@@ -33,7 +33,7 @@ class Region:
     attitude_deg: Range | None = None
 
     def holds(self, point: OperatingPoint) -> bool | None:
-        """Whether a point lies in it; None where that is not known."""
+        """Whether the region contains an operating point; None if unknown."""
         is_inside = point.state in self.states
         is_known = is_inside or point.state is not OperatingState.UNKNOWN
         inside: list[bool | None] = [is_inside if is_known else None]
@@ -45,7 +45,7 @@ class Region:
         return None if None in inside and False not in inside else all(inside)
 
     def overlaps(self, other: "Region") -> bool:
-        """Whether a point may lie in both."""
+        """Whether this region and another have common operating points."""
         both = zip(self.ranges, other.ranges, strict=True)
         return bool(self.states & other.states) and all(
             one is None or two is None or (one[0] < two[1] and two[0] < one[1]) for one, two in both
@@ -53,29 +53,30 @@ class Region:
 
     @property
     def ranges(self) -> tuple[Range | None, Range | None, Range | None]:
-        """Of eccentricity ratio, oil temperature and attitude angle."""
+        """Ranges of eccentricity ratio, oil temperature and attitude angle."""
         return self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg
 
 
 def rule_of(on_delay_s: float, off_delay_s: float, *, is_latching: bool = False) -> AlarmRule:
-    """A rule with delays in seconds."""
+    """Return an alarm rule with delays given in seconds."""
     return AlarmRule(ns_from_s(on_delay_s), ns_from_s(off_delay_s), is_latching)
 
 
 @dataclass(frozen=True)
 class LimitRule:
-    """Limits of a value by operating condition. Where none hold, the alarm is suppressed by design.
+    """Limits of a value by operating condition; without valid limits the alarm is suppressed.
 
-    Where the condition is not known nothing is suppressed, and all limits that may hold count.
+    An unknown operating condition suppresses no alarm: all limits that may be valid are applied.
 
     Parameters
     ----------
     limits
-        Hold in the given states, outside of all tables; None if only tables hold, as for zones.
+        Limits in the given states outside the regions of `tables`; None if only `tables` apply,
+        as for zones.
     states
-        Operating states in which `limits` count.
+        Operating states in which `limits` are valid.
     tables
-        Regions of the condition in which other limits hold instead; no two overlap.
+        Disjoint regions of the operating condition with the limits that are valid there.
     """
 
     limits: Limits | None
@@ -84,7 +85,7 @@ class LimitRule:
     tables: tuple[tuple[Region, Limits], ...] = ()
 
     def at(self, point: OperatingPoint) -> Sequence[Limits]:
-        """The limits that hold at a point, or may hold; empty where none do."""
+        """Return the limits that are or may be valid at an operating point; empty if none are."""
         possible = []
         for region, limits in self.tables:
             holds = region.holds(point)
@@ -96,9 +97,9 @@ class LimitRule:
         return (*possible, self.limits) if counts and self.limits is not None else possible
 
     def judge(self, reading: Reading, point: OperatingPoint, held: AlarmLevel | None) -> Judgement:
-        """Worst judgement by all limits that may hold; of equal ones, by the strictest limit.
+        """Return the worst judgement by the limits that may be valid; of equal ones, the strictest.
 
-        Where none hold, the condition is unknown: an alarm does not return by being suppressed.
+        Without valid limits the condition is unknown, so a suppressed alarm does not return.
         """
         found = [judge(reading, limits, held) for limits in self.at(point)]
         if not found:
@@ -109,7 +110,10 @@ class LimitRule:
 
 
 def point_of(assessment: Assessment) -> OperatingPoint:
-    """Operating condition of a result, doubted or not; a standstill is known without a state."""
+    """Return the operating point of an assessment of any quality.
+
+    Standstill is also derived from the speed reading if the operating state is unknown.
+    """
     condition, readings = assessment.condition, assessment.readings
     state = OperatingState.UNKNOWN if condition is None else condition.state
     speed = readings.get("speed_rpm", NOT_MEASURED)
@@ -120,27 +124,28 @@ def point_of(assessment: Assessment) -> OperatingPoint:
 
 
 BearingRules: TypeAlias = Mapping[str, LimitRule | None]
-"""Limits of one bearing, by the `rule` of the kinds of alarms that they make; None makes none."""
+"""Limit rules of one bearing, by `AlarmKind.rule`; None disables the alarms of the kind."""
 
 
 @dataclass(frozen=True)
 class UnitRules:
-    """Rules of one unit; None where nothing is watched, such as clock and link of a replay.
+    """Alarm rules of one unit; None disables an alarm, such as clock and link in a replay.
 
     Parameters
     ----------
     slow_channel
-        Of slow channels that a limit needs; another device may deliver them, and later.
+        Rule for slow channels that a limit needs. Another device may deliver them with a delay.
     bearings
-        By bearing.
+        Limit rules by bearing.
     films
-        Of changes of each film's stiffness, which `core.change` decides.
+        Rule for changes of film stiffness, which `core.change` detects.
     clock_offset, clock_drift
-        Of the device's stamps against the host, s; of its sampling, parts per million.
+        Limits of the offset of the device time stamps from host time, s, and of the sampling-rate
+        drift, ppm.
     time_stamps
-        That the device's stamps fit the sample index.
+        Rule for time stamps of the device that do not match the sample index.
     link
-        That samples arrive.
+        Rule for a lost link to the device.
     """
 
     channel: AlarmRule = field(default_factory=lambda: rule_of(0.5, 10.0))

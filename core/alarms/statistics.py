@@ -1,4 +1,4 @@
-"""Figures of an alarm list (ISA-18.2, clause 16): rates, standing and chattering alarms."""
+"""Alarm system metrics (ISA-18.2, clause 16): alarm rates, stale and chattering alarms."""
 
 from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,14 +13,14 @@ from core.limits import AlarmLevel
 from core.units import DAY_NS, NS_PER_S
 
 SHOWN_NS = 600 * NS_PER_S
-"""For how long after its last activation an alarm still counts as chattering."""
+"""Time after its last chattering activation for which an alarm is reported as chattering."""
 
 
 @dataclass(frozen=True)
 class ChatterRule:
-    """Activations within a window that make an alarm chattering.
+    """Number of activations within a time window that define a chattering alarm.
 
-    An alarm that is active for less than the window is fleeting.
+    An alarm that is active for less than the window counts as fleeting.
     """
 
     n_activations: int = 3
@@ -28,7 +28,7 @@ class ChatterRule:
 
 
 class ChatterWatch:
-    """Counts the newest activations of alarms."""
+    """Detector of chattering alarms from their newest activations."""
 
     def __init__(self, rule: ChatterRule) -> None:
         self._rule = rule
@@ -36,7 +36,7 @@ class ChatterWatch:
         self._chattered: dict[str, int] = {}
 
     def note(self, event: AlarmEvent, seen_ns: int) -> None:
-        """Count an event, seen at a host time; its own time may be that of samples long past."""
+        """Add an event, received at host time `seen_ns`; its own time may be an old sample time."""
         if event.change not in ANNOUNCED:
             return
         n_wanted = self._rule.n_activations
@@ -46,7 +46,7 @@ class ChatterWatch:
             self._chattered[event.identity.id] = seen_ns
 
     def is_chattering(self, alarm: str, now_ns: int) -> bool:
-        """Whether an alarm has chattered until a short while ago."""
+        """Whether an alarm has chattered within the last `SHOWN_NS`."""
         seen_ns = self._chattered.get(alarm)
         return seen_ns is not None and now_ns - seen_ns <= SHOWN_NS
 
@@ -54,10 +54,10 @@ class ChatterWatch:
 TEN_MINUTES_NS = 600 * NS_PER_S
 
 STALE_NS = DAY_NS
-"""An alarm that is active for longer is stale."""
+"""Active time beyond which an alarm is stale."""
 
 N_FLOOD = 10
-"""More alarms than this in ten minutes are a flood: too many for an operator (ISA-18.2)."""
+"""Number of alarms in ten minutes above which an alarm flood is counted (ISA-18.2)."""
 
 N_MOST_FREQUENT = 10
 
@@ -66,7 +66,7 @@ HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 @dataclass(frozen=True)
 class Frequent:
-    """One of the most frequent alarms: how often it was announced, and its share of all."""
+    """Frequent alarm: its number of announcements, and their share of all announcements."""
 
     alarm: str
     n_alarms: int
@@ -75,22 +75,22 @@ class Frequent:
 
 @dataclass(frozen=True)
 class AlarmFigures:
-    """Figures over some time.
+    """Alarm system metrics over a period.
 
     Parameters
     ----------
     n_alarms
-        Announcements: alarms that were raised, rose to danger, or came back from being hidden.
+        Number of announcements: alarms raised, escalated, or active when no longer hidden.
     most_in_10_min
-        In the worst ten minutes.
+        Largest number of announcements within ten minutes.
     share_in_flood
-        Of the ten-minute periods, those with more than `N_FLOOD`.
+        Fraction of the ten-minute periods with more than `N_FLOOD` announcements.
     most_frequent
-        At most `N_MOST_FREQUENT`, the most frequent first.
+        At most `N_MOST_FREQUENT` alarms, the most frequent first.
     chattering
-        By alarm: activations that lie, with enough others, within one window.
+        Number of chattering activations, by alarm.
     n_fleeting
-        Alarms that returned within the window.
+        Number of alarms that returned within the window of `ChatterRule`.
     """
 
     n_alarms: int
@@ -105,7 +105,7 @@ class AlarmFigures:
 
 
 def is_announced(event: AlarmEvent) -> bool:
-    """Whether an event calls an operator: an alarm that is new on the list, or back on it."""
+    """Whether an event announces an alarm: newly raised, escalated, or active and unhidden."""
     return event.state_after is AlarmState.UNACKNOWLEDGED and (
         event.change in ANNOUNCED or event.state_before in HIDDEN
     )
@@ -114,7 +114,7 @@ def is_announced(event: AlarmEvent) -> bool:
 def figures_of(
     events: Iterable[AlarmEvent], start_ns: int, end_ns: int, rule: ChatterRule
 ) -> AlarmFigures:
-    """Figures of the events from a start up to, not including, an end; other events are left out.
+    """Return the metrics of the events from a start up to, but not including, an end.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def figures_of(
 
 
 def stale_alarms(alarms: Iterable[Alarm], now_ns: int) -> list[Alarm]:
-    """Alarms on the list that have been active for more than a day, the oldest first."""
+    """Return the visible alarms that have been active for more than a day, the oldest first."""
     standing = [
         (alarm.raised_ns, alarm)
         for alarm in alarms
@@ -157,12 +157,12 @@ def stale_alarms(alarms: Iterable[Alarm], now_ns: int) -> list[Alarm]:
 
 
 def _n_before(times: TimeArray, window_ns: int) -> npt.NDArray[np.int64]:
-    """Number of the sorted times in the window that ends with each of them, ends included."""
+    """Return the number of sorted times in the closed window that ends at each time."""
     return np.arange(1, times.size + 1) - np.searchsorted(times, times - window_ns)
 
 
 def _chattering(events: Iterable[AlarmEvent], rule: ChatterRule) -> dict[str, int]:
-    """Activations of each alarm that lie, with enough others, within one window."""
+    """Return the number of chattering activations by alarm, for alarms that have any."""
     raised: defaultdict[str, list[int]] = defaultdict(list)
     for event in events:
         if event.change in ANNOUNCED:

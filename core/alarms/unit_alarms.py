@@ -1,4 +1,4 @@
-"""`UnitAlarms`: all alarms of one unit, updated by samples, results, findings and the link."""
+"""`UnitAlarms`: all alarms of a unit, updated from samples, assessments, film changes and link."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -40,18 +40,18 @@ from core.stiffness.order_line import AMPLITUDES, DIRECTIONS
 from core.units import NS_PER_S
 
 POINT_HOLDS_NS = 300 * NS_PER_S
-"""How long the operating condition of a result is taken for that of later samples."""
+"""Time for which the operating condition of an assessment remains valid for later samples."""
 
 
 class UnitAlarms(AlarmBoard):
-    """Owns the alarms of one unit.
+    """Alarms of one unit.
 
     Parameters
     ----------
     rules
-        What is watched; alarms whose rule is gone can only be acknowledged.
+        Alarm rules; a stored alarm whose rule has been removed can only be acknowledged.
     rows
-        Which channel each row of a block is about, by id; the unit's channels if not given.
+        Channel id of each row of a block; by default, the unit's channels in order.
     """
 
     def __init__(
@@ -88,21 +88,21 @@ class UnitAlarms(AlarmBoard):
 
     @property
     def is_connected(self) -> bool:
-        """Whether samples arrive, as last reported."""
+        """Whether the link to the device was up in the newest link update."""
         return self._link[0]
 
     def reference(self, bearing: str, state: OperatingState) -> VectorReference | None:
-        """Reference of the 1× vectors of a bearing in a state, if there is one."""
+        """Return the reference 1× vectors of a bearing in an operating state, or None."""
         return self._references.get((bearing, state))
 
     def refer_to(self, reference: VectorReference) -> None:
-        """Compare 1× vectors with a new reference from the next result on."""
+        """Set the reference of the 1× vectors, effective from the next assessment on."""
         self._references[reference.bearing, reference.state] = reference
 
     def take(
         self, block: SampleBlock, assessments: Iterable[Assessment], host_ns: int
     ) -> list[AlarmNews]:
-        """Judge a block, the device's clock by the host's, and results that are complete."""
+        """Judge new assessments, the channels of a block and the device clock; return changes."""
         if self._is_repeated(block):
             return []
         for assessment in assessments:
@@ -126,12 +126,12 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def films(self, conditions: Mapping[str, Judgement], now_ns: int) -> list[AlarmNews]:
-        """Update the alarms about films, by id, at the time of the samples that decided.
+        """Update the film-stiffness alarms from judgements by alarm id, at a sample time.
 
         Raises
         ------
         KeyError
-            If the unit has no such alarm about a film.
+            If the unit has no film-stiffness alarm with such an id.
         """
         films = {watch.id: watch for watch in self._of_rule["films"]}
         for id_, condition in conditions.items():
@@ -140,23 +140,23 @@ class UnitAlarms(AlarmBoard):
         return self.drain_news()
 
     def link(self, is_connected: bool, reason: str | None, host_ns: int) -> list[AlarmNews]:
-        """Update the alarm about the link."""
+        """Update the link alarm; return the changed alarm with its events."""
         self._link = (is_connected, reason)
         self._take_link(host_ns)
         return self.drain_news()
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Judge the link and end the shelving of alarms by host time."""
+        """Judge the link and unshelve expired alarms at a host time; return the changed alarms."""
         self._take_link(host_ns)
         return super().tick(host_ns)
 
     def restore(
         self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
     ) -> list[AlarmNews]:
-        """Continue after a restart from stored alarms, as `AlarmBoard.restore` does.
+        """Restore alarms after a restart, as `AlarmBoard.restore` does.
 
-        An event of the link since the last block counts more than the memory: a link that was lost
-        stays lost until samples arrive.
+        A link event since the last block overrides the memory: a lost link stays lost until samples
+        arrive.
         """
         news = super().restore(stored, host_ns, memory)
         if memory is not None:
@@ -172,7 +172,7 @@ class UnitAlarms(AlarmBoard):
 
     @property
     def memory(self) -> AlarmMemory:
-        """State to continue from in another process, beside the events of alarms."""
+        """State for continuing in another process, in addition to the stored alarm events."""
         return AlarmMemory(
             tuple(self.alarms),
             dict(self._segment_faults),
@@ -182,7 +182,7 @@ class UnitAlarms(AlarmBoard):
         )
 
     def _is_repeated(self, block: SampleBlock) -> bool:
-        """Whether a block has no new samples; where samples are missing, delays stop."""
+        """Whether a block has no new samples; pause the delays if samples are missing before it."""
         before, self._stop = self._stop, (block.epoch, block.stop_index)
         if before is None or (block.epoch, block.first_index) == before:
             return False
@@ -218,7 +218,7 @@ class UnitAlarms(AlarmBoard):
                 self.record(watch.id, _at(point, condition), then_ns)
 
     def _recent_point(self, subject: str, now_ns: int) -> OperatingPoint:
-        """Condition of a bearing by its newest result; of anything else, the unit's state."""
+        """Return the recent operating point of a bearing; other subjects have only a state."""
         if subject in self._points:
             point, seen_ns = self._points[subject]
         elif self._points:
@@ -229,7 +229,7 @@ class UnitAlarms(AlarmBoard):
         return point if abs(now_ns - seen_ns) <= POINT_HOLDS_NS else NOWHERE_KNOWN
 
     def _update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
-        """Update the alarm of a channel, the device or its link."""
+        """Update the alarm of a channel, the device or the link."""
         if condition.level is not None:
             subject = self._bearing_of.get(watch.source, watch.source)
             condition = _at(self._recent_point(subject, now_ns), condition)
@@ -239,12 +239,12 @@ class UnitAlarms(AlarmBoard):
         alarm, value = self.alarm(watch.id), reading.value
         limits = watch.limits.at(point) if watch.limits and alarm.is_settled_inactive else ()
         if value is not None and limits and all(each.is_within(value) for each in limits):
-            return  # the usual case, and the cheapest
+            return  # fast path: inactive alarm, value within all limits
         condition = watch.judge(reading, point, alarm.condition.level)
         self.update(watch, _at(point, condition), now_ns)
 
     def _take_channels(self, block: SampleBlock) -> None:
-        """Judge every channel in every cell; compare once while all are OK as they were before."""
+        """Judge all channels in each cell of a block; skip cells with unchanged qualities."""
         if block.channel_quality == self._inactive_with:
             return
         watches = self._of_rule[WAVEFORM_CHANNEL]
@@ -269,7 +269,10 @@ class UnitAlarms(AlarmBoard):
 
 
 def _judged(watch: Watch, assessment: Assessment) -> list[tuple[int, Reading]]:
-    """The readings that an alarm is judged by, with times: the newest segment's, or an average."""
+    """Return the readings that an alarm is judged by, with their times.
+
+    Fast rules use the readings of recent segments, other rules the averaged reading.
+    """
     source = watch.source
     recent = assessment.recent if watch.group in FAST else ()
     found = [(each.time_ns, each.readings[source]) for each in recent if source in each.readings]
@@ -277,5 +280,5 @@ def _judged(watch: Watch, assessment: Assessment) -> list[tuple[int, Reading]]:
 
 
 def _at(point: OperatingPoint, condition: Judgement) -> Judgement:
-    """A judgement with the operating condition under which a limit was passed."""
+    """Return a judgement with the operating point added if a limit is exceeded."""
     return condition if condition.level is None else replace(condition, point=point)

@@ -1,1 +1,1 @@
-"""What healthy films are like under each condition, learned from readings and kept as a value."""
+"""Baselines of film stiffness: expected values under each operating condition, and learning."""

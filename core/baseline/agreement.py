@@ -1,4 +1,4 @@
-"""Checks of a learned baseline: agreement with another, drift while learned, far readings."""
+"""Checks of a learned baseline: agreement of two baselines, drift during learning, outliers."""
 
 import math
 from dataclasses import dataclass
@@ -14,9 +14,10 @@ from core.baseline.history import DIRECTIONS, StiffnessHistory
 
 
 def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[str, float]:
-    """Mean difference of ln by direction, second less first, in cells that both support themselves.
+    """Return the mean difference of ln stiffness by direction, second minus first baseline.
 
-    It is weighted by readings of the first; a direction without common cells is missing.
+    The mean is over cells with `Support.OWN` in both, weighted by the number of readings in the
+    first. A direction without common cells is omitted.
     """
     found: dict[str, float] = {}
     for one in first.quantities:
@@ -38,17 +39,17 @@ def mean_difference(first: BearingBaseline, second: BearingBaseline) -> dict[str
 
 
 SPELL_DAYS = 8
-"""Longer than healthy days are correlated."""
+"""Block length in days for standard errors; longer than the correlation of healthy readings."""
 
 MIN_SPELLS = 3
 
 OUTLIER_STDS = 4.0
-"""Standard deviations at which days are clipped."""
+"""Number of standard deviations at which residuals are clipped."""
 
 
 @dataclass(frozen=True)
 class Drift:
-    """Change of ln over the whole time of learning, with its standard uncertainty."""
+    """Change of ln stiffness over the whole learning period, with its standard uncertainty."""
 
     change: float
     std: float
@@ -57,7 +58,7 @@ class Drift:
 def learning_drift(
     history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: QuantityBaseline
 ) -> Drift | None:
-    """Drift of the readings that a baseline was learned from; None if too few conditions recur."""
+    """Return the drift of the learning readings; None if too few conditions recur."""
     conditions, value = history.conditions, history.ln_k[DIRECTIONS.index(baseline.direction)]
     usable = is_settled & baseline.is_known(conditions) & np.isfinite(value)
     if not usable.any():
@@ -72,7 +73,7 @@ def learning_drift(
 def drift_within(
     day: npt.NDArray[np.int64], value: FloatArray, cell: npt.NDArray[np.int64]
 ) -> Drift | None:
-    """Drift of values over days, each compared only with others of its cell; (n,) all three."""
+    """Return the drift of values over days, compared within cells; all arrays are (n,)."""
     since = (day - day.min()) / max(int(np.ptp(day)), 1)
     time, value = _within(since, cell), _within(value, cell)
     spell = (day - day.min()) // SPELL_DAYS
@@ -88,7 +89,7 @@ def drift_within(
 
 
 def _within(x: FloatArray, cell: npt.NDArray[np.int64]) -> FloatArray:
-    """Differences from the mean of each cell."""
+    """Return the differences from the mean of each cell."""
     _, number = np.unique(cell, return_inverse=True)
     mean = np.bincount(number, weights=x) / np.bincount(number)
     return np.asarray(x - mean[number])
@@ -99,17 +100,17 @@ def _slope(time: FloatArray, value: FloatArray) -> float:
 
 
 FAR_DEVIATION = math.log(2.0)
-"""A film is never twice as stiff as on another day under the same condition: published stiffness
-of warm films at one eccentricity and oil temperature differs by a few per cent (Brito et al.,
-Tables 8 and 9)."""
+"""Implausible deviation of ln stiffness: a factor of two under the same condition. The published
+stiffness of warm films at the same eccentricity and oil temperature differs by a few per cent
+(Brito et al., Tables 8 and 9)."""
 
 
 def far_readings(
     history: StiffnessHistory, is_settled: npt.NDArray[np.bool_], baseline: BearingBaseline
 ) -> str | None:
-    """Warning about settled readings at least twice or at most half of what was learned.
+    """Return a warning if settled readings are at least twice or at most half the baseline.
 
-    A robust fit gives such readings no weight, so that the baseline does not show them.
+    The robust fit rejects such readings, so the baseline itself does not show them.
     """
     counts = []
     for learned in baseline.quantities:

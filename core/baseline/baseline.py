@@ -1,4 +1,4 @@
-"""`BearingBaseline`: the learned stiffness of a bearing, with author, time and event."""
+"""`BearingBaseline`: learned film stiffness of a bearing, with its origin."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -15,12 +15,12 @@ from core.condition.cells import CellGrid, FilmConditions
 
 @dataclass(frozen=True)
 class TimeScatter:
-    """Scatter of the mean deviation over a time scale, correlation of readings included.
+    """Relative scatter of the mean deviation over a time scale, for correlated readings.
 
     Parameters
     ----------
     share
-        Standard deviation of the mean over that of single readings; 1 if they are fully correlated.
+        Standard deviation of the mean divided by that of single readings; 1 if fully correlated.
     """
 
     time_scale_h: float
@@ -33,16 +33,16 @@ class TimeScatter:
 
 @dataclass(frozen=True)
 class Origin:
-    """Subject and origin of a baseline.
+    """Identity of a baseline: unit, bearing, version, author and time.
 
     Parameters
     ----------
     version
-        Number of the baseline among those of its bearing, from 1.
+        Version number of the baseline of this bearing, from 1.
     created_ns
-        Host time of learning.
+        Host time at which the baseline was learned.
     event
-        Event at the machine that made a new baseline necessary.
+        Event at the machine that required a new baseline; empty if none.
     """
 
     unit: str
@@ -56,22 +56,22 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class Deviations:
-    """Readings compared with their baseline; nothing is compared where `place` is -1.
+    """Deviations of readings from their baseline; `place` is -1 for readings without comparison.
 
     Parameters
     ----------
     is_known : (n,)
-        Whether the condition of a reading has everything that the baseline depends on.
+        Whether all conditions that the baseline depends on are known.
     place : (n,)
-        Cell in the table.
+        Row of the cell in the table, or -1.
     deviation : (n,)
-        ln of measured over learned.
+        ln of the measured stiffness over the learned stiffness.
     weight : (n,)
-        1 for a typical reading, less for a noisier one.
+        Weight of the reading: 1 for typical noise, less for a noisier reading.
     scatter, lasting : (n,)
-        Scatter of readings in the cell: the part that averaging takes away, and the rest.
+        Scatter of readings in the cell: the part that averaging reduces, and the remaining part.
     surface_std : (n,)
-        Standard uncertainty of the surface.
+        Standard uncertainty of the surface at the reading.
     """
 
     is_known: npt.NDArray[np.bool_]
@@ -84,29 +84,29 @@ class Deviations:
 
     @property
     def offset_std(self) -> FloatArray:
-        """(n,) standard uncertainty that averaging does not take away."""
+        """Standard uncertainty that averaging does not reduce (n,)."""
         return np.asarray(np.sqrt(self.surface_std**2 + self.lasting**2))
 
 
 @dataclass(frozen=True)
 class QuantityBaseline:
-    """Learned stiffness in one direction.
+    """Learned film stiffness in one direction.
 
     Parameters
     ----------
     quantity
         Name of the quantity in stored documents.
     attitude_covariance
-        Covariance of the surface's attitude terms; empty if it has none.
+        Covariance of the attitude terms of the surface; empty without attitude terms.
     max_surface_std
-        Uncertainty of the surface above which nothing is compared.
+        Standard uncertainty of the surface above which readings are not compared.
     scatter, u_random
-        Of single readings: scatter about the surface over all cells, and the typical random
-        uncertainty that is part of it.
+        Typical scatter of single readings about the surface over all cells, and the typical
+        random uncertainty included in it.
     reading_h
-        Running hours that a reading stands for.
+        Running hours per reading.
     time_scatter
-        Shortest time scale first.
+        Scatter over each time scale, the shortest first.
     rejected_share
         Fraction of the learning groups that the robust fit rejected.
     """
@@ -144,7 +144,7 @@ class QuantityBaseline:
     ) -> Deviations:
         """Compare readings (n,) with the learned values under their conditions.
 
-        The value is ln of the stiffness, with its random standard uncertainty.
+        `value` is ln of the stiffness; `u_random` is its random standard uncertainty.
         """
         is_known = self.is_known(conditions)
         place = self.table.find(self.grid.cells(conditions))
@@ -165,16 +165,16 @@ class QuantityBaseline:
         return found
 
     def compare_history(self, history: StiffnessHistory) -> Deviations:
-        """Compare the readings of a history in the direction of the baseline."""
+        """Compare the readings of a history in the direction of this baseline."""
         row = DIRECTIONS.index(self.direction)
         return self.compare(history.conditions, history.ln_k[row], history.u_random[row])
 
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
-        """(n,) whether readings have everything that the baseline depends on."""
+        """Return whether all conditions that the baseline depends on are known (n,)."""
         return conditions.is_known(self.grid.has_attitude or self.surface.shape.has_attitude)
 
     def eccentricity_rise(self, conditions: FilmConditions) -> FloatArray:
-        """(n,) rise of ln of the stiffness with ln of the eccentricity ratio; NaN if unknown."""
+        """Return d ln(stiffness) / d ln(eccentricity ratio) (n,); NaN for unknown conditions."""
         known = self.is_known(conditions)
         rise = np.full(known.size, np.nan)
         here = conditions.rows(known)
@@ -182,7 +182,7 @@ class QuantityBaseline:
         return rise
 
     def _surface_std(self, conditions: FilmConditions, cell: npt.NDArray[np.int64]) -> FloatArray:
-        """(n,) interpolated in the cell; larger where the attitude differs from the cell's."""
+        """Return the uncertainty of the surface (n,), including the attitude difference."""
         std = self._between_nodes(conditions, cell)
         if not self.surface.shape.has_attitude:
             return std
@@ -193,7 +193,7 @@ class QuantityBaseline:
         return np.asarray(np.sqrt(variance))
 
     def _between_nodes(self, conditions: FilmConditions, cell: npt.NDArray[np.int64]) -> FloatArray:
-        """(n,) uncertainty of the surface, linear along both axes from node to node."""
+        """Return the uncertainty of the surface (n,), bilinear between the nodes of the cell."""
         i, along_e = _steps(conditions.eccentricity_ratio, self.grid.eccentricity_width)
         j, along_t = _steps(conditions.oil_temperature_c, self.grid.temperature_width_c)
         std = self.table.node_std
@@ -204,7 +204,7 @@ class QuantityBaseline:
 
 
 def _steps(x: FloatArray, width: float) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Node of the cell below each x, and the fraction of the step to the next node."""
+    """Return the lower node of each x in its cell, and the fraction of the step above the node."""
     steps = x / width % 1.0 * (NODES - 1)
     node = np.minimum(np.floor(steps), NODES - 2)
     return node.astype(np.int64), steps - node
@@ -212,9 +212,10 @@ def _steps(x: FloatArray, width: float) -> tuple[npt.NDArray[np.int64], FloatArr
 
 @dataclass(frozen=True)
 class BearingBaseline:
-    """Learned baselines of the film of one bearing, from the first to the last reading of a period.
+    """Learned baseline of one bearing, from the readings of a learning period.
 
-    There is at most one for each direction; those with too few readings are missing.
+    There is at most one `QuantityBaseline` per direction; directions with too few readings have
+    none.
     """
 
     origin: Origin
@@ -223,5 +224,5 @@ class BearingBaseline:
     quantities: tuple[QuantityBaseline, ...]
 
     def of(self, direction: str) -> QuantityBaseline | None:
-        """Baseline in a direction, if it was learned."""
+        """Return the baseline in a direction, or None if none was learned."""
         return next((each for each in self.quantities if each.direction == direction), None)

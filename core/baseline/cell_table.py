@@ -1,4 +1,4 @@
-"""Table of cells: scatter, uncertainty and support of a baseline in each."""
+"""Table of the condition cells of a baseline: scatter, uncertainty and support of each cell."""
 
 import itertools
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from core.arrays import FloatArray
 from core.condition.cells import Cell, CellArray, FilmConditions
 
 NODES = 3
-"""Nodes along each axis of a cell, edges included."""
+"""Number of nodes along each axis of a cell, edges included."""
 
 
 class Support(StrEnum):
-    """Whether readings in a cell can be judged."""
+    """Support of a cell by learning readings; without support, readings are not judged."""
 
     NONE = "none"
     BORROWED = "borrowed"
@@ -25,25 +25,25 @@ class Support(StrEnum):
 
 @dataclass(frozen=True)
 class CellStatistics:
-    """One cell.
+    """Statistics of one condition cell.
 
     Parameters
     ----------
     location
-        Median of the readings, in ln.
+        Median of ln stiffness.
     scatter
-        Robust standard deviation of readings about the surface; drawn towards that of all cells
-        where there are few days.
+        Robust standard deviation of readings about the surface. With few days it is shrunk towards
+        a model over all cells.
     lasting
-        Part of the scatter that averaging does not take away: the effect of an error of the
-        shaft's position, which lasts for weeks, where stiffness rises steeply.
+        Part of the scatter that averaging does not reduce. It is caused by errors of the shaft
+        position, which last for weeks, where the surface is steep.
     surface_std
         Standard uncertainty of the surface at the median condition of the cell's readings.
     node_std
-        The same at `NODES` by `NODES` nodes, temperatures of the lowest eccentricity first. A cell
-        with readings on one side only is uncertain on the other.
+        Standard uncertainty of the surface at `NODES` by `NODES` nodes, temperatures of the lowest
+        eccentricity first. It is larger at the edges of a cell that have no readings nearby.
     eccentricity_ratio, oil_temperature_c, attitude_deg
-        Median condition; an attitude of zero where it is unknown.
+        Median condition; an unknown attitude is 0.
     """
 
     cell: Cell
@@ -74,7 +74,7 @@ class CellStatistics:
 
 @dataclass(frozen=True)
 class CellTable:
-    """All cells with readings."""
+    """Table of the cells of a baseline."""
 
     cells: tuple[CellStatistics, ...]
 
@@ -86,7 +86,7 @@ class CellTable:
             raise ValueError("cells: not all have as many axes")
 
     def find(self, cells: CellArray) -> npt.NDArray[np.int64]:
-        """(n,) row of each cell in the table; -1 if it is missing, or has no support."""
+        """Return the row of each cell in the table (n,); -1 for a missing or unsupported cell."""
         if not self.cells:
             return np.full(cells.shape[1], -1)
         low, places = self._places
@@ -98,34 +98,34 @@ class CellTable:
 
     @cached_property
     def scatter(self) -> FloatArray:
-        """(n_cells,)."""
+        """Scatter of each cell (n_cells,)."""
         return np.array([cell.scatter for cell in self.cells], np.float64)
 
     @cached_property
     def lasting(self) -> FloatArray:
-        """(n_cells,)."""
+        """Part of the scatter of each cell that averaging does not reduce (n_cells,)."""
         return np.array([cell.lasting for cell in self.cells], np.float64)
 
     @cached_property
     def passing(self) -> FloatArray:
-        """(n_cells,) part of the scatter that averaging takes away."""
+        """Part of the scatter of each cell that averaging reduces (n_cells,)."""
         return np.asarray(np.sqrt(self.scatter**2 - self.lasting**2))
 
     @cached_property
     def node_std(self) -> FloatArray:
-        """(NODES, NODES, n_cells) by eccentricity and temperature."""
+        """Uncertainty at the eccentricity and temperature nodes (NODES, NODES, n_cells)."""
         rows = np.array([cell.node_std for cell in self.cells], np.float64)
         return rows.reshape(-1, NODES, NODES).transpose(1, 2, 0)
 
     @cached_property
     def middle(self) -> FilmConditions:
-        """Median condition of each cell, (n_cells,)."""
+        """Median condition of each cell (n_cells,)."""
         rows = [(c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in self.cells]
         return FilmConditions(*np.array(rows, np.float64).reshape(-1, 3).T)
 
     @cached_property
     def _places(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """Lowest bins, and row by bins counted from there."""
+        """Lowest bin number of each axis, and table rows indexed by bin number minus the lowest."""
         bins = np.array([cell.cell for cell in self.cells])
         low = bins.min(axis=0)
         places = np.full(tuple(bins.max(axis=0) - low + 1), -1)
@@ -136,12 +136,12 @@ class CellTable:
 
 
 def cells_between(own: frozenset[Cell], reach: int) -> frozenset[Cell]:
-    """Cells between two cells of own support along some axis.
+    """Return the cells that lie between two cells of own support along an axis.
 
     Parameters
     ----------
     reach
-        Largest number of cells between the two.
+        Largest number of cells between two cells of own support.
     """
     found: set[Cell] = set()
     for cell in own:
@@ -154,7 +154,7 @@ def cells_between(own: frozenset[Cell], reach: int) -> frozenset[Cell]:
 
 
 def neighbourhood(cell: Cell) -> tuple[Cell, ...]:
-    """The cell and all that touch it."""
+    """Return a cell and its neighbours, including diagonal neighbours."""
     steps = itertools.product((-1, 0, 1), repeat=len(cell))
     return tuple(tuple(i + step for i, step in zip(cell, by, strict=True)) for by in steps)
 

@@ -1,4 +1,4 @@
-"""Grouping of readings by day and condition; robust scales, medians and weighted means."""
+"""Grouping of readings by day and condition; robust scales, medians and moving averages."""
 
 import math
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from core.units import DAY_NS
 
 @dataclass(frozen=True, eq=False)
 class Groups:
-    """Points (n,) that a surface is fitted to: medians of readings, their number and their day."""
+    """Groups of readings (n,) for the surface fit: medians, number of readings and day."""
 
     conditions: FilmConditions
     value: FloatArray
@@ -21,7 +21,7 @@ class Groups:
     day: npt.NDArray[np.int64]
 
     def rows(self, wanted: npt.NDArray[np.bool_]) -> "Groups":
-        """Some of the groups."""
+        """Return the groups selected by a mask (n,)."""
         return Groups(
             self.conditions.rows(wanted),
             self.value[wanted],
@@ -33,10 +33,10 @@ class Groups:
 def group_readings(
     time_ns: TimeArray, conditions: FilmConditions, value: FloatArray, grid: CellGrid
 ) -> Groups:
-    """Group the readings of one day in one quarter of a cell.
+    """Group readings by day and quarter of a condition cell.
 
-    Readings within a day share water, weather and warm-up. Quarters are used because ln k changes
-    by a tenth and more across a cell.
+    Readings of a day are correlated: they have the same water level, weather and warm-up. Quarters
+    are used because ln k changes by 0.1 and more across a cell.
     """
     halves = replace(
         grid,
@@ -57,7 +57,7 @@ def group_readings(
 
 
 def group_medians(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
-    """Median of x in every group; groups are numbered from zero without gaps."""
+    """Return the median of x in each group; groups are numbered from zero without gaps."""
     x = x[np.lexsort((x, group))]
     count = np.bincount(group)
     start = np.cumsum(count) - count
@@ -69,28 +69,28 @@ def _group_sums(x: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
 
 
 STD_PER_MAD = 1.4826
-"""Standard deviation of a normal distribution over its median absolute deviation."""
+"""Ratio of standard deviation to median absolute deviation of a normal distribution."""
 
 BISQUARE_LIMIT = 4.685
-"""Standard deviations beyond which Tukey's bisquare is zero; 95 % efficient for normal values
+"""Number of standard deviations beyond which Tukey's bisquare is zero; 95 % normal efficiency
 (Maronna, Martin and Yohai, Robust Statistics, 2.2)."""
 
 
 def robust_std(deviation: FloatArray) -> float:
-    """Standard deviation about zero, from the median of the absolute deviations."""
+    """Return the standard deviation about zero, estimated from the median absolute deviation."""
     if deviation.size == 0:
         return 0.0
     return STD_PER_MAD * float(np.median(np.abs(deviation)))
 
 
 def bisquare(standardised: FloatArray) -> FloatArray:
-    """Weight of each standardised deviation: 1 at zero, 0 beyond `BISQUARE_LIMIT`."""
+    """Return the bisquare weight of each standardised deviation; 0 beyond `BISQUARE_LIMIT`."""
     rest = np.clip(1.0 - (standardised / BISQUARE_LIMIT) ** 2, 0.0, 1.0)
     return np.asarray(rest**2)
 
 
 def absolute_quantile_std(deviation: FloatArray) -> float:
-    """Standard deviation about zero: the larger estimate of middle half and three quarters."""
+    """Return a standard deviation about zero from the 50 % and 75 % quantiles; the larger one."""
     if deviation.size == 0:
         return 0.0
     half, three_quarters = np.quantile(np.abs(deviation), (0.5, 0.75))
@@ -98,11 +98,11 @@ def absolute_quantile_std(deviation: FloatArray) -> float:
 
 
 MEDIAN_READINGS = 5
-"""Number of newest deviations whose median is averaged, so that single spikes do not count."""
+"""Window length of the running median, which removes single spikes before averaging."""
 
 
 def running_median(deviation: FloatArray) -> FloatArray:
-    """(n,) median of the newest `MEDIAN_READINGS`; until there are enough, of all."""
+    """Return the running median over `MEDIAN_READINGS` values (n,), over fewer at the start."""
     n = deviation.size
     if n < MEDIAN_READINGS:
         return np.array([np.median(deviation[: i + 1]) for i in range(n)], np.float64)
@@ -112,17 +112,17 @@ def running_median(deviation: FloatArray) -> FloatArray:
 
 
 def ewma_weight(time_scale_h: float, reading_h: float) -> float:
-    """Weight α of the newest reading in an exponentially weighted mean over a time scale."""
+    """Return the smoothing factor α of an exponentially weighted mean over a time scale."""
     return -math.expm1(-reading_h / time_scale_h)
 
 
 def ewma(x: FloatArray, alpha: float) -> FloatArray:
-    """(n,) exponentially weighted sums; `ewma_step` for all of x, with the same arithmetic."""
-    from scipy.signal import lfilter  # slow to import, and not needed at start
+    """Return exponentially weighted sums (n,), equal to repeated calls of `ewma_step`."""
+    from scipy.signal import lfilter  # slow import, not needed at start-up
 
     return np.asarray(lfilter([alpha], [1.0, alpha - 1.0], x))
 
 
 def ewma_step(total: float, x: float, alpha: float) -> float:
-    """Exponentially weighted sum after one more value."""
+    """Return the exponentially weighted sum after one more value."""
     return total * (1.0 - alpha) + alpha * x

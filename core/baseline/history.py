@@ -1,4 +1,4 @@
-"""Readings of one bearing over time as columns: what baselines learn from and back-tests run on."""
+"""`StiffnessHistory`: readings of one bearing over time, for learning and back-tests."""
 
 from dataclasses import dataclass, field, fields
 from enum import IntEnum
@@ -11,14 +11,14 @@ from core.arrays import FloatArray, TimeArray
 from core.condition.cells import FilmConditions
 
 CodeArray: TypeAlias = npt.NDArray[np.int8]
-"""Members of an IntEnum, one byte each."""
+"""Values of an IntEnum as int8."""
 
 DIRECTIONS = ("x", "y")
-"""Rows of every column of shape (2, n)."""
+"""Directions of the rows of columns of shape (2, n)."""
 
 
 class ReadingOutcome(IntEnum):
-    """Whether a stiffness was measured, and if not, why there is no number."""
+    """Outcome of a stiffness measurement: measured, or the reason for a missing value."""
 
     MEASURED = 0
     INSUFFICIENT_EXCITATION = 1
@@ -27,27 +27,26 @@ class ReadingOutcome(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class StiffnessHistory:
-    """One bearing of one unit; readings in order of time, NaN where there is no number.
+    """Readings of one bearing in order of time, as columns; NaN for missing values.
 
-    Columns are (n,); those by direction, `PER_DIRECTION`, are (2, n). Hours without a reading are
-    allowed and are gaps.
+    Columns are (n,); the columns `PER_DIRECTION` are (2, n). Time may have gaps.
 
     Parameters
     ----------
     ln_k
-        Natural logarithm of measured stiffness in N/m.
+        Natural logarithm of the measured stiffness in N/m.
     u_random
-        Random standard uncertainty of stiffness relative to it, which is that of `ln_k`.
+        Relative random standard uncertainty of the stiffness, equal to that of `ln_k`.
     shaft_um_pk, bearing_um_pk
-        Amplitudes at 1×, of shaft relative to bearing and of bearing.
+        1× amplitudes: of the shaft relative to the bearing, and of the bearing.
     outcome
-        Members of `ReadingOutcome`; by default a missing `ln_k` is of bad quality.
+        Values of `ReadingOutcome`; by default, a missing `ln_k` is `BAD_QUALITY`.
 
     Raises
     ------
     ValueError
-        With column and row, if a column has another shape, time does not increase, a number is
-        infinite, an uncertainty is not above zero, or outcome and number contradict one another.
+        If a column has a wrong shape, time does not increase, a value is infinite, an uncertainty
+        is not positive, or `outcome` contradicts `ln_k`. The message states column and row.
     """
 
     time_ns: TimeArray
@@ -80,15 +79,15 @@ class StiffnessHistory:
 
     @property
     def conditions(self) -> FilmConditions:
-        """Conditions of all readings."""
+        """Film conditions of all readings."""
         return FilmConditions(self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg)
 
     def rows(self, start: int, stop: int) -> "StiffnessHistory":
-        """The readings from row `start` up to, not including, row `stop`."""
+        """Return the readings from row `start` up to, but not including, row `stop`."""
         return self.where(slice(start, stop))
 
     def where(self, wanted: npt.NDArray[np.bool_] | slice) -> "StiffnessHistory":
-        """The readings that a mask of shape (n,) or a slice picks."""
+        """Return the readings selected by a mask (n,) or a slice."""
         return StiffnessHistory(
             **{f.name: getattr(self, f.name)[..., wanted] for f in fields(self)}
         )

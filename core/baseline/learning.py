@@ -1,4 +1,4 @@
-"""Learning a baseline from the readings of a healthy bearing."""
+"""Learning of a baseline from the readings of a healthy bearing."""
 
 import numpy as np
 import numpy.typing as npt
@@ -28,9 +28,9 @@ def held_out_deviations(
     table: CellTable,
     settings: BaselineSettings,
 ) -> FloatArray:
-    """Deviations (n,) of each reading from a surface fitted without its spell of days.
+    """Return cross-validated deviations (n,) from surfaces fitted without the reading's fold.
 
-    NaN where the cell has no support without the spell.
+    A fold consists of spells of consecutive days. NaN for cells with too few days in other folds.
     """
     n_days = np.unique(groups.day).size
     spell_days = int(np.clip(n_days // (2 * FOLDS), 1, LONGEST_SPELL_DAYS))
@@ -57,7 +57,7 @@ def _is_known_without(
     table: CellTable,
     place: npt.NDArray[np.int64],
 ) -> npt.NDArray[np.bool_]:
-    """Whether cells have half of `min_days` without the spell."""
+    """Return whether each cell has at least half of `min_days` without the fold `left_out`."""
     group_place = table.find(settings.grid.cells(groups.conditions))
     counted = (group_fold != left_out) & (group_place >= 0)
     days = np.unique(np.vstack([group_place[counted], groups.day[counted]]), axis=1)[0]
@@ -66,7 +66,7 @@ def _is_known_without(
 
 
 REJECTED = 0.1
-"""Robust weight below which a group counts as rejected."""
+"""Robust weight below which the fit has rejected a group."""
 
 
 def learn(
@@ -75,7 +75,7 @@ def learn(
     origin: Origin,
     settings: BaselineSettings,
 ) -> BearingBaseline:
-    """Learn the baseline of a bearing from readings that are mostly of a healthy machine.
+    """Learn the baseline of a bearing from readings that are mostly from a healthy machine.
 
     Raises
     ------

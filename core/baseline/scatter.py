@@ -1,4 +1,4 @@
-"""Scatter of healthy mean deviations: by cell and day, and over each time scale."""
+"""Scatter of deviations of a healthy bearing: daily means in each cell, means over time scales."""
 
 from dataclasses import replace
 
@@ -20,10 +20,10 @@ from core.baseline.settings import BaselineSettings
 from core.baseline.surface_fit import MIN_SCATTER, slope_scatter
 
 PRIOR_DAYS = 20.0
-"""Weight of the slope model, in days. Deviations last for days, so that twenty days are few."""
+"""Weight of the slope model, in days of readings; large, because deviations last for days."""
 
 MAX_LASTING = 0.95
-"""Largest lasting part of the scatter: some of it always averages out."""
+"""Largest fraction of the scatter that is attributed to lasting deviations."""
 
 
 def with_scatter(
@@ -33,14 +33,14 @@ def with_scatter(
     day: npt.NDArray[np.int64],
     deviation: FloatArray,
 ) -> CellTable:
-    """Table with the scatter of every cell.
+    """Return the table with the scatter and the lasting part of every cell.
 
     Parameters
     ----------
     slope : (n_cells,)
         Slope of the surface with eccentricity, at the median condition of each cell.
     place, day, deviation : (n,)
-        Row of the cell, day and deviation of each reading.
+        Table row of the cell, day and deviation of each reading.
     """
     if place.size == 0:
         return table
@@ -62,7 +62,7 @@ def with_scatter(
 def _own(
     place: npt.NDArray[np.int64], mean: FloatArray, n_cells: int
 ) -> tuple[FloatArray, FloatArray]:
-    """(n_cells,) scatter of the daily means of each cell, and number of days."""
+    """Return the scatter of the daily means, and the number of days, of each cell (n_cells,)."""
     own, n_days = np.zeros(n_cells), np.zeros(n_cells)
     seen, numbered = np.unique(place, return_inverse=True)
     own[seen] = STD_PER_MAD * group_medians(np.abs(mean), numbered)
@@ -73,14 +73,14 @@ def _own(
 def _daily(
     place: npt.NDArray[np.int64], day: npt.NDArray[np.int64], deviation: FloatArray
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Cell and mean deviation of each day in each cell."""
+    """Return the table row and the mean deviation of each day in each cell."""
     keys, group = np.unique(np.vstack([place, day]), axis=1, return_inverse=True)
     group = group.reshape(-1)
     return keys[0], np.asarray(np.bincount(group, deviation) / np.bincount(group))
 
 
 MIN_SPANS = 4.0
-"""Length of the learning period, in time scales, that a time scale requires."""
+"""Required length of the learning period as a multiple of the time scale."""
 
 MIN_SHARE, MAX_SHARE = 1e-3, 4.0
 HALVINGS = 24
@@ -92,9 +92,9 @@ def time_scatter(
     table: CellTable,
     settings: BaselineSettings,
 ) -> tuple[TimeScatter, ...]:
-    """Scatter over each time scale that the learning period is long enough for.
+    """Return the scatter over each time scale for which the learning period is long enough.
 
-    The deviations (n,) are cross-validated, oldest first; places are rows of their cells.
+    The deviations (n,) are cross-validated, oldest first; `place` is the table row of each.
     """
     smooth, weight = running_median(deviation), _weight(table.scatter[place])
     columns = (np.ones(weight.size), smooth, table.passing[place], table.lasting[place])
@@ -109,7 +109,7 @@ def time_scatter(
         )
         total, mean, stray, stays = (ewma(weight * column, forgotten)[first:] for column in columns)
         share = _share(mean / total, stray / total, stays / total)
-        # two time constants make one independent mean; the scatter of few means is uncertain
+        # independent means are two time constants apart; the scatter of few means is uncertain
         share *= 1.0 + 2.0 / spans
         if found:  # correlated readings cannot average out faster than independent ones
             last = found[-1]
@@ -119,13 +119,13 @@ def time_scatter(
 
 
 def _weight(scatter: FloatArray) -> FloatArray:
-    """Weights of typical readings in `QuantityBaseline.compare`."""
+    """Return the weights of readings with typical noise in `QuantityBaseline.compare`."""
     typical = float(np.median(scatter)) if scatter.size else 1.0
     return np.minimum(1.0, (typical / scatter) ** 2)
 
 
 def _share(mean: FloatArray, stray: FloatArray, stays: FloatArray) -> float:
-    """Share of `stray` that, together with what stays, explains the scatter of the means."""
+    """Return the factor of `stray` that explains, with `stays`, the scatter of the means."""
     least, most = MIN_SHARE, MAX_SHARE
     for _ in range(HALVINGS):
         middle = (least * most) ** 0.5

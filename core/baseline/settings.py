@@ -1,4 +1,4 @@
-"""How a baseline is learned."""
+"""Settings for learning a baseline."""
 
 from dataclasses import dataclass, field
 
@@ -10,35 +10,35 @@ from core.condition.cells import CellGrid, FilmConditions
 
 @dataclass(frozen=True)
 class BaselineSettings:
-    """Requirements of a baseline, and smoothness of its surface.
+    """Settings for learning a baseline: data requirements and smoothness of the surface.
 
     Parameters
     ----------
     grid
-        Cells of eccentricity and oil temperature.
+        Grid of the condition cells.
     uses_attitude
-        Whether the surface depends on the attitude angle too: pads are not set evenly, and x is not
-        y. The grid decides whether cells do.
+        Whether the surface depends on the attitude angle, because pads are set unevenly and x and
+        y differ. `grid` defines whether the cells depend on the attitude angle.
     min_readings, min_days
-        Readings, and days with readings, that give a cell support of its own.
+        Number of readings, and of days with readings, required for own support of a cell.
     borrowing_readings
-        Readings that let a cell borrow support, if it and its neighbours have `min_days` in all.
+        Number of readings with which a cell borrows support, if the cell and its neighbours have
+        at least `min_days` in total.
     borrowing_reach
-        Largest number of cells between two of own support that borrow from these through the
-        surface.
+        Largest number of cells between two cells of own support that borrow support from both.
     max_surface_std
-        Uncertainty of the surface, in ln, above which a cell is not supported after all.
+        Standard uncertainty of the surface, in ln, above which a cell has no support.
     min_learning_days
-        Days with readings before there is a baseline at all.
+        Number of days with readings required for a baseline.
     knot_cells
-        Cells from one knot of the surface to the next.
+        Knot spacing of the surface, in cells.
     bend_std
-        Prior standard deviation of the change of slope of ln k from knot to knot.
+        Prior standard deviation of the change of slope of ln k between knots.
     time_scales_h
-        Running hours over which deviations are averaged, shortest first: large losses show on the
-        short time scales, small ones on the long ones.
+        Averaging times of deviations in running hours, shortest first. Large losses of stiffness
+        are detected on short time scales, small losses on long ones.
     reading_h
-        Running hours from one reading to the next.
+        Interval between readings in running hours.
     """
 
     grid: CellGrid = field(default_factory=CellGrid)
@@ -56,9 +56,9 @@ class BaselineSettings:
 
     @property
     def has_attitude(self) -> bool:
-        """Whether surface or cells depend on the attitude angle."""
+        """Whether the surface or the cells depend on the attitude angle."""
         return self.uses_attitude or self.grid.has_attitude
 
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
-        """(n,) whether readings have everything that the baseline depends on."""
+        """Return whether all conditions that the baseline depends on are known (n,)."""
         return conditions.is_known(self.has_attitude)

@@ -1,4 +1,4 @@
-"""A smooth surface over eccentricity and oil temperature: cubic B-splines on uniform knots."""
+"""Smooth surface over eccentricity ratio and oil temperature, of cubic B-splines."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,12 +10,12 @@ from core.arrays import FloatArray
 from core.condition.cells import FilmConditions
 
 ATTITUDE_TERMS = 4
-"""Shaft position along x and y, and at twice its angle: effect of a bearing that is not round."""
+"""Number of attitude terms: first and second harmonic of the angle, for an out-of-round bearing."""
 
 
 @dataclass(frozen=True)
 class KnotAxis:
-    """Uniform knots: `n_intervals` of one width, from `start` on."""
+    """Uniform knots of an axis: `n_intervals` intervals of equal width from `start`."""
 
     start: float
     width: float
@@ -27,13 +27,13 @@ class KnotAxis:
 
     @property
     def n_splines(self) -> int:
-        """Cubic B-splines that are not zero somewhere on the axis."""
+        """Number of cubic B-splines that are non-zero on the axis."""
         return self.n_intervals + 3
 
     def splines(self, x: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """First spline that is not zero at each x, and the values of the four that are not.
+        """Return the first non-zero spline at each x, and the values of the four non-zero splines.
 
-        Beyond the ends the outermost cubic is continued.
+        Beyond the ends, the outermost cubic polynomials are extrapolated.
 
         Returns
         -------
@@ -56,7 +56,7 @@ class KnotAxis:
 
 @dataclass(frozen=True)
 class SurfaceShape:
-    """Knots of a surface, and whether it depends on the attitude angle."""
+    """Knots of a surface on both axes, and whether the surface depends on the attitude angle."""
 
     eccentricity: KnotAxis
     temperature: KnotAxis
@@ -64,12 +64,12 @@ class SurfaceShape:
 
     @property
     def n_coefficients(self) -> int:
-        """Tensor products of splines, and terms of the attitude."""
+        """Number of coefficients: tensor products of splines, and attitude terms."""
         tensor = self.eccentricity.n_splines * self.temperature.n_splines
         return tensor + (ATTITUDE_TERMS if self.has_attitude else 0)
 
     def terms(self, conditions: FilmConditions) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """(16, n) tensor products that are not zero, and (16, n) their values."""
+        """Return the indices (16, n) and values (16, n) of the non-zero tensor products."""
         first_e, value_e = self.eccentricity.splines(conditions.eccentricity_ratio)
         first_t, value_t = self.temperature.splines(conditions.oil_temperature_c)
         step = np.arange(4)[:, np.newaxis]
@@ -80,7 +80,7 @@ class SurfaceShape:
         return index.reshape(shape), value.reshape(shape)
 
     def design(self, conditions: FilmConditions) -> FloatArray:
-        """(n, n_coefficients) value of every term at every point."""
+        """Return the design matrix (n, n_coefficients)."""
         index, value = self.terms(conditions)
         matrix = np.zeros((len(conditions), self.n_coefficients))
         np.put_along_axis(matrix, index.T, value.T, axis=1)
@@ -90,7 +90,7 @@ class SurfaceShape:
 
 
 def attitude_terms(conditions: FilmConditions) -> FloatArray:
-    """Terms of the shaft's position: (4, n)."""
+    """Return the attitude terms (4, n): cosine and sine of the angle and of twice the angle."""
     angle = np.radians(conditions.attitude_deg)
     once, twice = conditions.eccentricity_ratio, conditions.eccentricity_ratio**2
     return np.stack(
@@ -105,7 +105,7 @@ def attitude_terms(conditions: FilmConditions) -> FloatArray:
 
 @dataclass(frozen=True)
 class Surface:
-    """A surface with its coefficients."""
+    """Fitted surface: shape, constant offset and spline coefficients."""
 
     shape: SurfaceShape
     offset: float
@@ -122,7 +122,7 @@ class Surface:
         return np.array(self.coefficients)
 
     def slope(self, conditions: FilmConditions) -> FloatArray:
-        """(n,) rise with eccentricity ratio, over a quarter of a knot's width either way."""
+        """Return the slope with eccentricity ratio (n,), a difference over ± 1/4 knot width."""
         step = self.shape.eccentricity.width / 4.0
         up, down = (
             self.at(replace(conditions, eccentricity_ratio=conditions.eccentricity_ratio + by))
@@ -131,10 +131,10 @@ class Surface:
         return np.asarray((up - down) / (2.0 * step))
 
     def at(self, conditions: FilmConditions) -> FloatArray:
-        """(n,) height at each point."""
+        """Return the value of the surface at each point (n,)."""
         index, value = self.shape.terms(conditions)
         height = np.zeros(len(conditions))
-        for row in range(index.shape[0]):  # in one order for one reading and for many
+        for row in range(index.shape[0]):  # summation order does not depend on n
             height += self._coefficients[index[row]] * value[row]
         if self.shape.has_attitude:
             height += self._coefficients[-ATTITUDE_TERMS:] @ attitude_terms(conditions)

@@ -1,4 +1,4 @@
-"""Robust fit of the surface, and scatter from errors of position where it is steep."""
+"""Robust fit of the surface, with scatter from shaft position errors where it is steep."""
 
 from dataclasses import dataclass
 
@@ -11,10 +11,10 @@ from core.baseline.grouping import Groups, bisquare, robust_std
 from core.baseline.surface import ATTITUDE_TERMS, KnotAxis, Surface, SurfaceShape
 
 MAX_STDS = 3.0
-"""Standard deviations at which deviations are clipped."""
+"""Number of standard deviations at which deviations are clipped."""
 
 FLAT_SHARE = 0.25
-"""Fraction of the deviations that count as those of a flat surface."""
+"""Fraction of the deviations, those with the smallest slopes, that count as flat."""
 
 ROUNDS = 8
 MIN_SCATTER = 1e-6
@@ -22,9 +22,10 @@ MIN_SCATTER = 1e-6
 
 @dataclass(frozen=True)
 class SlopeScatter:
-    """Variance of a deviation, given the slope.
+    """Model of the variance of a deviation as a function of the slope of the surface.
 
-    It is `flat` up to a squared slope, and rises by `per_slope` with the squared slope beyond.
+    The variance is `flat` up to the squared slope `flat_square`. Above, it increases linearly with
+    the squared slope, with the factor `per_slope`.
     """
 
     flat: float
@@ -32,17 +33,17 @@ class SlopeScatter:
     flat_square: float
 
     def lasting(self, slope: FloatArray) -> FloatArray:
-        """Variance from errors of position at each slope."""
+        """Return the variance due to shaft position errors at each slope."""
         return self.per_slope * np.maximum(slope**2 - self.flat_square, 0.0)
 
     def variance(self, slope: FloatArray) -> FloatArray:
-        """Variance at each slope."""
+        """Return the variance at each slope."""
         return np.asarray(self.flat + self.lasting(slope))
 
 
 def slope_scatter(slope: FloatArray, deviation: FloatArray) -> SlopeScatter:
-    """Fit variance to squared deviations (n,), each weighted by its expected value."""
-    from scipy.optimize import nnls  # slow to load, and not needed to begin
+    """Fit the variance model to squared deviations (n,), weighted by their expected values."""
+    from scipy.optimize import nnls  # slow import, not needed at start-up
 
     flat_square = float(np.quantile(slope**2, FLAT_SHARE))
     steep = np.maximum(slope**2 - flat_square, 0.0)
@@ -60,18 +61,18 @@ HUBER_LIMIT = 1.345
 HUBER_ROUNDS, BISQUARE_ROUNDS, SLOPE_ROUNDS = 6, 8, 4
 
 SLOPE_STD = 2.0
-"""Prior standard deviation of the change of ln k from knot to knot: so wide that it matters only
-where all readings lie on a line."""
+"""Prior standard deviation of the change of ln k between knots. It is wide, and matters only where
+all readings lie on a line."""
 
 ATTITUDE_STD = 1.0
 MIN_STD = 1e-4
 """Smallest scatter of groups, in ln."""
 
 FEW_READINGS = 2.0
-"""Number of readings of a group that has half weight."""
+"""Number of readings with which a group has half weight."""
 
 SPANS_DAYS = (1, 10)
-"""Spans over which residuals may be correlated."""
+"""Lengths of spells over which residuals are tested for correlation, days."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,14 +81,14 @@ class Fit:
 
     Parameters
     ----------
-    covariance
-        (n_coefficients, n_coefficients)
+    covariance : (n_coefficients, n_coefficients)
+        Covariance of the coefficients.
     robust_weight : (n_groups,)
-        1 for a group that fits, 0 for one that is rejected.
+        Robust weight of each group: 1 for a good fit, 0 for a rejected group.
     group_std : (n_groups,)
-        Scatter of groups about the surface.
+        Standard deviation of each group about the surface.
     clustering
-        Number of correlated groups that are worth one independent group.
+        Number of correlated groups equivalent to one independent group.
     """
 
     surface: Surface
@@ -98,20 +99,20 @@ class Fit:
 
     @property
     def attitude_covariance(self) -> tuple[tuple[float, ...], ...]:
-        """Covariance of the attitude terms; empty if there are none."""
+        """Covariance of the attitude terms; empty without attitude terms."""
         if not self.surface.shape.has_attitude:
             return ()
         part = self.covariance[-ATTITUDE_TERMS:, -ATTITUDE_TERMS:]
         return tuple(tuple(row) for row in part.tolist())
 
     def std(self, design: FloatArray) -> FloatArray:
-        """(n,) standard uncertainty of the surface at rows of a design matrix."""
+        """Return the standard uncertainty of the surface (n,) at the rows of a design matrix."""
         variance = np.einsum("ij,jk,ik->i", design, self.covariance, design)
         return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
 
 
 def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
-    """Fit a surface, and estimate scatter and correlation of the groups."""
+    """Fit a surface robustly; estimate scatter and correlation of the groups."""
     offset = float(np.median(groups.value))
     points = _Points.of(groups, shape, offset)
     prior = prior_precision(shape, bend_std)
@@ -130,7 +131,7 @@ def fit_surface(groups: Groups, shape: SurfaceShape, bend_std: float) -> Fit:
 
 @dataclass(frozen=True, eq=False)
 class _Points:
-    """Groups as rows of a regression, weighted by their number of readings."""
+    """Groups as rows of a regression, with weights from the numbers of readings."""
 
     design: FloatArray
     y: FloatArray
@@ -143,18 +144,18 @@ class _Points:
         return cls(shape.design(groups.conditions), groups.value - offset, trust, groups.day)
 
     def left(self, coefficients: FloatArray) -> FloatArray:
-        """(n,) residuals of a surface, scaled to the same scatter."""
+        """Return the residuals (n,), scaled to equal scatter."""
         return np.asarray((self.y - self.design @ coefficients) * np.sqrt(self.trust))
 
     def solve(self, precision: FloatArray, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Coefficients, and lower Cholesky factor of their precision."""
+        """Return the coefficients, and the lower Cholesky factor of their precision matrix."""
         weighted = self.design * (self.trust * precision)[:, np.newaxis]
         factor, _ = cho_factor(self.design.T @ weighted + prior, lower=True)
         return cho_solve((factor, True), weighted.T @ self.y), factor
 
 
 def _resisting(points: _Points, prior: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Coefficients and robust weights, with one scatter for all groups."""
+    """Return robustly fitted coefficients and weights, with a common scatter of all groups."""
     robust, std = np.ones(points.y.size), max(robust_std(points.y), MIN_STD)
     for round_ in range(HUBER_ROUNDS + BISQUARE_ROUNDS):
         coefficients, _ = points.solve(robust / std**2, prior)
@@ -170,14 +171,14 @@ def _resisting(points: _Points, prior: FloatArray) -> tuple[FloatArray, FloatArr
 def _std(
     points: _Points, coefficients: FloatArray, robust: FloatArray, slope: FloatArray
 ) -> FloatArray:
-    """(n,) scatter of groups where the surface has a slope, from those that fit."""
+    """Return the scatter of each group (n,) from its slope, fitted to the non-rejected groups."""
     fits = robust > 0.0
     model = slope_scatter(slope[fits], points.left(coefficients)[fits])
     return np.maximum(np.sqrt(model.variance(slope)), MIN_STD)
 
 
 def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Surface:
-    """Surface fitted to some of the groups, with the weights of the whole fit."""
+    """Return the surface refitted to the used groups with the weights of the whole fit."""
     shape, offset = fit.surface.shape, fit.surface.offset
     points = _Points.of(groups, shape, offset)
     precision = is_used * fit.robust_weight / (fit.group_std**2 * fit.clustering)
@@ -186,7 +187,7 @@ def refit(groups: Groups, fit: Fit, bend_std: float, is_used: FloatArray) -> Sur
 
 
 def prior_precision(shape: SurfaceShape, bend_std: float) -> FloatArray:
-    """(n_coefficients, n_coefficients) inverse covariance of the prior."""
+    """Return the inverse covariance of the prior (n_coefficients, n_coefficients)."""
     n_e, n_t = shape.eccentricity.n_splines, shape.temperature.n_splines
     along_e, along_t = _differences(n_e, bend_std), _differences(n_t, bend_std)
     tensor = np.kron(along_e, np.eye(n_t)) + np.kron(np.eye(n_e), along_t)
@@ -203,7 +204,7 @@ def _differences(n: int, bend_std: float) -> FloatArray:
 def _clustering(
     points: _Points, coefficients: FloatArray, robust: FloatArray, std: FloatArray
 ) -> float:
-    """Variance of the means over some days relative to that of independent groups; at least 1."""
+    """Return the variance of means over spells relative to independent groups; at least 1."""
     standardised = (points.y - points.design @ coefficients) / std
     weight, found = points.trust * robust, [1.0]
     for span in SPANS_DAYS:
@@ -218,7 +219,7 @@ def _clustering(
 def surface_shape(
     groups: Groups, knot_e: float, knot_t_c: float, has_attitude: bool
 ) -> SurfaceShape:
-    """Surface with knots that cover all groups."""
+    """Return the shape of a surface with knots that cover all groups."""
     return SurfaceShape(
         _axis(groups.conditions.eccentricity_ratio, knot_e),
         _axis(groups.conditions.oil_temperature_c, knot_t_c),

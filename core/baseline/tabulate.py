@@ -1,4 +1,4 @@
-"""Filling the table of cells: statistics and support of each."""
+"""Calculation of the cell table of a baseline: statistics and support of each cell."""
 
 import itertools
 from dataclasses import dataclass
@@ -22,12 +22,12 @@ from core.baseline.surface_fit import MIN_SCATTER, Fit
 from core.condition.cells import Cell, CellArray, CellGrid, FilmConditions
 
 BELIEVED = 0.1
-"""Robust weight above which a group counts as support."""
+"""Robust weight from which a group counts towards the support of a cell."""
 
 
 @dataclass(frozen=True)
 class _Contents:
-    """Readings of a cell: numbers, median of ln and median condition."""
+    """Readings of a cell: numbers of readings and days, median of ln k, median condition."""
 
     n_readings: int
     n_days: int
@@ -44,7 +44,7 @@ def tabulate(
     fit: Fit,
     settings: BaselineSettings,
 ) -> CellTable:
-    """Statistics and support of cells with readings, given in ln, and of those between."""
+    """Return the table of cells with readings and of cells between them; `value` is ln k."""
     contents = _seen(conditions, value, groups, fit, settings.grid)
     enough = {
         cell
@@ -61,7 +61,7 @@ def tabulate(
             CellStatistics(
                 **vars(content),
                 cell=cell,
-                scatter=max(float(np.median(fit.group_std)), MIN_SCATTER),  # until it is known
+                scatter=max(float(np.median(fit.group_std)), MIN_SCATTER),  # preliminary
                 lasting=0.0,
                 surface_std=float(std[row]),
                 node_std=nodes[row],
@@ -90,7 +90,7 @@ def _support(cell: Cell, enough: set[Cell], between: frozenset[Cell], is_sure: n
 def _seen(
     conditions: FilmConditions, value: FloatArray, groups: Groups, fit: Fit, grid: CellGrid
 ) -> dict[Cell, _Contents]:
-    """Contents of every cell with readings."""
+    """Return the contents of each cell that has readings."""
     cells, place = np.unique(grid.cells(conditions), axis=1, return_inverse=True)
     place = place.reshape(-1)
     n_readings, n_days = _support_counts(groups, fit, grid, cells)
@@ -113,7 +113,7 @@ def _unseen(
     surface: Surface,
     grid: CellGrid,
 ) -> _Contents:
-    """Contents of a cell without readings: its centre, with the attitude of the nearest cell."""
+    """Return the contents of a cell without readings: its centre, the nearest cell's attitude."""
     nearest = min(
         sorted(enough), key=lambda other: sum(abs(a - b) for a, b in zip(cell, other, strict=True))
     )
@@ -124,7 +124,7 @@ def _unseen(
 
 
 def _surface_std(contents: dict[Cell, _Contents], fit: Fit) -> FloatArray:
-    """(n_cells,) at the median condition of each cell."""
+    """Return the uncertainty of the surface at the median condition of each cell (n_cells,)."""
     columns = [
         (c.eccentricity_ratio, c.oil_temperature_c, c.attitude_deg) for c in contents.values()
     ]
@@ -132,7 +132,7 @@ def _surface_std(contents: dict[Cell, _Contents], fit: Fit) -> FloatArray:
 
 
 def _node_std(contents: dict[Cell, _Contents], fit: Fit, grid: CellGrid) -> list[tuple[float, ...]]:
-    """Of each cell, in the order of `CellStatistics.node_std`."""
+    """Return `CellStatistics.node_std` of each cell: the uncertainty at its nodes."""
     low = np.array([cell[:2] for cell in contents], np.float64)
     attitude_deg = np.array([content.attitude_deg for content in contents.values()])
     along = np.linspace(0.0, 1.0, NODES)
@@ -151,7 +151,7 @@ def _node_std(contents: dict[Cell, _Contents], fit: Fit, grid: CellGrid) -> list
 def _support_counts(
     groups: Groups, fit: Fit, grid: CellGrid, cells: CellArray
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """(n_cells,) readings and days of each cell, without groups that the fit rejected."""
+    """Return the readings and days of each cell (n_cells,), without groups rejected by the fit."""
     believed = groups.rows(fit.robust_weight >= BELIEVED)
     place = _find_columns(grid.cells(believed.conditions), cells)
     days = np.unique(np.vstack([place, believed.day]), axis=1)[0]
@@ -161,7 +161,7 @@ def _support_counts(
 
 
 def _find_columns(wanted: CellArray, cells: CellArray) -> npt.NDArray[np.int64]:
-    """(n,) which column of `cells`, sorted as by `np.unique`, each wanted column is."""
+    """Return the index of each wanted column (n,) in `cells`, which `np.unique` has sorted."""
     low = np.minimum(cells.min(axis=1), wanted.min(axis=1, initial=0))[:, np.newaxis]
     size = tuple(np.maximum(cells.max(axis=1), wanted.max(axis=1, initial=0)) - low[:, 0] + 1)
     flat = np.ravel_multi_index(tuple(cells - low), size)

@@ -1,1 +1,1 @@
-"""Whether a film has changed, compared with its baseline, and why."""
+"""Detection of a change of film stiffness from its baseline, and of its cause."""

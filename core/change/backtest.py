@@ -1,4 +1,4 @@
-"""Operation and decisions over stored readings: the steps of a running unit, folded."""
+"""Operating states and decisions recomputed over stored readings, for back-tests and restarts."""
 
 import math
 from collections import deque
@@ -27,7 +27,7 @@ from core.condition.operating_state import (
 
 @dataclass(frozen=True, eq=False)
 class OperationHistory:
-    """`OperatingState` of every reading (n,), and whether it had settled."""
+    """`OperatingState` of each reading (n,), and whether the state had settled."""
 
     state: CodeArray
     is_settled: npt.NDArray[np.bool_]
@@ -41,10 +41,10 @@ def operation_history(
     oil_temperature_c: FloatArray | None = None,
     state: CodeArray | None = None,
 ) -> OperationHistory:
-    """Operating states from speed and power, or those that a file gives, and their settling.
+    """Return the operating states and their settling, from speed and power or from given states.
 
-    Times increase; columns are (n,) with NaN where there is no number. Without an oil temperature
-    a film warms up for the longest time.
+    Times increase; columns are (n,) with NaN for missing values. Without an oil temperature, the
+    full warm-up time applies.
     """
     columns = (speed_rpm, power_mw, oil_temperature_c, state)
     rows = [
@@ -56,10 +56,10 @@ def operation_history(
 
 
 def last_operation(history: StiffnessHistory, rules: FilmRules) -> tuple[Operation, OilSettling]:
-    """Operation of a unit and settling of a bearing's oil after the bearing's stored readings."""
+    """Return the operation of a unit and the oil settling of a bearing after stored readings."""
     time_ns = history.time_ns.tolist()
     if time_ns:
-        # readings keep their distances, though time may be made to pass faster from now on
+        # intervals between stored readings stay unscaled; a time lapse applies only from now on
         shift_ns = rules.lapsed_ns(time_ns[-1]) - time_ns[-1]
         time_ns = [reading_ns + shift_ns for reading_ns in time_ns]
     columns = (history.speed_rpm, history.power_mw, history.oil_temperature_c, None)
@@ -75,7 +75,7 @@ def _operations(
     state: CodeArray | None,
     limits: OperatingLimits,
 ) -> Iterator[tuple[Operation, OilSettling]]:
-    """Operation and oil after each reading."""
+    """Yield the operation and the oil settling after each reading."""
     operation, oil = UNKNOWN_OPERATION, NOT_AT_SPEED
     oils_c = repeat(math.nan) if oil_temperature_c is None else oil_temperature_c.tolist()
     states = repeat(None) if state is None else map(OperatingState, state.tolist())
@@ -88,10 +88,10 @@ def _operations(
 
 @dataclass(frozen=True, eq=False)
 class DecisionHistory:
-    """The decision after every reading, (n,) each.
+    """Decision after each reading, as columns (n,).
 
-    Members of `Verdict`; level 0 or a member of `AlarmLevel`; and the most significant mean
-    deviation, NaN before there is one.
+    `verdict` contains values of `Verdict`, and `level` values of `AlarmLevel` or 0. The other
+    columns describe the most significant mean deviation; NaN before the first.
     """
 
     verdict: CodeArray
@@ -101,7 +101,7 @@ class DecisionHistory:
     time_scale_h: FloatArray
 
     def raised(self) -> npt.NDArray[np.int64]:
-        """Rows in which a level rises."""
+        """Return the rows in which the level rises."""
         return np.flatnonzero(np.diff(self.level, prepend=np.int8(0)) > 0)
 
 
@@ -112,7 +112,7 @@ def decide_all(
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,
 ) -> DecisionHistory:
-    """Decide over stored readings, oldest first, from the initial decision on."""
+    """Return the decisions over stored readings, oldest first, from the initial decision."""
     nothing = (np.nan, np.nan, np.nan)
     rows = [
         (
@@ -131,7 +131,7 @@ def last_decision(
     baseline: QuantityBaseline,
     rules: FilmRules,
 ) -> Decision:
-    """Decision after stored readings, as if the baseline had been in force."""
+    """Return the decision after stored readings, as if the baseline had been in force."""
     watched = (history, is_settled, baseline.direction, baseline)
     found = deque(_decisions(*watched, rules.change, rules.lapsed_ns), maxlen=1)
     return found[0] if found else INITIAL_DECISION

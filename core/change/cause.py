@@ -1,16 +1,16 @@
 """Cause of a change of stiffness: the film, the oil of all films, or bracket and transducers.
 
-Stiffness is measured as bracket motion over shaft motion times the bracket's stiffness. Each fault
-that can change it moves the shaft at 1× in its own way, and the healthy machine has shown how the
-shaft moves for any stiffness of its films (`core.change.shaft_response`):
+The measured stiffness is bracket motion over shaft motion, times the bracket stiffness. Each fault
+that changes it has a different effect on the 1× shaft motion, which is compared with the response
+learned from the healthy machine (`core.change.shaft_response`):
 
-- a film: as with films of the measured stiffness;
-- an accelerometer: not at all;
-- shaft probes: each reads more by what its stiffness reads less, less the distance that the shaft
-  seems to run further out, and the shaft moves as before;
-- a loose bracket: as with films in series with a softer bracket.
+- film: the shaft moves as with films of the measured stiffness;
+- accelerometer: the shaft motion does not change;
+- shaft probes: the true motion does not change. Each probe reads more by the factor by which its
+  stiffness reads less, corrected for the apparent larger eccentricity;
+- loose bracket: the shaft moves as with films in series with a softer bracket.
 
-A cause is named only if the motion agrees with it and with no other.
+A cause is reported only if the motion agrees with this cause and with no other.
 """
 
 from dataclasses import dataclass, fields
@@ -35,17 +35,17 @@ class Cause(StrEnum):
 
 @dataclass(frozen=True)
 class Attribution:
-    """Cause of a change, with its evidence.
+    """Cause of a change of stiffness, with its evidence.
 
     Parameters
     ----------
     film_share
-        Fraction of the change that is the film's if the rest is a transducer of the bearing; 0 to 1
-        within its uncertainty. None if it is unknown, or if no such mixture agrees with the motion.
+        Fraction of the change due to the film, if the rest is due to a transducer of the bearing; 0
+        to 1 within its uncertainty. None if unknown, or if no such mixture agrees with the motion.
     film_share_std
         Standard uncertainty of `film_share`.
     shaft_change, bearing_change
-        Motion of shaft and bearing over the motion that was expected, in ln.
+        ln of the motion of shaft and of bearing over the expected motion.
     """
 
     cause: Cause
@@ -57,23 +57,23 @@ class Attribution:
 
 
 MIN_RELATIVE_CHANGE = 0.4
-"""Fraction of the change of the alarmed film from which on another film has changed with it."""
+"""Smallest change of another film, relative to the alarmed film, that counts as changed too."""
 
 MAX_MISFIT = 30.0
-"""Sum over all films of squared deviations, in standard uncertainties, up to which a cause agrees
-with the motion of the shaft. In simulated lives 95 % of the healthy means lie below."""
+"""Largest misfit of a cause that agrees with the shaft motion: sum over all films of the squared
+residuals in standard uncertainties. In simulations, 95 % of the healthy means lie below."""
 
 SCALES = np.linspace(0.8, 1.6, 9)
-"""Multiples of a predicted motion that agree with the prediction: the response was learned where
-films changed together, and is not exact where one changes alone. In simulated lives a film of one
-bearing moved the shaft by 1.0 to 1.35 times the predicted motion."""
+"""Scale factors of the predicted motion that are accepted. The response was learned from films that
+changed together, and is inexact if one film changes alone. In simulations, a film of one bearing
+moved the shaft by 1.0 to 1.35 times the predicted motion."""
 
 SPREAD = 0.15
-"""Error of a predicted motion at each film, as a fraction of its rms over all films."""
+"""Error of the predicted motion at each film, as a fraction of its rms over all films."""
 
 SHARE_SPREAD, COVERAGE = 0.3, 2.0
-"""Relative standard uncertainty of a share from the prediction, and the number of standard
-uncertainties by which a share may lie outside 0 to 1."""
+"""Relative standard uncertainty of the film share due to the prediction, and the number of standard
+uncertainties by which the share may lie outside 0 to 1."""
 
 FILM_REASON = "the shaft moves as it does with films of the stiffness that is measured"
 OIL_REASON = "all films changed alike, and the shaft moves as it does with such films"
@@ -88,16 +88,16 @@ NO_FIT_REASON = "shaft motion agrees with no single cause"
 
 @dataclass(frozen=True, eq=False)
 class UnitReadings:
-    """Settled readings of all films of a unit at the same times: all (n_films, n), NaN if missing.
+    """Settled readings of all films of a unit at common times, (n_films, n) each; NaN if missing.
 
     Parameters
     ----------
     ln_k, ln_shaft
-        ln of stiffness and of shaft motion at 1×.
+        ln of the stiffness, and of the shaft motion at 1×.
     deviation
-        Of stiffness from its baseline.
+        Deviation of ln k from its baseline.
     rise
-        Rise of the baseline's ln k with ln of the eccentricity ratio.
+        Derivative of the baseline's ln k with respect to ln of the eccentricity ratio.
     """
 
     ln_k: FloatArray
@@ -107,7 +107,7 @@ class UnitReadings:
     attitude_deg: FloatArray
 
     def columns(self, wanted: npt.NDArray[np.bool_ | np.int64]) -> "UnitReadings":
-        """Some of the times, by mask or number."""
+        """Return the readings at the times selected by a mask or by column numbers."""
         return UnitReadings(*(getattr(self, f.name)[:, wanted] for f in fields(self)))
 
 
@@ -122,10 +122,10 @@ def attribute(
     Parameters
     ----------
     readings
-        The newest readings for which the film has a deviation, about `MEAN_READINGS` of them.
+        About `MEAN_READINGS` newest readings for which the film has a deviation.
     bracket_n_per_m : (n_films,), optional
-        Stiffness of the brackets that measured stiffness is computed with. Without it a loose
-        bracket cannot be ruled out, and no film is found to have become stiffer.
+        Bracket stiffness that the measured stiffness was computed with. Without it, a loose
+        bracket cannot be excluded, so a stiffer film is never reported as cause.
     """
     if response is None or film not in response.places:
         return Attribution(Cause.UNKNOWN, "the response of the shaft has not been learned")
@@ -145,7 +145,7 @@ def attribute(
 
 @dataclass(frozen=True, eq=False)
 class _Residuals:
-    """Distance (n_films,) of the motion from each cause's, in standard uncertainties."""
+    """Residuals (n_films,) of the motion for each possible cause, in standard uncertainties."""
 
     row: int
     response: ShaftResponse
@@ -153,13 +153,13 @@ class _Residuals:
 
     @cached_property
     def std(self) -> FloatArray:
-        """(n_films,) standard uncertainty of means of that many readings."""
+        """Standard uncertainty of the means over the given number of readings (n_films,)."""
         few = max(1.0, MEAN_READINGS / self.readings.ln_k.shape[1])
         return np.asarray(np.array(self.response.std) * few**0.5)
 
     @cached_property
     def change(self) -> FloatArray:
-        """(n_films, n) deviations of the films that changed together; zero for the others."""
+        """Deviations of the films that changed together; 0 for other films (n_films, n)."""
         deviation, known = self.readings.deviation, np.isfinite(self.readings.deviation)
         mean = np.nansum(deviation, axis=1) / np.maximum(np.sum(known, axis=1), 1)
         together = np.sign(mean) == np.sign(mean[self.row])
@@ -169,16 +169,16 @@ class _Residuals:
 
     @cached_property
     def if_film(self) -> FloatArray:
-        """Residual if films have the measured stiffness."""
+        """Residual if the films have the measured stiffness."""
         return self._residual(self.readings.ln_k)
 
     @cached_property
     def if_unchanged(self) -> FloatArray:
-        """Residual if neither a film nor a shaft probe has changed."""
+        """Residual if no film and no shaft probe has changed."""
         return self._residual(self.readings.ln_k - self.change)
 
     def probe_misfit(self) -> float:
-        """Misfit if the bearing's shaft probes read wrong; NaN if that is unknown."""
+        """Return the misfit for wrong shaft probes of the bearing; NaN if unknown."""
         gain, ln_k = self._probe_gain(), self.readings.ln_k
         if not np.all(np.isfinite(gain)):
             return float("nan")
@@ -187,10 +187,10 @@ class _Residuals:
         return min(self.misfit(x, a * own) for a, x in zip(SCALES, residual, strict=True))
 
     def bracket_misfit(self, bracket_n_per_m: FloatArray | None) -> float:
-        """Misfit if brackets have changed as stiffness seems to have; NaN if that is unknown.
+        """Return the misfit for brackets that changed by the apparent change; NaN if unknown.
 
-        To the rest of the machine, film and bracket in series are one spring; the film's share of
-        the motion in its own bearing falls with the stiffness of the bracket.
+        For the rest of the machine, film and bracket in series act as one spring. The film's share
+        of the motion in its own bearing decreases with the bracket stiffness.
         """
         if bracket_n_per_m is None:
             return float("nan")
@@ -202,7 +202,7 @@ class _Residuals:
         return self.scaled_misfit(self._residual(np.log(alike), own))
 
     def film_share(self) -> tuple[float, float] | tuple[None, None]:
-        """Share of the film in a mixture with a bearing transducer, with its uncertainty."""
+        """Return the film's share in a mixture with a transducer fault, with its uncertainty."""
         step = self.if_unchanged - self.if_film
         size = float(np.sum(step**2))
         if size == 0.0:
@@ -214,14 +214,14 @@ class _Residuals:
         return (share, std) if is_possible else (None, None)
 
     def bearings(self, rows: npt.NDArray[np.bool_]) -> frozenset[str]:
-        """Bearings of some of the films."""
+        """Return the ids of the bearings whose films are selected by the mask `rows`."""
         places = zip(self.response.places, rows.tolist(), strict=True)
         return frozenset(bearing for (bearing, _), is_wanted in places if is_wanted)
 
     def _probe_gain(self) -> FloatArray:
-        """(n_films, n) ln of the gain of the bearing's probes that would explain the deviations.
+        """Return ln of the probe gains of the bearing that explain the deviations (n_films, n).
 
-        With gains g the film reads softer by g, and the shaft seems to run further out by
+        With ln gains g, the film reads softer by g, and the apparent eccentricity increases by
         g_x cos² + g_y sin² of the attitude angle, where the baseline is stiffer.
         """
         bearing = self.response.places[self.row][0]
@@ -229,24 +229,24 @@ class _Residuals:
         angle = np.radians(self.readings.attitude_deg[self.row])
         outward = np.stack([np.cos(angle) ** 2, np.sin(angle) ** 2])[: len(pair)]
         matrix = np.eye(len(pair)) + np.einsum("in,jn->nij", self.readings.rise[pair], outward)
-        deviation = np.nan_to_num(self.readings.deviation[pair])  # unknown in y: as if not changed
+        deviation = np.nan_to_num(self.readings.deviation[pair])  # unknown counts as 0
         gain = np.zeros_like(self.readings.ln_k)
         gain[pair] = np.linalg.solve(matrix, -deviation.T[:, :, np.newaxis])[:, :, 0].T
         return gain
 
     def _residual(self, ln_k: FloatArray, own: FloatArray | float = 0.0) -> FloatArray:
-        """Residual of the shares of motion, for a stiffness and an `own` excess of each film."""
+        """Return the residual of the motion shares for a stiffness and an `own` excess per film."""
         motion = self.readings.ln_shaft - own
         left = motion - np.mean(motion, axis=0) - self.response.expected(ln_k)
         return np.asarray(np.mean(left, axis=1) / self.std)
 
     def scaled_misfit(self, residual: FloatArray) -> float:
-        """Smallest misfit over the multiples of a predicted motion."""
+        """Return the smallest misfit over all `SCALES` of the predicted motion."""
         step = self.if_unchanged - residual
         return min(self.misfit(self.if_unchanged - a * step, a * step) for a in SCALES)
 
     def misfit(self, residual: FloatArray, predicted: FloatArray | float = 0.0) -> float:
-        """Sum of squares, with the uncertainty of the prediction."""
+        """Return the sum of squared residuals, including the uncertainty of the prediction."""
         spread = SPREAD**2 * np.mean((predicted * self.std) ** 2) / self.std**2
         return float(np.sum(residual**2 / (1.0 + spread)))
 
@@ -256,7 +256,7 @@ def _cause(seen: _Residuals, bracket_n_per_m: FloatArray | None) -> tuple[Cause,
         TRANSDUCER_REASON: seen.misfit(seen.if_unchanged),
         PROBE_REASON: seen.probe_misfit(),
     }
-    # brackets come loose, which looks like stiffer films; they do not stiffen
+    # a loose bracket looks like a stiffer film; brackets do not become stiffer
     if np.mean(seen.change[seen.row]) > 0.0:
         misfits[BRACKET_REASON] = seen.bracket_misfit(bracket_n_per_m)
     known = seen.bearings(np.asarray(np.any(np.isfinite(seen.readings.deviation), axis=1)))
@@ -265,7 +265,7 @@ def _cause(seen: _Residuals, bracket_n_per_m: FloatArray | None) -> tuple[Cause,
     agreeing = [reason for reason, misfit in misfits.items() if misfit <= MAX_MISFIT]
     only_film = is_film and all(misfit > MAX_MISFIT for misfit in misfits.values())
     if changed == known and len(known) > 1:
-        # transducers of all bearings hardly change together
+        # transducers of all bearings are unlikely to change together
         return (Cause.OIL, OIL_REASON) if only_film else (Cause.UNKNOWN, ALIKE_REASON)
     if only_film:
         return (Cause.FILM, FILM_REASON) if len(known) > 1 else (Cause.UNKNOWN, ALONE_REASON)

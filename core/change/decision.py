@@ -1,4 +1,4 @@
-"""Decision whether a film has changed: verdict, alert and danger, stepped reading by reading."""
+"""Decision whether a film has changed: verdict, alert and danger, updated with each reading."""
 
 import math
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from core.units import NS_PER_S
 
 
 class Verdict(IntEnum):
-    """Verdict on a reading; all but the first three say why the film could not be judged."""
+    """Verdict on a reading; all except the first three are reasons why it was not judged."""
 
     NORMAL = 0
     ALERT = 1
@@ -33,17 +33,17 @@ class Verdict(IntEnum):
 
 
 JUDGED = (Verdict.NORMAL, Verdict.ALERT, Verdict.DANGER)
-"""Verdicts of a film that could be judged."""
+"""Verdicts on a reading that was judged."""
 
 WITHOUT_NUMBER = {
     ReadingOutcome.INSUFFICIENT_EXCITATION: Verdict.INSUFFICIENT_EXCITATION,
     ReadingOutcome.BAD_QUALITY: Verdict.BAD_QUALITY,
 }
-"""Verdicts on readings without a number."""
+"""Verdict for each outcome without a stiffness value."""
 
 
 Outcome: TypeAlias = Comparison | Verdict
-"""Comparison of a reading with its baseline, or the verdict that says why there is none."""
+"""Comparison of a reading with its baseline, or the verdict that prevents a comparison."""
 
 
 def outcomes(
@@ -54,9 +54,9 @@ def outcomes(
     is_settled: npt.NDArray[np.bool_],
     baseline: QuantityBaseline | None,
 ) -> Iterator[Outcome]:
-    """Outcome of each reading of one film in one direction, from columns (n,).
+    """Yield the outcome of each reading of one film in one direction, from columns (n,).
 
-    The value is ln of the stiffness, NaN where there is no number; codes are of `ReadingOutcome`.
+    `value` is ln of the stiffness, NaN if missing; `codes` contains values of `ReadingOutcome`.
     """
     unusable = np.full(value.size, -1)
     columns: tuple[FloatArray, ...] = (np.zeros(value.size),) * 4
@@ -78,18 +78,18 @@ def outcomes(
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """State of the decision on one quantity in one direction.
+    """State of the decision on a film in one direction.
 
     Parameters
     ----------
     verdict
         Verdict on the newest reading.
     finding
-        The most significant mean deviation, as of the newest reading that counted.
+        Most significant mean deviation after the newest counted reading.
     deviation, deviation_std
-        Of the newest reading that counted, in ln, and its standard uncertainty.
+        Deviation of the newest counted reading, in ln, and its standard uncertainty.
     alert, danger
-        Levels with their delays.
+        Delay timers of the levels.
     """
 
     verdict: Verdict = Verdict.GATHERING_EVIDENCE
@@ -104,7 +104,7 @@ class Decision:
 
     @property
     def level(self) -> AlarmLevel | None:
-        """Level that is held, whether or not the newest reading could be judged."""
+        """Active level, whether or not the newest reading was judged."""
         if self.danger.is_on:
             return AlarmLevel.DANGER
         return AlarmLevel.ALERT if self.alert.is_on else None
@@ -121,15 +121,15 @@ def step(
     baseline: QuantityBaseline | None,
     limits: ChangeLimits,
 ) -> Decision:
-    """Update a decision with one reading.
+    """Return a decision updated with one reading.
 
-    A reading does not count if it follows the last one that counted by less than half of the time
-    that a reading stands for: the two share most of their samples.
+    A reading does not count if it is less than half a reading interval after the previous counted
+    reading, because both share most of their samples.
 
     Raises
     ------
     ValueError
-        If the reading is not later than the one before.
+        If the reading is not later than the previous reading.
     """
     if decision.last_ns is not None and time_ns <= decision.last_ns:
         raise ValueError(f"reading at {time_ns} ns is not after {decision.last_ns} ns")
@@ -162,7 +162,7 @@ def step(
 
 
 def _min_step_ns(baseline: QuantityBaseline) -> int:
-    """Time after one reading before the next one counts."""
+    """Return the smallest interval between counted readings."""
     return round(0.5 * baseline.reading_h * 3600.0 * NS_PER_S)
 
 
@@ -180,7 +180,7 @@ def _level_step(
     baseline: QuantityBaseline,
     limits: ChangeLimits,
 ) -> DelayTimer:
-    """Step of one level; delays are whole numbers of readings, at least one."""
+    """Return the updated timer of a level; delays are whole numbers of readings, at least one."""
     if timer.is_on:
         wanted = any(_is_held(finding, limit, limits) for finding in findings)
     else:
@@ -194,7 +194,7 @@ def _level_step(
 
 
 def _is_exceeded(finding: Finding, limit: float, margin: float, limits: ChangeLimits) -> bool:
-    """Whether a change is significant, and exceeds the limit by its margin."""
+    """Whether a change is significant, and exceeds the limit by the margin."""
     significance = finding.significance
     threshold = limits.significance_threshold(finding.time_scale_h)
     size = abs(finding.change) * (1.0 - margin / max(significance, 1e-9))
@@ -202,17 +202,17 @@ def _is_exceeded(finding: Finding, limit: float, margin: float, limits: ChangeLi
 
 
 def _is_held(finding: Finding, limit: float, limits: ChangeLimits) -> bool:
-    """Whether a change still exceeds its limit less the deadband."""
+    """Whether a change still exceeds the limit minus the deadband."""
     threshold = limits.significance_threshold(finding.time_scale_h) * limits.holding_share
     return finding.significance > threshold and abs(finding.change) > limit - limits.deadband
 
 
 def _verdict(decision: Decision, baseline: QuantityBaseline, limits: ChangeLimits) -> Verdict:
-    """Verdict on a reading that was compared with its baseline."""
+    """Return the verdict on a reading that was compared with its baseline."""
     if decision.level is not None:
         return Verdict(int(decision.level))
     counted_h = decision.evidence.n_counted * baseline.reading_h
     is_enough = decision.finding is not None and counted_h >= limits.min_evidence_h
-    # a change beyond its limit is not normal even before its delay has passed
+    # a change beyond the limit is not normal, even before the on-delay has elapsed
     is_normal = is_enough and decision.alert.opposed_ns == 0
     return Verdict.NORMAL if is_normal else Verdict.GATHERING_EVIDENCE

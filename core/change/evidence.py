@@ -1,4 +1,4 @@
-"""Evidence of a change: the mean deviation over each time scale, reading by reading."""
+"""Evidence of a change: mean deviations over each time scale, updated with each reading."""
 
 import math
 from dataclasses import dataclass
@@ -10,12 +10,12 @@ from core.baseline.grouping import MEDIAN_READINGS, ewma_step, ewma_weight
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """One reading compared with its baseline: a row of `Deviations`, and the reading's `u_random`.
+    """Comparison of one reading with its baseline: a row of `Deviations`, with `u_random`.
 
     Parameters
     ----------
     offset_std
-        Standard uncertainty that averaging does not take away.
+        Standard uncertainty that averaging does not reduce.
     """
 
     deviation: float
@@ -27,9 +27,9 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class ScaleSums:
-    """Exponentially weighted sums over one time scale, weighted by readings.
+    """Exponentially weighted sums over one time scale, with the weights of the readings.
 
-    `fill` is that of ones: the part of the time scale that has been seen.
+    `fill` is the sum of ones, the elapsed fraction of the time scale.
     """
 
     fill: float = 0.0
@@ -39,7 +39,7 @@ class ScaleSums:
     offset: float = 0.0
 
     def step(self, compared: Comparison, middle: float, alpha: float) -> "ScaleSums":
-        """Add one reading; `middle` is the running median of the deviations."""
+        """Return the sums with one more reading; `middle` is the running median."""
         weight = compared.weight
         return ScaleSums(
             ewma_step(self.fill, 1.0, alpha),
@@ -50,9 +50,9 @@ class ScaleSums:
         )
 
     def finding(self, time: TimeScatter) -> "Finding":
-        """Mean deviation over the time scale with its uncertainty."""
+        """Return the mean deviation over the time scale with its uncertainty."""
         offset = self.offset / self.weight
-        # means over a half-filled time scale scatter further
+        # means over a partly elapsed time scale have a larger scatter
         own = time.share * (self.scatter / self.weight) / self.fill
         std = math.sqrt(own * own + offset * offset)
         return Finding(time.time_scale_h, self.deviation / self.weight, std)
@@ -60,7 +60,7 @@ class ScaleSums:
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Mean deviation, ln of measured over learned, and standard uncertainty of a healthy one."""
+    """Mean deviation of ln k from the baseline, and its standard uncertainty without a change."""
 
     time_scale_h: float
     change: float
@@ -68,15 +68,15 @@ class Finding:
 
     @property
     def significance(self) -> float:
-        """Distance from no change, in standard uncertainties."""
+        """Absolute change in standard uncertainties."""
         return abs(self.change) / self.std
 
 
 @dataclass(frozen=True, slots=True)
 class GatheredEvidence:
-    """Deviations counted so far, and their sums over the time scales of the baseline.
+    """Number of counted deviations, and their sums over the time scales of the baseline.
 
-    The median of the newest deviations is averaged, so that single spikes do not count.
+    The running median of the deviations is averaged, so that single spikes have no effect.
     """
 
     n_counted: int = 0
@@ -84,12 +84,12 @@ class GatheredEvidence:
     scales: tuple[ScaleSums, ...] = ()
 
     def step(self, compared: Comparison, baseline: QuantityBaseline) -> "GatheredEvidence":
-        """Add one reading.
+        """Return the evidence with one more reading.
 
         Raises
         ------
         ValueError
-            If the evidence was gathered with another baseline's time scales.
+            If the baseline has a different number of time scales than the evidence.
         """
         times = baseline.time_scatter
         scales = self.scales or (ScaleSums(),) * len(times)
@@ -107,7 +107,7 @@ class GatheredEvidence:
         )
 
     def findings(self, baseline: QuantityBaseline) -> list[Finding]:
-        """Mean deviations over the time scales that have been seen in full."""
+        """Return the mean deviations over the time scales that have fully elapsed."""
         return [
             sums.finding(time)
             for sums, time in zip(self.scales, baseline.time_scatter, strict=True)

@@ -1,4 +1,4 @@
-"""`FilmJudge`: compares the readings of a unit's films with their baselines."""
+"""`FilmJudge`: comparison of the film readings of a unit with their baselines."""
 
 import math
 from collections import deque
@@ -21,19 +21,19 @@ from core.limits import AlarmLevel, Judgement, unknown
 
 @dataclass(frozen=True)
 class FilmFinding:
-    """Verdict on a film in one direction after a reading, with its numbers; None where missing.
+    """Verdict on a film in one direction after a reading, with its values; None if missing.
 
     Parameters
     ----------
     level
-        Level that is held, whether or not this reading could be judged.
+        Active level, whether or not this reading was judged.
     change, change_std, time_scale_h
-        Most significant mean deviation from the baseline, in ln; its standard uncertainty; running
-        hours that it is averaged over.
+        Most significant mean deviation from the baseline, in ln; its standard uncertainty; its
+        averaging time in running hours.
     deviation, deviation_std
-        Deviation of this reading alone; None unless it was compared.
+        Deviation of this reading and its standard uncertainty; None if it was not compared.
     attribution
-        Cause of the change, while a level is held.
+        Cause of the change while a level is active.
     """
 
     verdict: Verdict
@@ -53,11 +53,11 @@ ALARM_REASONS = {
     Cause.BRACKET_OR_TRANSDUCER: "bracket_or_transducer_changed",
     Cause.UNKNOWN: "changed_cause_unknown",
 }
-"""Reason of an alarm by cause."""
+"""Reason of a film alarm, by cause of the change."""
 
 
 def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
-    """Judgement of the film's alarm: a film that could not be judged has not returned to normal."""
+    """Return the judgement of a film's alarm; unknown if the film was not judged."""
     if finding.verdict not in JUDGED:
         return unknown(finding.verdict.name.lower())
     limit = limits.danger_change if finding.level is AlarmLevel.DANGER else limits.alert_change
@@ -69,7 +69,7 @@ def alarm_condition(finding: FilmFinding, limits: ChangeLimits) -> Judgement:
 
 @dataclass(frozen=True)
 class FilmDecision:
-    """Decision on a bearing in a direction, with the version of its baseline."""
+    """Decision on the film of a bearing in one direction, with the version of its baseline."""
 
     bearing: str
     direction: str
@@ -79,9 +79,9 @@ class FilmDecision:
 
 @dataclass(frozen=True)
 class FilmMemory:
-    """State of `FilmWatch` that stored readings do not hold: the oil is by bearing.
+    """State of `FilmWatch` that stored readings do not contain; oil settling by bearing.
 
-    The slot is the number of the newest interval that had its reading.
+    `slot` is the number of the newest reading interval; the next reading is due in a later one.
     """
 
     operation: Operation
@@ -92,7 +92,7 @@ class FilmMemory:
 
 @dataclass(frozen=True)
 class FilmNews:
-    """A reading with its findings and decisions in x and y."""
+    """Newly judged reading of a film with its findings and decisions in x and y."""
 
     reading: FilmReading
     findings: tuple[FilmFinding, FilmFinding]
@@ -100,16 +100,18 @@ class FilmNews:
 
 
 MAX_RECENT = 4 * MEAN_READINGS
-"""Moments whose readings are kept to find causes: some lack the deviation of a film."""
+"""Number of recent times whose readings are kept for attribution; some lack a deviation."""
 
 
 class FilmJudge:
-    """Active baselines and decisions so far of one unit, with the brackets' stiffness by bearing.
+    """Change detection for the films of one unit, with active baselines and decisions.
+
+    `brackets_n_per_m` is the bracket stiffness by bearing.
 
     Attributes
     ----------
     response
-        Shaft response that causes are found with; None if it has not been learned.
+        Shaft response used for attribution; None if it has not been learned.
     """
 
     def __init__(self, rules: FilmRules, brackets_n_per_m: Mapping[str, float]) -> None:
@@ -122,15 +124,15 @@ class FilmJudge:
         self._recent: deque[FloatArray] = deque(maxlen=MAX_RECENT)
 
     def baseline(self, bearing: str) -> BearingBaseline | None:
-        """Active baseline of a bearing."""
+        """Return the active baseline of a bearing, or None."""
         return self._baselines.get(bearing)
 
     def activate_baseline(
         self, bearing: str, baseline: BearingBaseline | None, decisions: Sequence[Decision] = ()
     ) -> None:
-        """Compare a bearing with a baseline, or with none, from its next reading on.
+        """Activate a baseline of a bearing, or none, from the next reading on.
 
-        Decisions in x and y may be given to continue from; by default they are the initial ones.
+        `decisions` in x and y are the start values; by default, the initial decisions.
         """
         if baseline is None:
             self._baselines.pop(bearing, None)
@@ -138,35 +140,35 @@ class FilmJudge:
             self._baselines[bearing] = baseline
         begun = decisions or (INITIAL_DECISION,) * len(DIRECTIONS)
         for direction, decision in zip(DIRECTIONS, begun, strict=True):
-            self._decisions[bearing, direction] = _timeless(decision)  # of another clock, perhaps
+            self._decisions[bearing, direction] = _timeless(decision)  # clocks may differ
 
     @property
     def decided(self) -> tuple[FilmDecision, ...]:
-        """All decisions with the versions of their baselines."""
+        """All decisions with their baseline versions."""
         return tuple(
             FilmDecision(bearing, direction, self._version(bearing), decision)
             for (bearing, direction), decision in self._decisions.items()
         )
 
     def restore(self, decided: Sequence[FilmDecision]) -> None:
-        """Continue from decisions of the baselines that are active."""
+        """Restore decisions whose baseline version is active; ignore other decisions."""
         for found in decided:
             if found.version == self._version(found.bearing):
                 self._decisions[found.bearing, found.direction] = found.decision
 
     def forget_times(self) -> None:
-        """Keep the decisions, and accept readings of any later time."""
+        """Clear the times of all decisions, so that the next reading may have any time."""
         self._decisions = {film: _timeless(each) for film, each in self._decisions.items()}
 
     def add_recent(self, columns: Iterable[FloatArray]) -> None:
-        """Add settled readings of earlier moments, (5, n_films) each, the fields of `UnitReadings`.
+        """Add settled readings of earlier times for attribution.
 
-        Causes are found with the newest of them.
+        Each item is (5, n_films), with the fields of `UnitReadings` as rows.
         """
         self._recent.extend(columns)
 
     def judge(self, readings: Sequence[FilmReading]) -> list[FilmNews]:
-        """Judge the readings of all bearings at one moment, and update the decisions."""
+        """Judge the readings of all bearings at one time, and update the decisions."""
         found = {
             (reading.bearing, direction): self._decide(reading, direction)
             for reading in readings
@@ -207,7 +209,7 @@ class FilmJudge:
     def _remember(
         self, readings: Sequence[FilmReading], found: Mapping[FilmDirection, FilmFinding]
     ) -> None:
-        """Keep the readings of one moment if they are settled and of every bearing."""
+        """Keep the readings of one time if all bearings have a settled reading."""
         settled = {each.bearing: each for each in readings if each.condition.is_settled}
         if settled.keys() != self._rules.estimators.keys():
             return
@@ -228,7 +230,7 @@ class FilmJudge:
         self._recent.append(np.array(rows).T)
 
     def _attribution(self, film: FilmDirection) -> Attribution:
-        """Cause of a change of a film, from the newest readings that have its deviation."""
+        """Return the cause of a change, from the newest readings with a deviation of this film."""
         row = self._films.index(film)
         newest = [column for column in self._recent if np.isfinite(column[2, row])]
         columns = newest[-MEAN_READINGS:] or [np.full((5, len(self._films)), np.nan)]

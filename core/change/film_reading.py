@@ -1,4 +1,4 @@
-"""`FilmReading`: one reading of one film with the condition that it was taken under."""
+"""`FilmReading`: one reading of one film with its operating condition."""
 
 import math
 from collections.abc import Mapping
@@ -14,16 +14,16 @@ from core.stiffness.estimators import ESTIMATORS
 
 @dataclass(frozen=True)
 class FilmValue:
-    """Reading of a film in one direction; NaN where there is no number.
+    """Reading of a film in one direction; NaN for missing values.
 
     Parameters
     ----------
     ln_k, u_random
         Natural logarithm of the stiffness in N/m, and its random standard uncertainty.
     shaft_um_pk, bearing_um_pk
-        1× amplitudes of shaft relative to bearing, and of bearing.
+        1× amplitudes of the shaft relative to the bearing, and of the bearing.
     outcome, reason
-        Whether stiffness and condition were measured, and if not, why.
+        Whether stiffness and condition were measured, and the reason if not.
     """
 
     ln_k: float
@@ -36,7 +36,7 @@ class FilmValue:
 
 @dataclass(frozen=True)
 class FilmReading:
-    """One film at one moment in x and y, averaged over a few minutes; NaN without a number."""
+    """Reading of one film in x and y, averaged over a few minutes; NaN for missing values."""
 
     unit: str
     bearing: str
@@ -53,7 +53,7 @@ class FilmReading:
 
     @property
     def conditions(self) -> FilmConditions:
-        """Conditions of the one reading as columns."""
+        """Film conditions of this reading as columns of length 1."""
         axes = (self.eccentricity_ratio, self.oil_temperature_c, self.attitude_deg)
         return FilmConditions.one(*axes)
 
@@ -61,7 +61,7 @@ class FilmReading:
 def film_reading(
     assessment: Assessment, condition: BearingCondition, estimator: Estimator
 ) -> FilmReading:
-    """Film reading of an assessment; only readings of good quality become numbers."""
+    """Return the film reading of an assessment; stiffness and condition need good quality."""
     readings = assessment.readings
     eccentricity = readings["eccentricity_ratio"]
     x, y = (_value(readings, estimator, direction) for direction in DIRECTIONS)
@@ -82,12 +82,12 @@ def film_reading(
 
 
 def value_or_nan(reading: Reading) -> float:
-    """Value of a reading of any quality; NaN if missing."""
+    """Return the value of a reading of any quality; NaN if missing."""
     return math.nan if reading.value is None else reading.value
 
 
 def good_or_nan(reading: Reading) -> float:
-    """Value of a reading of good quality; otherwise NaN."""
+    """Return the value of a reading of good quality, otherwise NaN."""
     return value_or_nan(reading) if reading.quality.level is Level.GOOD else math.nan
 
 
@@ -110,7 +110,7 @@ def _value(readings: Mapping[str, Reading], estimator: Estimator, direction: str
 
 
 def _outcome(stiffness: Reading, condition: Quality) -> tuple[ReadingOutcome, Reason]:
-    """Outcome of a stiffness reading: no number rather than a doubtful one."""
+    """Return the outcome of a stiffness reading; a doubtful reading counts as bad quality."""
     quality = stiffness.quality
     if quality.reason is Reason.INSUFFICIENT_EXCITATION:
         return ReadingOutcome.INSUFFICIENT_EXCITATION, quality.reason

@@ -1,4 +1,4 @@
-"""`FilmWatch`: follows the operation of a unit, and reads its films at regular intervals."""
+"""`FilmWatch`: tracking of the operation of a unit, with film readings at regular intervals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -20,7 +20,7 @@ from core.units import ns_from_s
 
 
 class FilmWatch:
-    """Watch of the films of one unit, fed with its assessments."""
+    """Monitor of the films of one unit, updated from its assessments."""
 
     def __init__(self, rules: FilmRules, judge: FilmJudge) -> None:
         self.judge = judge
@@ -31,30 +31,30 @@ class FilmWatch:
 
     @property
     def operation(self) -> Operation:
-        """Operating state of the unit now."""
+        """Present operation of the unit."""
         return self._operation
 
     @property
     def memory(self) -> FilmMemory:
-        """State that another process needs, beside stored readings, to continue."""
+        """State for continuing in another process, in addition to stored readings."""
         return FilmMemory(self._operation, dict(self._oil), self._slot, self.judge.decided)
 
     def restore_operation(self, operation: Operation, oil: Mapping[str, OilSettling]) -> None:
-        """Continue from an operation, and from the settling of the oil by bearing."""
+        """Restore the operation, and the oil settling by bearing."""
         self._operation, self._oil = operation, dict(oil)
 
     def restore(self, memory: FilmMemory) -> None:
-        """Continue where another process stopped; baselines must have been activated before."""
+        """Restore the state of another process; activate the baselines first."""
         self.restore_operation(memory.operation, memory.oil)
         self._slot = memory.slot
         self.judge.restore(memory.decided)
 
     def take(self, assessments: Sequence[Assessment]) -> tuple[list[Assessment], list[FilmNews]]:
-        """Update with the assessments of all bearings.
+        """Update operation and films with the assessments of all bearings.
 
         Returns
         -------
-        The assessments with their conditions, and news of the films if a reading was due.
+        The assessments with their film conditions, and the film news if a reading was due.
         """
         seen: list[Assessment] = []
         news: list[FilmNews] = []
@@ -71,7 +71,7 @@ class FilmWatch:
         now_ns, last_ns = self._rules.lapsed_ns(assessment.time_ns), self._operation.last_ns
         if last_ns is not None and now_ns <= last_ns:
             if last_ns - now_ns <= ns_from_s(self._rules.operating.longest_gap_s):
-                return  # the same assessment again, or a clock put back a little
+                return  # repeated assessment, or a clock set back slightly
             self._restart()
         speed_rpm, power_mw = (value_or_nan(readings[key]) for key in ("speed_rpm", "power_mw"))
         self._operation = step_operation(
@@ -79,7 +79,7 @@ class FilmWatch:
         )
 
     def _restart(self) -> None:
-        """Keep decisions but not times, after a clock was put back."""
+        """Keep the decisions and reset all times after the clock was set back."""
         self.restore_operation(UNKNOWN_OPERATION, {})
         self._slot = None
         self.judge.forget_times()
@@ -100,7 +100,7 @@ class FilmWatch:
         return BearingCondition(self._operation.state, is_settled, cell)
 
     def _is_time(self, time_ns: int) -> bool:
-        """Whether a reading is due; not in the first interval, which may have begun before."""
+        """Whether a reading is due; never in the first interval, which may be incomplete."""
         slot = time_ns // self._rules.reading_ns
         if self._slot is None or slot <= self._slot:
             self._slot = max(slot, self._slot or slot)

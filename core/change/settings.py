@@ -1,4 +1,4 @@
-"""Limits of a change, and the rules that the films of a unit are watched by."""
+"""Limits of a change of film stiffness, and rules for the films of a unit."""
 
 import math
 from collections.abc import Mapping
@@ -10,33 +10,34 @@ from core.machine.unit import Estimator
 
 REFERENCE_H = 4.0
 MIN_SIGNIFICANCE = 3.0
-"""Smallest significance that is required, however long the time scale."""
+"""Required significance for long time scales."""
 
 ALERT_MARGIN, DANGER_MARGIN = 1.0, 3.0
-"""Standard uncertainties by which a change must exceed its limit. A loss of 5 % must still be
-found within two weeks, where means are known to 0.7 %. A danger was an alert long before."""
+"""Number of standard uncertainties by which a change must exceed its limit. A loss of 5 % must be
+detected within two weeks, with an uncertainty of 0.7 %. An alert is raised long before a
+danger."""
 
 
 @dataclass(frozen=True)
 class ChangeLimits:
-    """Limits of the change of a film, in ln (0.035 is 3.5 %), in both directions.
+    """Limits of the change of ln k of a film (0.035 is 3.5 %), for increase and decrease.
 
     Parameters
     ----------
     alert_change, danger_change
-        Size that a significant change must exceed, less its margin, to be an alert or a danger.
+        Limit of the absolute change for an alert and for a danger; the margin is added.
     deadband
-        How far below its limit a change must fall for the level to be left; the required
-        significance falls by the same fraction.
+        Distance below the limit at which an active level ends. The required significance for
+        holding a level is lower by the fraction `deadband / alert_change`.
     significance, significance_fall
-        Required distance of a mean deviation over four hours from zero, in standard uncertainties,
-        and how much less is required for each time scale four times longer: longer means have
-        fewer occasions to stray.
+        Required significance of a mean deviation over four hours, in standard uncertainties, and
+        its reduction for each fourfold longer time scale. Means over longer time have fewer
+        independent values, and so fewer false alarms.
     min_evidence_h
-        Running hours with a baseline before a film is called normal. A time scale counts after its
-        own length.
+        Running hours with a baseline before a film is reported as normal. A time scale is used
+        once it has elapsed.
     on_delay_h, off_delay_h
-        Running hours without interruption before a level counts, or counts no longer.
+        Uninterrupted running hours before a level becomes active, and before it ends.
     """
 
     alert_change: float = 0.035
@@ -50,27 +51,27 @@ class ChangeLimits:
 
     @property
     def holding_share(self) -> float:
-        """Fraction of the required significance below which a level is left."""
+        """Fraction of the required significance below which an active level ends."""
         return 1.0 - self.deadband / self.alert_change
 
     def significance_threshold(self, time_scale_h: float) -> float:
-        """Significance that a mean deviation over a time scale must reach."""
+        """Return the required significance of a mean deviation over a time scale."""
         fall = self.significance_fall * math.log(time_scale_h / REFERENCE_H, 4.0)
         return max(self.significance - fall, MIN_SIGNIFICANCE)
 
 
 @dataclass(frozen=True)
 class FilmRules:
-    """Rules that the films of one unit are watched by.
+    """Rules for monitoring the films of one unit.
 
     Parameters
     ----------
     estimators
-        Estimator whose stiffness is watched, by bearing; other bearings are not watched.
+        Estimator of the monitored stiffness, by bearing; other bearings are not monitored.
     reading_ns
-        Time from one reading to the next.
+        Interval between readings.
     time_lapse
-        Speed of time for operation and decision; above 1 in demonstrations only.
+        Time scale factor for operation and decision; above 1 only in demonstrations.
     """
 
     estimators: Mapping[str, Estimator]
@@ -81,5 +82,5 @@ class FilmRules:
     time_lapse: float = 1.0
 
     def lapsed_ns(self, time_ns: int) -> int:
-        """Time as operation and decision count it."""
+        """Return the scaled time used for operation and decision."""
         return time_ns if self.time_lapse == 1.0 else round(time_ns * self.time_lapse)

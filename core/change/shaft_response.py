@@ -1,10 +1,10 @@
-"""Response of shaft motion at 1× to stiffness, learned from a healthy machine.
+"""Response of 1× shaft motion to film stiffness, learned from a healthy machine.
 
-Operating conditions make a machine's films four times stiffer or softer and back, so that its
-healthy readings show how far the shaft moves for any stiffness of its bearings. A damaged film
-moves it as any film of that stiffness does; a bracket or transducer that changes the measurement
-does not. Unbalance acts on all bearings alike: only the share of each film direction in the
-geometric mean of all is learned.
+Film stiffness varies by a factor of four with the operating condition, so healthy readings contain
+the shaft motion for a wide range of stiffness. A damaged film has the same effect on the motion as
+a healthy film of equal stiffness; a faulty bracket or transducer has a different effect. Unbalance
+acts on all bearings alike, so the response is the motion at each film direction relative to the
+geometric mean of all.
 """
 
 from collections.abc import Mapping
@@ -20,16 +20,16 @@ from core.baseline.grouping import bisquare, robust_std
 from core.baseline.history import DIRECTIONS, StiffnessHistory
 
 FilmDirection: TypeAlias = tuple[str, str]
-"""Bearing and direction."""
+"""Bearing id and direction of a film."""
 
 MEAN_READINGS = 24
-"""Readings that are averaged before a response is judged: four hours."""
+"""Number of readings averaged for a comparison with the response: four hours."""
 
 MIN_MEANS = 50
-"""Number of averages that learning requires."""
+"""Number of averages required for learning."""
 
 PARTS = 6
-"""Parts of the learning period that are left out in turn for cross-validation."""
+"""Number of folds of the cross-validation, each a part of the learning period."""
 
 ROUNDS = 6
 RIDGE = 1e-6
@@ -38,18 +38,18 @@ MIN_STD = 1e-4
 
 @dataclass(frozen=True)
 class ShaftResponse:
-    """Share of each film in the shaft's motion, as a quadratic function of all stiffnesses.
+    """Relative shaft motion at each film, as a quadratic function of ln k of all films.
 
     Parameters
     ----------
     places
-        Bearings and directions, in the order of everything else.
+        Bearing and direction of each film, in the order of all other arrays.
     centre
-        ln of a typical stiffness of each.
+        ln of the typical stiffness of each film.
     coefficients
-        (n_films, n_terms)
+        Coefficients of the quadratic function (n_films, n_terms).
     std
-        Cross-validated scatter of means of `MEAN_READINGS` of each film, in ln.
+        Cross-validated scatter of the means of `MEAN_READINGS` readings of each film, in ln.
     """
 
     places: tuple[FilmDirection, ...]
@@ -70,18 +70,18 @@ class ShaftResponse:
         return np.array(self.coefficients)
 
     def expected(self, ln_k: FloatArray) -> FloatArray:
-        """(n_films, n) ln of the shaft's motion at each film over the geometric mean of all."""
+        """Return ln of the motion at each film over the geometric mean of all (n_films, n)."""
         return self._coefficients @ _terms(ln_k - np.array(self.centre)[:, np.newaxis])
 
 
 def learn_response(
     histories: Mapping[str, StiffnessHistory], is_settled: npt.NDArray[np.bool_]
 ) -> ShaftResponse | None:
-    """Learn the response from all bearings of a unit together, all at the same times.
+    """Learn the shaft response from histories of all bearings of a unit, at common times.
 
     Returns
     -------
-    None if there are too few readings with stiffness and amplitude of every film.
+    The response, or None with too few readings of stiffness and amplitude of every film.
     """
     places = tuple((bearing, direction) for bearing in histories for direction in DIRECTIONS)
     ln_k, ln_shaft = film_columns(histories)
@@ -101,12 +101,12 @@ def learn_response(
 
 
 def film_columns(histories: Mapping[str, StiffnessHistory]) -> tuple[FloatArray, FloatArray]:
-    """Ln of stiffness and of shaft motion of every film: (n_films, n) each.
+    """Return ln of the stiffness and of the shaft motion of all films, (n_films, n) each.
 
     Raises
     ------
     ValueError
-        If the histories are not all at the same times.
+        If the histories do not have the same times.
     """
     first = next(iter(histories.values()))
     for bearing, history in histories.items():
@@ -122,7 +122,7 @@ def _n_terms(n_films: int) -> int:
 
 
 def _terms(x: FloatArray) -> FloatArray:
-    """(n_terms, n): 1, every x, every product of two."""
+    """Return the quadratic terms (n_terms, n): 1, each x, and each product of two x."""
     first, second = np.triu_indices(x.shape[0])
     return np.concatenate([np.ones((1, x.shape[1])), x, x[first] * x[second]])
 
@@ -140,7 +140,7 @@ def _fit(terms: FloatArray, share: FloatArray) -> FloatArray:
 
 
 def _held_out(terms: FloatArray, shares: FloatArray) -> FloatArray:
-    """(n_films, n) residuals of each part of the time from a fit to the others."""
+    """Return cross-validated residuals (n_films, n): each fold from a fit to the others."""
     left = np.empty_like(shares)
     for part in np.array_split(np.arange(shares.shape[1]), PARTS):
         others = np.delete(np.arange(shares.shape[1]), part)

@@ -1,1 +1,1 @@
-"""Checks of transducers and signals."""
+"""Checks of transducers and of their signals."""

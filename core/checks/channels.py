@@ -1,7 +1,7 @@
 """Checks of single channels over short cells of samples, before calibration.
 
-A cell is shorter than a turn of the shaft: its mean follows the vibration. A mean outside the OK
-limits is therefore no more than a doubt, which the checks of a whole segment decide.
+A cell is shorter than a turn of the shaft, so its mean follows the vibration. A mean outside the OK
+limits is therefore only uncertain; the checks of a whole segment decide.
 """
 
 from collections.abc import Iterable
@@ -14,16 +14,16 @@ from core.arrays import FloatArray, RawArray
 from core.quality import GOOD, Level, Quality, Reason, bad, uncertain
 
 COUNTS_FULL_SCALE = 32768
-"""Counts of a 16-bit converter that stand for its full-scale voltage."""
+"""Counts of a 16-bit converter at its full-scale voltage."""
 
 VerdictArray = npt.NDArray[np.uint8]
-"""(n_channels, n_cells) positions in `VERDICTS`."""
+"""Verdicts (n_channels, n_cells) as indices of `VERDICTS`."""
 
 VERDICTS: tuple[Quality, ...] = (
     GOOD,
     *(make(reason) for make in (uncertain, bad) for reason in Reason),
 )
-"""All qualities by their number in a `VerdictArray`; 0 is good."""
+"""All qualities; the values of a `VerdictArray` are their indices. Index 0 is good."""
 
 VERDICT_OF = {quality: number for number, quality in enumerate(VERDICTS)}
 _LEVELS = np.array([list(Level).index(quality.level) for quality in VERDICTS], dtype=np.uint8)
@@ -35,7 +35,7 @@ NOT_FINITE = VERDICT_OF[bad(Reason.NOT_FINITE)]
 
 @dataclass(frozen=True)
 class ChannelLimits:
-    """Ranges of the channels of a device, each (n_channels, 1); see `ChannelCalibration`."""
+    """Voltage ranges of a device's channels, each (n_channels, 1); see `ChannelCalibration`."""
 
     full_scale_v: FloatArray
     unit_per_v: FloatArray
@@ -44,7 +44,7 @@ class ChannelLimits:
 
     @classmethod
     def of(cls, channels: Iterable[tuple[float, float, float, float]]) -> "ChannelLimits":
-        """Limits of channels, each as full scale, unit per volt, lowest and highest OK voltage."""
+        """Return limits from (full scale, unit per volt, lowest, highest OK voltage)."""
         columns = np.array(list(channels), dtype=np.float64).reshape(-1, 4)
         return cls(*(column[:, np.newaxis] for column in columns.T))
 
@@ -55,16 +55,16 @@ def channel_verdicts(
     is_ok: npt.NDArray[np.bool_],
     limits: ChannelLimits,
 ) -> VerdictArray:
-    """Judge each channel in each cell: device's verdict, finite samples, clipping, OK limits.
+    """Judge each channel in each cell: device status, finite samples, clipping, OK limits.
 
     Parameters
     ----------
     samples : (n_channels, n_samples)
-        int16 counts or float32 engineering units; at least one sample in each cell.
+        Samples as int16 counts or float32 engineering units; at least one sample in each cell.
     starts : (n_cells,)
-        First sample of each cell, rising from 0.
+        Index of the first sample of each cell, increasing from 0.
     is_ok : (n_channels, n_cells)
-        The device's own verdict.
+        Whether the device reports the channel as OK.
     """
     lowest = np.minimum.reduceat(samples, starts, axis=1)
     highest = np.maximum.reduceat(samples, starts, axis=1)
@@ -75,7 +75,7 @@ def channel_verdicts(
         is_clipped = (lowest == -COUNTS_FULL_SCALE) | (highest == COUNTS_FULL_SCALE - 1)
         is_finite = None
     else:
-        with np.errstate(invalid="ignore", over="ignore"):  # infinities have no mean
+        with np.errstate(invalid="ignore", over="ignore"):  # infinities have no finite mean
             total = np.add.reduceat(samples, starts, axis=1, dtype=np.float64)
             mean_v = total / length / limits.unit_per_v
         full_scale = np.abs(limits.full_scale_v * limits.unit_per_v)
@@ -92,7 +92,7 @@ def channel_verdicts(
 
 
 def worst_qualities(verdicts: VerdictArray) -> tuple[Quality, ...]:
-    """Quality of each channel over all cells: the worst of them, the first among equals."""
+    """Return the worst quality of each channel over all cells, the first one on a tie."""
     if not verdicts.any():
         return (GOOD,) * len(verdicts)
     first = _LEVELS[verdicts].argmax(axis=1)

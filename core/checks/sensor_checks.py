@@ -1,7 +1,6 @@
-"""Checks of transducers and operation that need a whole segment or all averaged ones.
+"""Checks of transducers and operation on a whole segment or on all averaged segments.
 
-Blocks are judged on counts and volts, before calibration; what is judged here shows only in a whole
-segment or in all that are averaged.
+Short cells of samples are checked before calibration in `core.checks.channels`.
 """
 
 import math
@@ -13,42 +12,43 @@ from core.arrays import FloatArray
 from core.quality import GOOD, Quality, Reading, Reason, bad, missing, uncertain
 
 N_PIECES = 8
-"""Pieces of a segment, so that a transducer that stopped in its middle is seen at once."""
+"""Number of pieces of a segment; detects a transducer that failed within the segment."""
 
 MAX_CLIPPED_SHARE = 0.01
-"""Of a segment's samples. Up to here single samples are wrong, as of a loose contact: the segment
-is left out for the channel, and the others stand. Beyond, the channel does not follow its
+"""Largest share of clipped samples that counts as isolated errors, as from a loose contact: only
+this segment of the channel is left out. With a larger share, the channel does not follow its
 signal."""
 
 SURE = 4.0
-"""Standard uncertainties by which a measured speed must miss the 1× line: segments are many."""
+"""Coverage factor of the speed check; large, because many segments are checked."""
 
 LOWEST_COUNT, HIGHEST_COUNT = -32768, 32767
-"""Ends of a 16-bit converter's range."""
+"""Lowest and highest count of a 16-bit converter."""
 
 
 @dataclass(frozen=True)
 class SensorLimits:
-    """What counts as a failure.
+    """Limits of the sensor checks.
 
     Parameters
     ----------
     min_counts_rms
-        A channel of a turning machine that varies less over an eighth of a segment than this many
-        counts of its converter is dead or stuck; a last count that flickers has 0.8.
+        Smallest standard deviation of a live channel over an eighth of a segment while the machine
+        turns, in converter counts. Below it, the channel is dead or stuck. A flickering last count
+        has 0.8.
     dead_counts
-        Greatest mean in counts of a channel that gives no voltage at all.
+        Largest absolute mean, in counts, of a dead channel, which delivers no voltage.
     max_backward_share
-        Share of an orbit's 1× power that may turn against the shaft: 0 in a circle, 0.5 on a
-        straight line, 1 in a circle whose x and y are swapped.
+        Largest accepted share of backward 1× power of an orbit: 0 for a forward circle, 0.5 for a
+        straight line, 1 for a circle with swapped x and y.
     max_speed_fraction
-        Running speed over rated speed that no turbine reaches, not even running away.
+        Running speed over rated speed above which a speed is implausible, even at runaway.
     speed_tolerance
-        Relative difference of a measured speed and the 1× line. Beside its line an amplitude reads
-        low: by 0.1 % at 0.2 % in 8192 samples of 600 Hz at 92.3 r/min, by 6 % at 1.5 %.
+        Accepted relative difference between measured speed and 1× line. An amplitude at a wrong
+        speed reads low: by 0.1 % at 0.2 % in 8192 samples of 600 Hz at 92.3 r/min, by 6 % at 1.5 %.
     max_speed_change, max_power_change
-        Spread over the averaging time, greatest minus least value, as a share of the mean speed and
-        of the rated power: the shaft moves in its bearings with the load, and the film with it.
+        Largest range (maximum minus minimum) over the averaging time, relative to the mean speed
+        and to the rated power. The shaft position and the film change with the load.
     """
 
     min_counts_rms: float = 1.0
@@ -61,7 +61,9 @@ class SensorLimits:
 
 
 def quietest_rms(samples: FloatArray) -> FloatArray:
-    """Least standard deviation (n_channels,) of channels (n_channels, n_samples) over their pieces.
+    """Return the smallest standard deviation over the pieces of each channel (n_channels,).
+
+    `samples` is (n_channels, n_samples).
 
     Raises
     ------
@@ -72,7 +74,7 @@ def quietest_rms(samples: FloatArray) -> FloatArray:
     length = n_samples // N_PIECES
     if length == 0:
         raise ValueError(f"needs {N_PIECES} samples or more, got {n_samples}")
-    # from the end, so that the newest sample is always looked at
+    # aligned to the end, so that the newest sample is always included
     pieces = samples[:, n_samples - N_PIECES * length :].reshape(n_channels, N_PIECES, length)
     quietest: FloatArray = pieces.std(axis=2, dtype=np.float64).min(axis=1)
     return quietest
@@ -81,14 +83,14 @@ def quietest_rms(samples: FloatArray) -> FloatArray:
 def signal_quality(
     rms: float, mean: float, unit_per_count: float, turning: bool, limits: SensorLimits
 ) -> Quality:
-    """Whether a channel moves at all while the machine turns; at standstill nothing is judged.
+    """Return the quality of a signal: bad if dead or stuck while the machine turns.
 
     Parameters
     ----------
     rms, mean
-        Least standard deviation (:func:`quietest_rms`) and mean of a segment, channel's unit.
+        Smallest standard deviation (:func:`quietest_rms`) and mean of a segment, channel's unit.
     unit_per_count
-        Of either sign; zero where it is not known: then only a constant signal is a failure.
+        Unit per count, of either sign; 0 if unknown, then only a constant signal is a failure.
     """
     count = abs(unit_per_count)
     if not turning or rms > limits.min_counts_rms * count:
@@ -99,11 +101,11 @@ def signal_quality(
 def level_quality(
     samples: FloatArray, turn_samples: int, ok_limits: tuple[float, float]
 ) -> Quality:
-    """Whether the level (n_samples,) of a transducer without its vibration is within its OK limits.
+    """Return the quality of a transducer's level: bad if a mean over a turn is not OK.
 
-    A mean over part of a turn follows the shaft, a mean over a turn does not. A level that jumps
-    farther than the shaft vibrates is that of a contact that was lost for a moment. Samples that
-    are fewer than a turn count as one.
+    Means over whole turns of `samples` (n_samples,) do not contain the vibration. A mean that jumps
+    farther than the shaft vibrates indicates a contact that was lost for a moment. Fewer samples
+    than one turn count as one turn.
     """
     n_turns = samples.size // turn_samples
     turns = samples[-n_turns * turn_samples :].reshape(max(n_turns, 1), -1)
@@ -115,18 +117,18 @@ def level_quality(
 
 
 def clipped_share(samples: FloatArray, unit_per_count: float) -> float:
-    """Share of the samples (n_samples,) of a channel at an end of its converter's range."""
+    """Return the share of samples (n_samples,) at either end of the converter's range."""
     counts = samples / unit_per_count
     at_end = (counts > HIGHEST_COUNT - 0.5) | (counts < LOWEST_COUNT + 0.5)
     return float(np.mean(at_end))
 
 
 def backward_share(power_x: float, power_y: float, cross_xy: complex) -> float:
-    """Share of an orbit's power that turns from y to x, against the positive sense; 0 to 1.
+    """Return the share of an orbit's power that turns from y to x (negative sense); 0 to 1.
 
-    With the orbit z = x + iy split into forward and backward circles F and B, |F|² and |B|² are
-    (S_xx + S_yy ± 2 Im S_xy) / 4, of the means of |X|², |Y|² and X · conj(Y) at a line. It needs no
-    phase reference, and averages like the spectra do.
+    The orbit z = x + iy is split into forward and backward circles F and B. |F|² and |B|² are
+    (S_xx + S_yy ± 2 Im S_xy) / 4, with the means of |X|², |Y|² and X · conj(Y) at a spectral line.
+    The share needs no phase reference, and averages like the spectra.
     """
     total = power_x + power_y
     if total <= 0.0:
@@ -135,11 +137,11 @@ def backward_share(power_x: float, power_y: float, cross_xy: complex) -> float:
 
 
 def axes_quality(share: float, rotation_sense: int, limits: SensorLimits) -> Quality:
-    """Whether the 1× orbit of a pair of transducers turns with the shaft, by its `backward_share`.
+    """Return the quality of a probe pair: uncertain if its 1× orbit turns against the shaft.
 
-    Unbalance and runout turn with it, whatever the film; an orbit that turns against it has most
-    likely its x and y swapped. Stiffness anisotropy can do it too, between two critical speeds, so
-    that it is no more than a doubt. To be asked only where the line stands out.
+    `share` is the `backward_share` of the orbit. Unbalance and runout turn with the shaft. A
+    backward orbit most likely has swapped x and y. Stiffness anisotropy between two critical speeds
+    can cause it too, so the quality is not bad. Call it only if the 1× line is distinct.
     """
     against = share if rotation_sense > 0 else 1.0 - share
     return uncertain(Reason.SWAPPED_AXES) if against > limits.max_backward_share else GOOD
@@ -152,15 +154,15 @@ def checked_speed(
     limits: SensorLimits,
     u_line: float = 0.0,
 ) -> Reading:
-    """Speed reading in r/min as far as it can be true: missing where no machine turns like that.
+    """Return the speed reading in r/min after plausibility checks; missing if implausibly high.
 
     Parameters
     ----------
     line_rpm
-        Speed that the 1× line shows, where it stands out of its surroundings; where it contradicts
-        the reading, that is uncertain.
+        Speed of the 1× line; None without a distinct line. If it contradicts the reading, the
+        result is uncertain.
     u_line
-        Its standard uncertainty, relative.
+        Relative standard uncertainty of `line_rpm`.
     """
     if measured.value is None:
         return measured
@@ -179,17 +181,16 @@ def stationarity(
     limits: SensorLimits,
     rated_power_mw: float | None = None,
 ) -> Quality:
-    """Whether speed and load stood still while the averaged segments were recorded.
+    """Return the quality of stationarity: uncertain if speed or power changed over the segments.
 
-    An unknown newest power is uncertain, since an unknown load is not steady.
+    It is also uncertain if the newest power is unknown, because the load may have changed.
 
     Parameters
     ----------
     speed_rpm, power_mw : (n_segments,)
-        Mean of each segment, oldest first; NaN where it is not known. Without power the speed alone
-        is judged.
+        Mean of each segment, oldest first; NaN if unknown. An empty `power_mw` is not judged.
     rated_power_mw
-        Where it is not known, changes of power are compared with the mean power.
+        Reference of power changes; by default the mean power.
     """
     mean_rpm, spread_rpm = _mean_and_spread(speed_rpm)
     if spread_rpm > limits.max_speed_change * mean_rpm:
@@ -203,6 +204,6 @@ def stationarity(
 
 
 def _mean_and_spread(values: FloatArray) -> tuple[float, float]:
-    """Mean size of the known values, and greatest minus least; zeros without any."""
+    """Return the absolute mean and the range of the finite values; zeros without finite values."""
     known = [value for value in values.tolist() if math.isfinite(value)]
     return (abs(sum(known) / len(known)), max(known) - min(known)) if known else (0.0, 0.0)

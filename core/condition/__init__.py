@@ -1,1 +1,1 @@
-"""Operating condition of a machine: operating state, shaft position and the cell of each film."""
+"""Operating condition of a machine: operating state, shaft position, condition cells of films."""

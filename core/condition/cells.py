@@ -1,4 +1,4 @@
-"""The conditions that films are compared under, and the cells that they fall into."""
+"""Film conditions, for comparing stiffness under equal conditions, and condition cells."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from core.condition.operating_state import OperatingState
 
 @dataclass(frozen=True, eq=False)
 class FilmConditions:
-    """Conditions of n readings as columns (n,); NaN where unknown."""
+    """Film conditions of n readings as columns (n,); NaN for unknown values."""
 
     eccentricity_ratio: FloatArray
     oil_temperature_c: FloatArray
@@ -21,7 +21,7 @@ class FilmConditions:
 
     @classmethod
     def one(cls, eccentricity_ratio: float, oil_temperature_c: float, attitude_deg: float) -> Self:
-        """Condition of one reading."""
+        """Return the conditions of a single reading, n = 1."""
         columns = np.array([[eccentricity_ratio], [oil_temperature_c], [attitude_deg]])
         return cls(*columns)
 
@@ -29,32 +29,33 @@ class FilmConditions:
         return int(self.eccentricity_ratio.size)
 
     def rows(self, wanted: npt.NDArray[np.bool_ | np.int64]) -> "FilmConditions":
-        """Some of the readings, by mask or row."""
+        """Return the conditions of the readings selected by a mask or by row numbers."""
         return FilmConditions(*(column[wanted] for column in vars(self).values()))
 
     def is_known(self, needs_attitude: bool) -> npt.NDArray[np.bool_]:
-        """(n,) whether eccentricity, oil temperature and, if needed, attitude are numbers."""
+        """Return whether eccentricity, oil temperature and, if needed, attitude are finite (n,)."""
         known = np.isfinite(self.eccentricity_ratio) & np.isfinite(self.oil_temperature_c)
         return known & np.isfinite(self.attitude_deg) if needs_attitude else known
 
 
 Cell: TypeAlias = tuple[int, ...]
-"""Bin numbers of eccentricity ratio, oil temperature and, if the grid has it, attitude angle."""
+"""Bin numbers of eccentricity ratio, oil temperature and, if in the grid, attitude angle."""
 
 CellArray: TypeAlias = npt.NDArray[np.int64]
-"""(n_axes, n) bin numbers."""
+"""Bin numbers (n_axes, n)."""
 
 
 @dataclass(frozen=True)
 class CellGrid:
-    """Widths of the bins; the first bin of each axis begins at zero.
+    """Grid of condition cells, given by bin widths; bin 0 of each axis begins at zero.
 
-    Without a width of the attitude, which must divide the circle, cells do not depend on it.
+    Without an attitude width, the cells do not depend on the attitude angle.
 
     Raises
     ------
     ValueError
-        With key and value, if a width is not a number above zero, or does not divide the circle.
+        If a width is not a positive number, or the attitude width does not divide 360°. The message
+        states key and value.
     """
 
     eccentricity_width: float = 0.05
@@ -76,7 +77,7 @@ class CellGrid:
         return self.attitude_width_deg is not None
 
     def cells(self, conditions: FilmConditions) -> CellArray:
-        """(n_axes, n) cell of each reading; valid only where `is_known`."""
+        """Return the cell of each reading (n_axes, n); valid only where `is_known` is true."""
         axes = [
             conditions.eccentricity_ratio / self.eccentricity_width,
             conditions.oil_temperature_c / self.temperature_width_c,
@@ -86,18 +87,18 @@ class CellGrid:
         return np.floor(np.nan_to_num(np.stack(axes))).astype(np.int64)
 
     def is_known(self, conditions: FilmConditions) -> npt.NDArray[np.bool_]:
-        """(n,) whether a reading has everything that its cell depends on."""
+        """Return whether all conditions that the cell depends on are known (n,)."""
         return conditions.is_known(self.has_attitude)
 
     def centre(self, cell: Cell) -> tuple[float, ...]:
-        """Eccentricity ratio, oil temperature and attitude angle in the middle of a cell."""
+        """Return eccentricity ratio, oil temperature and, if used, attitude at a cell's centre."""
         widths = (self.eccentricity_width, self.temperature_width_c, self.attitude_width_deg)
         return tuple((i + 0.5) * w for i, w in zip(cell, widths, strict=False) if w is not None)
 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Operating state, eccentricity, attitude and oil temperature; None where unknown."""
+    """Operating condition: state, eccentricity, attitude and oil temperature; None if unknown."""
 
     state: OperatingState = OperatingState.UNKNOWN
     eccentricity_ratio: float | None = None
@@ -110,10 +111,10 @@ NOWHERE_KNOWN = OperatingPoint()
 
 @dataclass(frozen=True)
 class BearingCondition:
-    """Condition that a bearing's stiffness is compared under; its cell is None where it is unknown.
+    """Condition of a bearing for the comparison of its stiffness; an unknown cell is None.
 
-    Settled is a state that has lasted for the settling time, after the warm-up: only settled films
-    are comparable.
+    A state is settled when it has lasted for the settling time after the warm-up. Only settled
+    films are compared.
     """
 
     state: OperatingState

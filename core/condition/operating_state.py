@@ -1,9 +1,9 @@
-"""Operating state of a unit, stepped reading by reading, and settling of its bearings' oil.
+"""Operating state of a unit, updated reading by reading, and settling of the bearing oil.
 
-After a start the oil warms and clearances close. How long that takes depends on the machine and on
-how long it stood still, so it is read from the oil: the oil has settled once its temperature has
-stayed within a band for some time. Later changes, by load or weather, do not unsettle it: the
-temperature is part of the condition that films are compared under.
+After a start, the oil warms up and clearances close. The duration depends on the machine and on the
+length of the standstill, so it is derived from the oil temperature: the oil has settled when its
+temperature has stayed within a band for a given time. Later changes due to load or weather do not
+reset this, because the oil temperature is part of the film condition.
 """
 
 import math
@@ -20,25 +20,25 @@ class OperatingLimits:
     Parameters
     ----------
     standing_below, at_speed_above
-        Fraction of the rated speed below which a unit stands still, and above which it is at speed.
+        Fractions of the rated speed: standstill is below the first, rated speed above the second.
     loaded_above, full_load_above
-        Fraction of the rated power above which it is at part load, and at full load.
+        Fractions of the rated power above which a unit is at part load and at full load.
     speed_hysteresis, power_hysteresis
-        How far beyond a limit, up or down, a reading must be for the limit to count as crossed.
+        Distance beyond a limit, up or down, at which the limit counts as crossed.
     settling_s
-        Time in one state before readings count as settled: they are averages over about five
-        minutes, and the shaft reaches its position within minutes.
+        Time in one state after which readings count as settled. Readings are averages over about
+        five minutes, and the shaft reaches its position within minutes.
     oil_band_c, oil_settling_s
-        Oil has settled after a start once its temperature has stayed within a band of this width
-        for this time at speed. Clearances close for hours after a start, later than the oil warms
-        (Brito et al., Tables 8 and 9): until then films at the same eccentricity and oil
-        temperature are not alike. Where clearance lags with 1.2 h and oil with 0.8 h, 1.7 % of the
-        closing is left after a start from cold, and less after a short stop.
+        Width of the temperature band, and time at speed within the band, for the oil to count as
+        settled after a start. Clearances close for hours after a start, later than the oil warms
+        up (Brito et al., Tables 8 and 9), and film stiffness is not comparable until then. With
+        time constants of 1.2 h (clearance) and 0.8 h (oil), 1.7 % of the closing remains after a
+        cold start, and less after a short stop.
     warm_up_s
-        Time at speed after which readings count even if the oil has not settled, as where the load
-        follows the grid.
+        Time at speed after which readings count even if the oil has not settled, for example with
+        a load that follows the grid.
     longest_gap_s
-        Time without readings after which the state before no longer counts.
+        Longest gap between readings across which the operating state continues.
     """
 
     rated_speed_rpm: float
@@ -57,7 +57,7 @@ class OperatingLimits:
 
 
 class OperatingState(IntEnum):
-    """Operating state of a unit, stored in one byte."""
+    """Operating state of a unit; stored in one byte."""
 
     UNKNOWN = 0
     STANDSTILL = 1
@@ -69,29 +69,30 @@ class OperatingState(IntEnum):
 
 
 UNDER_LOAD = (OperatingState.SPEED_NO_LOAD, OperatingState.PART_LOAD, OperatingState.FULL_LOAD)
-"""State at rated speed by the number of power limits that are passed."""
+"""States at rated speed, indexed by the number of exceeded power limits."""
 
 STEADY = frozenset(UNDER_LOAD)
-"""States in which films are compared: the shaft turns at its rated speed."""
+"""States at rated speed, in which films are compared."""
 
 
 @dataclass(frozen=True)
 class Operation:
-    """Operating state of a unit since when, with the memory that the next step needs.
+    """Operating state of a unit with its start time, and the memory needed for the next update.
 
     Parameters
     ----------
     since_ns
-        First reading in this state without interruption; None before the first reading.
+        Time of the first reading in this state; None before the first reading.
     last_ns
-        Newest reading.
+        Time of the newest reading.
     speed_passed, power_passed
-        Whether the lower and the upper limit are passed; None where that is not known.
+        Whether the lower and the upper limit are exceeded; None if unknown.
     was_at_speed
-        While the speed is between the two: whether the unit was last at rated speed (or stood
-        still).
+        While the speed is between both limits: whether the unit was last at rated speed (true) or
+        at standstill (false).
     at_speed_from_ns, at_speed_to_ns
-        First and newest reading of the stretch at rated speed; None if the unit is not at speed.
+        Times of the first and newest reading of the present period at rated speed; None if the
+        unit is not at rated speed.
     """
 
     state: OperatingState = OperatingState.UNKNOWN
@@ -104,7 +105,7 @@ class Operation:
     was_at_speed: bool | None = None
 
     def is_settled(self, limits: OperatingLimits, has_oil_settled: bool = False) -> bool:
-        """Whether a steady state has lasted for the settling time, after the warm-up."""
+        """Whether a state at rated speed has lasted for the settling time, after the warm-up."""
         now_ns, since_ns, from_ns = self.last_ns, self.since_ns, self.at_speed_from_ns
         if self.state not in STEADY or now_ns is None or since_ns is None or from_ns is None:
             return False
@@ -123,22 +124,22 @@ def step_operation(
     limits: OperatingLimits,
     state: OperatingState | None = None,
 ) -> Operation:
-    """Update the operation with one reading.
+    """Return the operation updated with one reading.
 
-    A gap longer than `limits.longest_gap_s` resets the operation: what the machine did meanwhile is
-    not known. A few readings without a speed do not end the stretch at rated speed.
+    A gap longer than `limits.longest_gap_s` resets the operation. Shorter gaps without a speed do
+    not end the period at rated speed.
 
     Parameters
     ----------
     speed_rpm, power_mw
-        NaN where there is no number.
+        Readings of speed and power; NaN if missing.
     state
-        State that a file of readings gives; speed and power are not looked at then.
+        State as given in a file of readings; overrides speed and power.
 
     Raises
     ------
     ValueError
-        If the reading is not later than the one before.
+        If the reading is not later than the previous reading.
     """
     longest_ns = ns_from_s(limits.longest_gap_s)
     if operation.last_ns is not None:
@@ -177,7 +178,7 @@ def step_operation(
 
 
 BETWEEN = (True, False)
-"""Above the lower limit, not above the upper."""
+"""Limits exceeded by a speed above the lower and below the upper limit."""
 
 
 def _passed(
@@ -187,7 +188,7 @@ def _passed(
     hysteresis: float,
     rated: float,
 ) -> tuple[bool, bool] | None:
-    """Which of two limits are passed, each with its hysteresis; none where `before` is unknown."""
+    """Return whether each of two limits is exceeded, with hysteresis if `before` is known."""
     if math.isnan(value):
         return None
     lower, upper = (
@@ -211,17 +212,17 @@ def _state(
 
 
 OIL_LEVELS = 8
-"""Temperatures that are kept over the settling time."""
+"""Number of stored temperatures over the settling time."""
 
 
 @dataclass(frozen=True)
 class OilSettling:
-    """Settling of the oil of a bearing in one stretch at rated speed.
+    """Settling of the oil of a bearing in one period at rated speed.
 
     Parameters
     ----------
     stretch_ns
-        First reading at speed; None while the unit is not at speed.
+        Time of the first reading of the period; None while the unit is not at rated speed.
     levels
         Times in ns and temperatures in °C over the settling time, oldest first.
     """
@@ -231,12 +232,12 @@ class OilSettling:
     has_settled: bool = False
 
     def step(self, operation: Operation, oil_c: float, limits: OperatingLimits) -> "OilSettling":
-        """Update with one temperature (NaN if missing), after that reading's operation step."""
+        """Return the settling after one temperature (NaN if missing) and its operation step."""
         now_ns = operation.last_ns
         if now_ns is None or operation.at_speed_from_ns is None:
             return NOT_AT_SPEED
         if operation.at_speed_to_ns != now_ns:
-            return self  # the speed is not known now
+            return self  # present speed is unknown
         is_new = operation.at_speed_from_ns != self.stretch_ns
         settling = OilSettling(operation.at_speed_from_ns) if is_new else self
         if settling.has_settled or math.isnan(oil_c):

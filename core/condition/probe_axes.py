@@ -1,7 +1,7 @@
-"""Two axes of shaft probes, one or two probes each: displacement separated from thermal growth.
+"""Shaft displacement from two axes of one or two probes each, separated from thermal growth.
 
-The change d of a gap from its reference holds the shaft's displacement u and the thermal growth g
-of shaft and housing: d_near = g − u on the positive axis, d_far = g + u across the shaft.
+The change d of a gap from its reference contains the shaft displacement u and the thermal growth g
+of shaft and housing: d_near = g − u for the probe on the positive axis, d_far = g + u opposite.
 """
 
 from dataclasses import dataclass
@@ -15,14 +15,14 @@ from core.quality import Quality, Reading, Reason, uncertain, worst
 from core.uncertainty import Budget, BudgetLine, random_line, systematic_line
 
 NEAR_X, FAR_X, NEAR_Y, FAR_Y, GROWTH, ASYMMETRY = range(6)
-"""Sources of a displacement, in order; all are lengths in µm."""
+"""Indices of the input quantities of a displacement; all are lengths in µm."""
 
 NAMES = ("gap x", "opposite gap x", "gap y", "opposite gap y", "thermal growth", "uneven growth")
 
 
 @dataclass(frozen=True)
 class ProbeAxis:
-    """Mean gaps in µm along one axis: of the probe on the positive axis and of the opposite one."""
+    """Mean gaps in µm along an axis, of the positive probe (near) and the opposite one (far)."""
 
     near: Reading
     near_reference_um: float
@@ -36,7 +36,7 @@ class ProbeAxis:
 
     @property
     def changes_um(self) -> tuple[float, float]:
-        """Changes of the gaps from their references; zero where unknown."""
+        """Changes of the near and far gaps from their references; 0 if unknown."""
         near, far = self.near.value, self.far.value if self.far is not None else None
         return (
             0.0 if near is None else near - self.near_reference_um,
@@ -45,7 +45,7 @@ class ProbeAxis:
 
     @property
     def quality(self) -> Quality:
-        """Quality of a displacement from these gaps; uncertain if one of two probes is lost."""
+        """Quality of the displacement along this axis; uncertain if one of two probes failed."""
         if self.far is None:
             return self.near.quality
         if self.near.value is None and self.far.value is None:
@@ -58,21 +58,21 @@ class ProbeAxis:
 
 @dataclass(frozen=True)
 class Growth:
-    """Thermal growth of all gaps of a bearing, as last measured, and limits of its error."""
+    """Last measured thermal growth of the gaps of a bearing, with half-width of its interval."""
 
     value_um: float
     half_width_um: float
 
 
 class ProbeAxes:
-    """Displacement along both axes, as weighted sums over all sources.
+    """Displacement along both axes, as weighted sums of the input quantities.
 
     Attributes
     ----------
     values_um
-        (6,) gap changes, external growth and its asymmetry.
+        Gap changes, last measured growth and growth asymmetry (6,).
     weights
-        (2, 6) weight of each in the displacement along x and y; zero where it is unknown.
+        Weights of the values in the displacement along x and y (2, 6); 0 if it is unknown.
     """
 
     def __init__(
@@ -87,11 +87,11 @@ class ProbeAxes:
 
     @property
     def growth_quality(self) -> Quality:
-        """Quality of the growth measured now."""
+        """Quality of the presently measured growth."""
         return worst(axis.quality for axis in self._axes if axis.has_both)
 
     def growth_budget(self) -> Budget | None:
-        """Growth measured now by opposite probes of one or both axes; None without them."""
+        """Return the present growth from opposite probes of one or both axes; None without them."""
         both = [axis for axis in (0, 1) if self._axes[axis].has_both]
         if not both:
             return None
@@ -99,7 +99,7 @@ class ProbeAxes:
         return Budget(float(weights @ self.values_um), self.lines(weights))
 
     def lines(self, weights: FloatArray) -> tuple[BudgetLine, ...]:
-        """Uncertainty of a weighted sum of `values_um` (GUM, equation 10)."""
+        """Return the uncertainty budget lines of a weighted sum of `values_um` (GUM, eq. 10)."""
         return tuple(
             chain.from_iterable(
                 self._lines(source, float(weight))
@@ -141,7 +141,7 @@ class ProbeAxes:
         return np.zeros(len(NAMES))
 
     def _growth_of(self, axis: int) -> FloatArray:
-        """Growth along an axis without opposite probes: the other's now, else the last known."""
+        """Return weights of the growth of a one-probe axis: the other axis, else last known."""
         if self._axes[1 - axis].has_both:
             return self._own_growth(1 - axis) + _unit(ASYMMETRY)
         return _unit(GROWTH) + axis * _unit(ASYMMETRY)

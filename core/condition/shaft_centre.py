@@ -1,4 +1,4 @@
-"""Shaft centre, eccentricity ratio and attitude angle in a bearing, from gaps."""
+"""Shaft centre, eccentricity ratio and attitude angle in a bearing, from probe gaps."""
 
 import math
 from dataclasses import replace
@@ -14,7 +14,7 @@ from core.uncertainty import Budget, Found, systematic_line
 CLEARANCE = "clearance"
 
 HALF_CIRCLE_DEG = 180.0
-"""Half-width of an unknown angle."""
+"""Half-width of the uniform distribution of an unknown angle."""
 
 
 def locate_shaft(
@@ -26,13 +26,13 @@ def locate_shaft(
 ) -> Found:
     """Locate the shaft from one or two probes on each axis, with uncertainty.
 
-    An axis with one probe cannot separate the shaft's displacement from thermal growth. It takes
-    the growth that the other axis measures now, else that which was measured last, else none, with
-    the corresponding uncertainty.
+    One probe cannot separate shaft displacement from thermal growth. An axis with one probe uses
+    the present growth of the other axis, else the last measured growth, else zero growth, each with
+    its uncertainty.
 
     Returns
     -------
-    By quantity: widening of all gaps since their references were read (measured by opposite probes
+    By quantity: thermal widening of the gaps since their references were read (from opposite probes
     only), displacement along the bearing axes, eccentricity ratio, and attitude angle from the
     positive x axis towards the positive y axis.
     """
@@ -78,7 +78,10 @@ def _eccentricity(
 
 
 def _angle(axes: ProbeAxes, outward: FloatArray, radius_um: float, angle_deg: float) -> Budget:
-    """Angle with the uncertainty of the motion across it; unknown near the centre."""
+    """Return the attitude angle with the uncertainty of the position across it.
+
+    Near the centre, the angle is unknown and has an uncertainty of ± 180°.
+    """
     across = np.array([-outward[1], outward[0]]) @ axes.weights
     along_um = Budget(angle_deg, axes.lines(across)).combined
     if math.degrees(along_um) >= HALF_CIRCLE_DEG / math.sqrt(3.0) * radius_um:

@@ -1,4 +1,4 @@
-"""Shaft position over the averaged segments, from the gaps of two or four probes, as readings."""
+"""Readings of shaft position and slow channels, averaged over segments."""
 
 from collections.abc import Mapping, Sequence
 
@@ -28,9 +28,9 @@ _NO_GAPS = (NOT_MEASURED, NOT_MEASURED)
 def position_results(
     unit: Unit, bearing: Bearing, segments: Sequence[Segment], last_growth: Growth | None
 ) -> Found:
-    """Gaps, shaft centre, eccentricity and attitude with their budgets, by quantity.
+    """Return gaps, shaft centre, eccentricity and attitude with their budgets, by quantity.
 
-    There is at least one segment, the oldest first.
+    `segments` has at least one segment, the oldest first.
     """
     measured = {
         "gap_x_um": _gap(unit, segments, bearing.shaft_x, bearing.gap_x),
@@ -53,13 +53,13 @@ def position_results(
 
 
 def measures_growth(bearing: Bearing) -> bool:
-    """Whether thermal growth of the gaps can be measured: an axis has opposite probes."""
+    """Whether thermal growth can be measured, which requires opposite probes on an axis."""
     far = [probe_axis(bearing, _NO_GAPS, _NO_GAPS, axis).far for axis in (0, 1)]
     return far != [None, None]
 
 
 def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
-    """Measured thermal growth, to be used once it can no longer be measured."""
+    """Return the measured thermal growth, for use when it can no longer be measured, or None."""
     growth = readings["gap_growth_um"]
     if growth.value is None or growth.interval_95 is None:
         return None
@@ -67,14 +67,14 @@ def measured_growth(readings: Mapping[str, Reading]) -> Growth | None:
 
 
 def slow_channels(unit: Unit, bearing: Bearing) -> dict[str, str | None]:
-    """Slow channel of each quantity of a bearing that is measured by one."""
+    """Return the slow channel of power and of oil temperature of a bearing, by quantity."""
     return {"power_mw": unit.power_channel, "oil_temperature_c": bearing.oil_temperature}
 
 
 def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]) -> Found:
-    """Means of slow channels over the segments, by quantity, with their scatter.
+    """Return the means of slow channels over the segments, by quantity, with their scatter.
 
-    The calibration uncertainty of the plant's transmitters is unknown here.
+    The uncertainty does not include the unknown calibration uncertainty of the transmitters.
     """
     found: dict[str, Budgeted] = {}
     for name, channel in channels.items():
@@ -86,7 +86,7 @@ def slow_results(segments: Sequence[Segment], channels: Mapping[str, str | None]
 def probe_axis(
     bearing: Bearing, near: Sequence[Reading], far: Sequence[Reading], axis: int
 ) -> ProbeAxis:
-    """Probes of an axis (0 is x) with their references, from mean gaps (x, y) in µm."""
+    """Return the probe axis (0 is x) with references, from the mean gaps (x, y) in µm."""
     has_far = (bearing.opposite_x, bearing.opposite_y)[axis] is not None
     if not has_far or bearing.opposite_reference_um is None:
         return ProbeAxis(near[axis], bearing.gap_reference_um[axis])
@@ -105,7 +105,7 @@ def _mean_slow(segments: Sequence[Segment], channel: str | None) -> tuple[Readin
 def _gap(
     unit: Unit, segments: Sequence[Segment], channel: str | None, slow_channel: str | None
 ) -> tuple[Reading, FloatArray]:
-    """Mean gap, µm, of the slow channel or a DC-coupled probe, and the values it is the mean of."""
+    """Return the mean gap, µm, of a slow channel or a DC-coupled probe, and the averaged values."""
     if slow_channel is not None:
         gap_mm, values_mm = _mean_slow(segments, slow_channel)
         if gap_mm.value is None:

@@ -1,1 +1,1 @@
-"""Data between measuring and serving: newest results and samples, alarm list, commands."""
+"""Data shared by analysis and API: newest results and samples, alarm list, commands."""

@@ -1,4 +1,4 @@
-"""List of alarms as API, metrics and reports read it, and its counts."""
+"""`AlarmList`: list of alarms for API, metrics and reports, and its counts."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -13,20 +13,20 @@ HIDDEN = (AlarmState.SHELVED, AlarmState.SUPPRESSED, AlarmState.OUT_OF_SERVICE)
 
 @dataclass(frozen=True)
 class AlarmCount:
-    """Number of alarms on the list.
+    """Number of alarms by state.
 
     Parameters
     ----------
     n_active
-        Active and not hidden.
+        Number of active alarms that are not hidden.
     n_danger
-        Active and not hidden, at danger level.
+        Number of active alarms at danger level that are not hidden.
     n_unacknowledged
-        Active or returned, not hidden, with an unacknowledged newest occurrence.
+        Number of alarms that are not hidden, with an unacknowledged newest occurrence.
     n_hidden
-        Shelved, suppressed or out of service.
+        Number of alarms that are shelved, suppressed or out of service.
     n_unjudged
-        Neither active nor hidden, without a current condition.
+        Number of alarms neither active nor hidden, without a current condition.
     """
 
     n_active: int
@@ -37,7 +37,7 @@ class AlarmCount:
 
 
 def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> AlarmCount:
-    """Count alarms of any state."""
+    """Return the number of alarms by state."""
     shown = [alarm for alarm in alarms if alarm.state not in HIDDEN]
     return AlarmCount(
         n_active=sum(alarm.level is not None for alarm in shown),
@@ -49,11 +49,11 @@ def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> Ala
 
 
 class AlarmList(Protocol):
-    """All alarms, from `AlarmEngine` in this process or from the reports of others."""
+    """List of all alarms, from `AlarmEngine` in this process or from states of other processes."""
 
     @property
     def revision(self) -> int:
-        """Number that changes with every change of an alarm."""
+        """Revision number; changes with every change of an alarm."""
         ...
 
     @property
@@ -63,15 +63,15 @@ class AlarmList(Protocol):
 
     @property
     def alarms(self) -> Sequence[Alarm]:
-        """All alarms of any state."""
+        """All alarms, in any state."""
         ...
 
     def alarm(self, id_: str) -> Alarm:
-        """Return an alarm. Raises `LookupError` if it does not exist."""
+        """Return the alarm with an id. Raises `LookupError` if it does not exist."""
         ...
 
     def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether the condition of an alarm is known now."""
+        """Return whether the condition of an alarm is currently known."""
         ...
 
     def is_chattering(self, alarm: Alarm) -> bool:
@@ -79,13 +79,13 @@ class AlarmList(Protocol):
         ...
 
     def count(self) -> AlarmCount:
-        """Return the number of alarms."""
+        """Return the number of alarms by state."""
         ...
 
 
 @dataclass(frozen=True)
 class EvidenceStatus:
-    """Number of evidence bundles since the start, and why none is written now, if so."""
+    """Number of evidence bundles since the start, and the present write error or None."""
 
     error: str | None
     n_waiting: int

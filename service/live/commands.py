@@ -26,31 +26,31 @@ class BaselineRefusedError(ValueError):
 
 @dataclass(frozen=True)
 class Accept:
-    """Put a version in force."""
+    """Put a baseline version in force."""
 
     version: int
 
 
 @dataclass(frozen=True)
 class Reject:
-    """Withdraw a version; it is never put in force automatically again."""
+    """Withdraw a baseline version; it is never put in force automatically again."""
 
     version: int
 
 
 @dataclass(frozen=True)
 class Freeze:
-    """Stop learning."""
+    """Stop learning of baselines of a bearing."""
 
 
 @dataclass(frozen=True)
 class Thaw:
-    """Resume learning."""
+    """Resume learning of baselines of a bearing."""
 
 
 @dataclass(frozen=True)
 class Renew:
-    """Learn anew after a machine event such as an overhaul, without older readings."""
+    """Learn a new baseline after a machine event such as an overhaul, without older readings."""
 
     from_ns: int
 
@@ -67,7 +67,7 @@ def baseline_step(
     reason: str,
     now_ns: int,
 ) -> StoredStep:
-    """Return the step to store for an action.
+    """Return the baseline step to store for an action.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def _require_acceptable(
 
 
 class UnreadableCommandError(Exception):
-    """A command that this version of the program cannot read."""
+    """The command cannot be read by this version of the program."""
 
 
 @dataclass(frozen=True)
@@ -195,7 +195,7 @@ def decoded(kind: str, document: str) -> OperatorCommand:
     Raises
     ------
     UnreadableCommandError
-        If it comes from another version of the program, or is damaged.
+        If the document is from another version of the program, or damaged.
     """
     try:
         if kind in _ALARM_ACTIONS:
@@ -210,11 +210,11 @@ def decoded(kind: str, document: str) -> OperatorCommand:
 
 
 class NotAvailableError(Exception):
-    """Data exist only in the process that analyses the unit; the message states which."""
+    """The data exist only in the process that analyses the unit; the message names the data."""
 
 
 class CommandFailedError(Exception):
-    """A command was not carried out, or not stored; the message states which."""
+    """The command was not carried out or not stored; the message states which."""
 
     def __init__(self, title: str, detail: str) -> None:
         super().__init__(detail)

@@ -20,16 +20,16 @@ RECENT_DAYS = 7.0
 
 @dataclass(frozen=True)
 class ReadingCounts:
-    """Number of readings of the last `RECENT_DAYS`, each a part of the one before.
+    """Number of readings of the last `RECENT_DAYS`; each count includes the following ones.
 
     Parameters
     ----------
     n_at_speed
-        Readings at rated speed, in any state.
+        Readings at rated speed, at any load.
     n_settled
-        Readings after the warm-up.
+        Readings in a settled operating state.
     n_complete
-        Readings with stiffness and condition, in the direction with fewer of them.
+        Settled readings with stiffness and condition, in the direction with fewer readings.
     n_judged
         Readings with a verdict on the film.
     """
@@ -42,17 +42,17 @@ class ReadingCounts:
 
 @dataclass(frozen=True)
 class LearningProgress:
-    """Progress of learning.
+    """Progress of learning the baseline of a bearing.
 
     Parameters
     ----------
     since_ns, until_ns
         Learning period; None before the first reading.
     n_readings, n_days
-        Number of usable readings and of their days, in the direction with fewer of them; None
-        after a baseline was learned in this period.
+        Number of usable readings, and of days with such readings, in the direction with fewer
+        readings; None after a baseline was learned in this period.
     recent
-        Newest readings.
+        Counts of the newest readings.
     """
 
     since_ns: int | None
@@ -93,7 +93,7 @@ def learning_progress(
 def _counts(
     store: FilmStore, place: FilmPlace, since_ns: int, until_ns: int, settings: FilmAlarmSettings
 ) -> tuple[int, int]:
-    """Return the number of usable readings and of their days."""
+    """Return the number of usable readings and of days with such readings."""
     found = store.history(
         FilmQuery(place.unit, place.bearing, place.estimator, since_ns, until_ns + 1)
     )
@@ -122,6 +122,6 @@ def _recent(
 
 
 def _complete(found: FilmHistory, settings: FilmAlarmSettings) -> list[npt.NDArray[np.bool_]]:
-    """Return for each direction, (n,), whether readings have stiffness and condition."""
+    """Return for each direction whether readings have stiffness and condition (n,)."""
     is_known = settings.baseline.settings().is_known(found.history.conditions)
     return [is_known & (outcome == ReadingOutcome.MEASURED) for outcome in found.history.outcome]

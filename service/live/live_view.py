@@ -1,4 +1,4 @@
-"""Newest state: link and samples of each unit, assessment of each bearing."""
+"""`LiveView`: newest link state and samples of each unit, newest assessment of each bearing."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -13,10 +13,10 @@ from core.samples.gaps import SampleAccount
 from service.live.samples import BlockHistory
 
 HELD_S = 10.0
-"""Duration of the samples held of each unit."""
+"""Duration of the samples held for each unit, seconds."""
 
 HELD_SAMPLES = 2_000_000
-"""Maximum of all channels of a unit."""
+"""Maximum number of held samples over all channels of a unit."""
 
 
 class LinkState(StrEnum):
@@ -30,22 +30,22 @@ class LinkState(StrEnum):
 
 @dataclass(frozen=True)
 class UnitStatus:
-    """Status of the samples of a unit.
+    """Status of the link and of the samples of a unit.
 
     Parameters
     ----------
     reason
-        Why the unit is not connected.
+        Reason why the unit is not connected, or None.
     since_ns
         Start of the present link state.
     last_sample_ns
-        Time of the newest sample by the clock of the device.
+        Time of the newest sample by the device clock.
     received_s
-        Monotonic time of its arrival.
+        Monotonic time of arrival of the newest sample.
     clock
-        Clock of the device compared with the clock of the host, if known.
+        Offset and drift of the device clock, if known.
     stamp_fault
-        Why the time stamp of the newest block was not used.
+        Reason why the time stamp of the newest block was not used, or None.
     n_failed
         Number of failed connection attempts and lost links since the start.
     """
@@ -63,12 +63,12 @@ class UnitStatus:
 
 @dataclass(frozen=True)
 class CurrentBearing:
-    """Newest result of a bearing; its readings have no values if it is not current.
+    """Newest result of a bearing; without values in its readings if not current.
 
     Parameters
     ----------
     age_s
-        Age of the newest result; None before the first.
+        Age of the newest result in seconds; None before the first result.
     """
 
     assessment: Assessment | None
@@ -79,7 +79,7 @@ class CurrentBearing:
 
 
 class LiveView:
-    """Newest state of all units, written by the analysis and read by the API on one event loop.
+    """Newest state of all units; the analysis writes, the API reads, in one event loop.
 
     Parameters
     ----------
@@ -94,14 +94,14 @@ class LiveView:
         self._assessments: dict[tuple[str, str], tuple[float, Assessment]] = {}
         self._blocks: dict[str, BlockHistory] = {}
         self.revision = 0
-        """Number that changes with every link state and result."""
+        """Counter that increases with every change of a link state and every result."""
 
         self.store_error: str | None = None
         self.n_unstored = 0
         self.unstored_reason: str | None = None
 
     def note_unstored(self, n_findings: int, reason: str) -> None:
-        """Count findings that were not stored and will not be."""
+        """Count findings that are lost because they could not be stored."""
         self.n_unstored += n_findings
         self.unstored_reason = reason
 
@@ -120,7 +120,7 @@ class LiveView:
     def set_received(
         self, block: SampleBlock, account: SampleAccount, sampled_s: float | None = None
     ) -> None:
-        """Set the newest block of a unit, which arrived at ``sampled_s``; default: now."""
+        """Set the newest block of a unit; ``sampled_s`` is its arrival time, by default now."""
         if block.unit not in self._blocks:
             most = HELD_SAMPLES // max(block.counts.shape[0], 1)
             self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))
@@ -135,7 +135,7 @@ class LiveView:
         )
 
     def set_assessment(self, assessment: Assessment, sampled_s: float | None = None) -> None:
-        """Set the newest result, of samples that arrived at ``sampled_s``; default: now."""
+        """Set the newest result; ``sampled_s`` is the arrival of its samples, by default now."""
         self.revision += 1
         key = (assessment.unit, assessment.bearing)
         since_s = self._clock.monotonic_s() if sampled_s is None else sampled_s
@@ -146,30 +146,30 @@ class LiveView:
         return self._status[unit]
 
     def blocks(self, unit: str) -> list[SampleBlock]:
-        """Return the newest blocks of a unit, oldest first, current or not."""
+        """Return the held blocks of a unit, oldest first, current or not."""
         return list(self._blocks.get(unit, ()))
 
     def newest_block(self, unit: str) -> SampleBlock | None:
-        """Return the newest block of a unit, current or not; None before the first."""
+        """Return the newest block of a unit, current or not; None before the first block."""
         blocks = self.blocks(unit)
         return blocks[-1] if blocks else None
 
     def why_no_samples(self, unit: str) -> Reason | None:
-        """Return why the newest samples of a unit are not current; None if they are."""
+        """Return the reason why the samples of a unit are not current; None if they are current."""
         return self._why_not_current(unit, self.data_age_s(unit))
 
     def data_age_s(self, unit: str) -> float | None:
-        """Return the time since the newest block arrived; None before the first."""
+        """Return the age of the newest block in seconds; None before the first block."""
         received_s = self._status[unit].received_s
         return None if received_s is None else self._clock.monotonic_s() - received_s
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """Return the newest result, current or not."""
+        """Return the newest result of a bearing, current or not; None before the first result."""
         entry = self._assessments.get((unit, bearing))
         return entry[1] if entry else None
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:
-        """Return the newest result, without values if it is not current."""
+        """Return the newest result of a bearing, without values if it is not current."""
         entry = self._assessments.get((unit, bearing))
         age_s = None if entry is None else self._clock.monotonic_s() - entry[0]
         reason = self._why_not_current(unit, age_s)

@@ -13,12 +13,12 @@ from core.units import ns_from_s
 
 
 class BlockHistory:
-    """Newest blocks of a unit, without repeated ones.
+    """Newest blocks of a unit, without repeated blocks.
 
     Parameters
     ----------
     n_samples
-        Samples per channel to hold; at most one block more is held.
+        Number of samples per channel to hold; at most one more block is held.
     """
 
     def __init__(self, n_samples: int) -> None:
@@ -31,7 +31,7 @@ class BlockHistory:
         return iter(self._blocks)
 
     def add(self, block: SampleBlock) -> bool:
-        """Add a block and drop old ones; return False if the block is a repetition."""
+        """Add a block and drop old blocks; return False for a repeated block."""
         if self._blocks:
             newest = self._blocks[-1]
             if block.epoch == newest.epoch and block.stop_index <= newest.stop_index:
@@ -50,11 +50,11 @@ class SampleWindow:
     Parameters
     ----------
     samples
-        (n_samples,) of each channel, by id; NaN where a sample is missing or bad.
+        Samples of each channel, by id (n_samples,); NaN for missing or bad samples.
     slow
         Mean of each slow channel.
     quality
-        Worst quality of the blocks, by channel.
+        Worst quality of each channel over the blocks, by id.
     """
 
     epoch: int
@@ -66,11 +66,11 @@ class SampleWindow:
     quality: Mapping[str, Quality] = field(default_factory=dict)
 
     def of(self, channel: str | None) -> FloatArray | None:
-        """Return the samples of a channel; None if the window does not contain it."""
+        """Return the samples of a channel; None if the window does not contain the channel."""
         return None if channel is None else self.samples.get(channel)
 
     def mean_of(self, slow_channel: str | None) -> Reading:
-        """Return the mean of a slow channel."""
+        """Return the mean reading of a slow channel; missing without such a channel."""
         return self.slow.get(slow_channel or "", missing(Reason.NOT_MEASURED))
 
 
@@ -81,7 +81,7 @@ def sample_window(
     n_samples: int,
     stamp: SampleBlock | None = None,
 ) -> SampleWindow:
-    """Join blocks into a window.
+    """Return the window of samples from a list of blocks.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def sample_window(
     rows
         Row of each channel in the blocks, by id.
     stamp
-        Block whose time stamp determines the start time; default: the oldest.
+        Block whose time stamp determines the start time; by default, the oldest block.
     """
     samples = {id_: np.full(n_samples, np.nan) for id_ in rows}
     for block in blocks:
@@ -115,14 +115,14 @@ def sample_window(
 def newest_blocks(
     blocks: Sequence[SampleBlock], n_samples: int
 ) -> tuple[list[SampleBlock], int, int]:
-    """Return the blocks of the newest samples, and first index and number of these samples.
+    """Return the blocks of the newest samples, and the first index and number of the samples.
 
     Parameters
     ----------
     blocks
         At least one block, oldest first.
     n_samples
-        Wanted number; fewer are returned if fewer are held.
+        Requested number of samples; fewer are returned if fewer are held.
     """
     newest = blocks[-1]
     since = newest.stop_index - n_samples

@@ -20,16 +20,16 @@ from core.uncertainty import Budget
 from service.live.live_view import UnitStatus
 
 MAX_BYTES = 16_000_000
-"""Maximum size of an unpacked document: many times that of the largest unit."""
+"""Maximum size of a decompressed document; many times the size for the largest unit."""
 
 
 class UnreadableStateError(Exception):
-    """A published state is damaged, or from another version of the program."""
+    """The published state is damaged, or from another version of the program."""
 
 
 @dataclass(frozen=True)
 class BearingState:
-    """Newest result of a bearing without its arrays."""
+    """Newest result of a bearing, without arrays."""
 
     time_ns: int
     window: AveragingWindow
@@ -54,16 +54,16 @@ class FilmState:
 
 @dataclass(frozen=True)
 class UnitState:
-    """State of a unit that changes with each result; results and films by bearing.
+    """State of a unit that changes with each result; `bearings` and `films` are by bearing id.
 
     Parameters
     ----------
     alarms
         All alarms of the unit.
     judged, chattering
-        Identifiers of the alarms whose condition is known, and of the chattering ones.
+        Ids of the alarms whose condition is known, and of the chattering alarms.
     baselines
-        Version in force, by bearing.
+        Baseline version in force, by bearing.
     """
 
     bearings: Mapping[str, BearingState]
@@ -83,11 +83,11 @@ class UnitSigns:
     data_age_s, result_ages_s
         Age of the newest samples, and of the newest result of each bearing.
     n_unstored
-        Findings that the process could not store.
+        Number of findings that the process could not store.
     store_error
-        Why the process cannot store now.
+        Present error of the database in the process, or None.
     said_s
-        Monotonic time of this report in the process; None in reports of older versions.
+        Monotonic time of this state in the process; None in states of older versions.
     """
 
     status: UnitStatus
@@ -98,7 +98,7 @@ class UnitSigns:
     said_s: float | None = None
 
 
-# in a tuple, so that the setting for NaN applies to all levels
+# wrapped in a tuple, so that the NaN setting applies to all nested values
 _WITH_NAN = ConfigDict(ser_json_inf_nan="constants")
 _STATE = TypeAdapter(tuple[UnitState], config=_WITH_NAN)
 _SIGNS = TypeAdapter(tuple[UnitSigns], config=_WITH_NAN)
@@ -110,7 +110,7 @@ def packed_state(state: UnitState) -> bytes:
 
 
 def unpacked_state(document: bytes) -> UnitState:
-    """Return the state of a document of `packed_state`.
+    """Return the state from a document of `packed_state`.
 
     Raises
     ------
@@ -128,12 +128,12 @@ def unpacked_state(document: bytes) -> UnitState:
 
 
 def written_signs(signs: UnitSigns) -> str:
-    """Return signs as JSON."""
+    """Return the frequently changing state as JSON."""
     return _SIGNS.dump_json((signs,)).decode()
 
 
 def read_signs(document: str) -> UnitSigns:
-    """Return the signs of a document of `written_signs`; raises as `unpacked_state` does."""
+    """Return the state from a document of `written_signs`; raises `UnreadableStateError`."""
     try:
         return _SIGNS.validate_json(document)[0]
     except ValidationError as error:
