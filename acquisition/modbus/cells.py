@@ -100,7 +100,7 @@ class Cell:
 
     @property
     def n_places(self) -> int:
-        """Number of addresses that the cell occupies: registers, or one bit for functions 1 and 2."""
+        """Number of addresses of the cell: registers, or one bit for functions 1 and 2."""
         return N_BYTES[self.type] // 2
 
     def start(self, base: int) -> int:

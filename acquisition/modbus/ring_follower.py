@@ -158,7 +158,7 @@ class RingFollower:
         return self._placed(list(zip(wanted, found, strict=True)), header)
 
     async def _enter(self, header: RingHeader) -> None:
-        """Set the read position at the start, after a device restart, or if the sequence went back."""
+        """Set the read position at the start, after a restart, or if the sequence went back."""
         before = self._header
         if before is None:
             self._timeline = Timeline(header.layout, self._epochs)
