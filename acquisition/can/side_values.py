@@ -122,7 +122,7 @@ class RawBlockBuilder:
         self._rejected.clear()
 
     def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[RawBlock]:
-        """Return raw blocks of instants of one epoch in index order; all arrived by `arrived_ns`."""
+        """Return raw blocks of instants of one epoch in index order, arrived by `arrived_ns`."""
         blocks = []
         if instants:  # the last instant has the smallest delay
             self._stamps.add(instants[-1].epoch, instants[-1].stop_index, arrived_ns)
