@@ -34,10 +34,10 @@ the largest difference of the crystals of device and host."""
 _WINDOW_S = 0.25
 _FAST_SHARE = 0.2
 _FAST_WINDOWS = 2
-"""Successive fast windows that show a wrong rate; buffered frames or a clock step cause one."""
+"""Successive windows with too many frames that show a fault; a clock step causes only one."""
 
 _WIDE = 1 << 32
-"""Modulus in samples; a smaller counter may wrap while the adapter does not run."""
+"""Smallest modulus of a counter, in samples, that does not wrap while the adapter is stopped."""
 
 
 class FrameAssembler:
@@ -182,7 +182,7 @@ class FrameAssembler:
         self._sets.open(self._next)
 
     def _begin_set(self, wave: int) -> None:
-        """Without counters, start a new set of frames at a frame out of order; drop the old set."""
+        """Without counters, start the next set at a frame out of order; abandon the current set."""
         if wave <= self._last_wave and self._next in self._sets.pending:
             self._next += self._plan.samples_per_frame
         self._last_wave = wave

@@ -1,4 +1,4 @@
-"""Opening of python-can buses; no other module depends on names of interfaces."""
+"""Opening of python-can buses; the only module that names python-can interfaces."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -92,7 +92,7 @@ def _opened(settings: CanLinkSettings, ids: list[int]) -> can.BusABC:
 
 
 def _slcan_speed(settings: CanLinkSettings) -> dict[str, Any]:
-    """Return the slcan options; listen-only unless an option requires acknowledging frames."""
+    """Return the slcan options; listen-only by default, but some buses need acknowledgement."""
     SlcanBus.require_speed(settings.bitrate, settings.data_bitrate)
     speed: dict[str, Any] = {}
     if "listen_only" not in settings.options:

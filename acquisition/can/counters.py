@@ -36,7 +36,8 @@ class CounterFollower:
 
     A frame close to the newest frame gets its sample index at once. A frame farther away is held
     until a second frame confirms it. Both then show a gap if the counter increased, if the clock
-    matches a counter wrap, or if the device reports restarts; otherwise a new epoch begins.
+    matches a counter wrap, or if a device that reports restarts has reported none; otherwise the
+    device has restarted its counter, and a new epoch begins.
 
     Parameters
     ----------

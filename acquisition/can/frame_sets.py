@@ -185,7 +185,7 @@ class FrameSets:
         return True
 
     def _refuse_old(self, seen: dict[int, bytes], index: int, data: bytes) -> None:
-        """Count an old frame by reason; a single device never repeats an index with other data."""
+        """Count an old frame by reason; different data at one index show a second sender."""
         n_samples = self._plan.samples_per_frame
         near = range(index - n_samples + 1, index + n_samples)
         if seen[index] != data if index in seen else any(n in seen for n in near):

@@ -100,7 +100,7 @@ class FrameReader:
     async def stop(self) -> None:
         """Close the bus and wait for the thread to end.
 
-        A thread blocked in a driver cannot be ended; after 10 s it is left to the process exit.
+        A thread blocked in a driver cannot be stopped; it ends with the process.
         """
         with self._room:
             self._is_stopping = True

@@ -35,7 +35,7 @@ from acquisition.modbus.requests import (
 from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
 
 _N_TRANSACTIONS = 65_000
-"""Largest transaction id; 0 is not used, because some devices treat it as a wildcard."""
+"""Largest transaction id; id 0 is not used, because some devices treat it as a wildcard."""
 
 _MAX_IDENTIFICATION_REPLIES = 8
 _N_IDENTITY_TRIES = 2

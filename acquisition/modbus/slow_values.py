@@ -1,4 +1,4 @@
-"""`PolledSlowValues`: slow values of a separate device, polled besides the waveforms."""
+"""`PolledSlowValues`: slow values of a separate device, polled in addition to the waveforms."""
 
 import asyncio
 import random

@@ -126,7 +126,7 @@ async def analysis_on(
     bus
         Queue of blocks to the analysis.
     alarm_context
-        Source of the live values in alarm messages; gets access to the film monitors.
+        Source of the values in alarm messages; receives the newest films.
     part
         Part of the plant for which this process is responsible.
     memories

@@ -206,7 +206,7 @@ def modbus_server(
     clock
         As in `daq_of`.
     patient
-        Whether the device waits for the first request before its time starts.
+        Whether the clock of the device starts with the first request.
     """
     if source.host is not None:
         return ModbusTcpServer(device, clock, source.host, source.port, patient=patient)
@@ -287,7 +287,7 @@ class Wire(StrEnum):
 
 
 def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
-    """Return the plant with sources of one wire for all units; addresses are set later."""
+    """Return the plant with a source of kind `wire` for each unit; addresses are set later."""
     units = tuple(
         # the recording of a polled source has the rate of its polls
         unit.model_copy(update={"source": _source(wire), "rate_hz": unit.sampling_hz})
@@ -297,7 +297,7 @@ def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
 
 
 def _source(wire: Wire) -> SourceSettings:
-    """Return a source for a wire; fast polls do not limit the speed of a replay."""
+    """Return source settings for a wire; fast polls do not limit the speed of a replay."""
     if wire in (Wire.CAN, Wire.CAN_FD):
         return CanSettings(
             kind="can",
