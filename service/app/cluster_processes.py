@@ -183,7 +183,7 @@ class Analysing:
         process = self._process
         store, clock = process.store, process.clock
         await self._holds.take()
-        bus = Bus(BUS_CAPACITY, clock)  # unused: blocks wait in the stream
+        bus = Bus(BUS_CAPACITY, clock)  # always empty: blocks wait in the stream
         timings, untimed = process.timings, self._monitors.items()
         monitors = {unit: TimedMonitor(monitor, timings) for unit, monitor in untimed}
         stored = {
