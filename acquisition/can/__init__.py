@@ -1,16 +1,16 @@
-"""CAN buses, classic and FD, as sample sources; nothing here ever sends a frame."""
+"""Sample sources for CAN and CAN FD buses; listen-only, frames are never sent."""
 
 import logging
 import sys
 
-# python-can would load asammdf for a log format that is not used here, and with it pandas: a third
-# of the time that the service takes to start. Where it is missing, it goes without.
+# Without this block python-can imports asammdf, for an unused log format, and with it pandas: a
+# third of the start time of the service. python-can works without asammdf.
 if "asammdf" not in sys.modules:
     sys.modules["asammdf"] = None  # type: ignore[assignment]
     import can  # noqa: F401
 
     del sys.modules["asammdf"]
 
-# All that python-can would log is raised as well, and logged once where it is caught.
+# python-can also raises all that it logs; the exception is logged where it is caught.
 for _name in ("can", "cantools"):
     logging.getLogger(_name).setLevel(logging.CRITICAL)

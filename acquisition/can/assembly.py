@@ -1,4 +1,4 @@
-"""Assembly of admitted frames, in the order of their arrival, into raw blocks."""
+"""Assembly of admitted CAN frames, in order of arrival, into raw blocks."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -21,49 +21,49 @@ from core.samples.axis import Epochs, SampleAxis
 from core.units import NS_PER_S
 
 MAX_UNSURE_S = 1.0
-"""Samples that arrive late for longer than this were not late: others before them are lost, or the
-device had stopped."""
+"""Longest delay of samples, s. Samples that stay late for longer show that others were lost, or
+that the device had stopped."""
 
 _OTHER_LOSS_S = 0.25
-"""Samples that are later by so much than those before have lost others since."""
+"""Increase of the delay, s, that shows a further loss of samples."""
 
 _MAX_DRIFT = 300e-6
-"""Share by which a device that does not count may sample too slowly: twice what the crystals of
-device and host can differ, and some."""
+"""Relative error by which the rate of a device without counter may be too low: more than twice
+the largest difference of the crystals of device and host."""
 
 _WINDOW_S = 0.25
 _FAST_SHARE = 0.2
 _FAST_WINDOWS = 2
-"""What waited before the bus was opened, and a host's clock that is put back, fill one window."""
+"""Successive windows with too many frames that show a fault; a clock step causes only one."""
 
 _WIDE = 1 << 32
-"""A counter of fewer samples than this may wrap while the adapter does not run."""
+"""Smallest modulus of a counter, in samples, that does not wrap while the adapter is stopped."""
 
 
 class FrameAssembler:
-    """Assembles frames of one device into raw blocks; keeps its place across connections.
+    """Assembler of the frames of one device; keeps its sample index across connections.
 
-    Where messages carry counters, these show to which instant a frame belongs. Where they carry
-    none, the frames of an instant come in a fixed order, and instants are counted here. In both
-    cases the host's clock has to confirm complete instants. Samples that are late on their way are
-    followed within a second by others that are not. Where that does not happen, a device with a
-    counter has stopped, and its counter with it: a new epoch begins. Without a counter, other
-    samples before or among them were lost, and none of them can be used.
+    A sample instant is the set of frames, one per waveform message, with the same sample index. The
+    counter in a message determines the instant of its frame. Without counters, the frames of an
+    instant arrive in a fixed order, and instants are counted by the host. In both cases complete
+    instants must be confirmed by the host's clock: delayed samples catch up with it within a
+    second. If they do not, a device with a counter has paused sampling, and a new epoch begins.
+    Without a counter, other samples were lost, and all unconfirmed samples are dropped.
 
     Parameters
     ----------
     begun_ns
-        When this run of the adapter began, UTC; 0 where a log is read, which is the same each time.
+        Start of this adapter, UTC ns since 1970; 0 for a log file, so that epochs are reproducible.
     device_waits
-        Whether the device sends when it is listened to, as one that replays a recording: then it
-        is no pause if it does not.
+        Whether the device sends only while the host listens, for example in a replay; its pauses
+        then do not start a new epoch.
 
     Attributes
     ----------
     refused
-        Frames that were not used, by reason.
+        Number of refused frames by reason.
     n_complete
-        Instants that have been complete so far, confirmed or not.
+        Number of complete instants so far, confirmed or not.
     """
 
     def __init__(self, plan: Plan, begun_ns: int = 0, *, device_waits: bool = False) -> None:
@@ -83,7 +83,7 @@ class FrameAssembler:
         self._begin_count()
 
     def _begin_count(self) -> None:
-        """Forget what belongs to the epoch that has ended."""
+        """Reset the state for a new epoch."""
         self._epoch = self._axis.epoch
         self._sets.begin()
         self._held: list[Instant] = []
@@ -100,7 +100,7 @@ class FrameAssembler:
 
     @property
     def trouble(self) -> str:
-        """Why none of the samples can be believed; empty if they can."""
+        """Reason why all samples are refused, in words; empty if they are valid."""
         if self._senders.found:
             return "frames contradict each other; do two devices send the same ids?"
         if not self._plan.counted and self._n_fast_windows >= _FAST_WINDOWS:
@@ -108,7 +108,7 @@ class FrameAssembler:
         return ""
 
     def listen(self) -> None:
-        """Note that the bus was opened: only a counter shows what passed since it was before."""
+        """Note that the bus was opened; without counters this starts a new epoch."""
         if self._plan.counted:
             return
         if self._next > 0:
@@ -118,15 +118,15 @@ class FrameAssembler:
     def take(
         self, frames: Iterable[Frame], arrived_ns: int, steady_ns: int | None = None
     ) -> list[RawBlock]:
-        """Take the frames of a batch; return the blocks that this completes, in order.
+        """Add the frames of a batch; return the completed blocks in order.
 
         Parameters
         ----------
         arrived_ns
-            By the host's clock, when the last of them had arrived; stamps are made of it.
+            Arrival of the last frame by the host's UTC clock, ns; source of time stamps.
         steady_ns
-            The same by a clock that is never set: it shows losses, pauses and restarts. None where
-            there is no other, as in a log.
+            Arrival by the monotonic clock, ns, to detect losses, pauses and restarts; None for a
+            log file, which has UTC times only.
         """
         passed_ns = arrived_ns if steady_ns is None else steady_ns
         blocks: list[RawBlock] = []
@@ -161,7 +161,7 @@ class FrameAssembler:
         else:
             placed = self._counters.place(part, data, passed_ns)
         blocks: list[RawBlock] = []
-        if placed and self._axis.epoch != self._epoch:  # finish what belongs to the old epoch
+        if placed and self._axis.epoch != self._epoch:  # complete the blocks of the old epoch
             blocks = self._built(arrived_ns)
             self._begin_count()
         for frame in placed:
@@ -182,13 +182,13 @@ class FrameAssembler:
         self._sets.open(self._next)
 
     def _begin_set(self, wave: int) -> None:
-        """Without counters, a frame that is out of turn gives up a set and begins another one."""
+        """Without counters, start the next set at a frame out of order; abandon the current set."""
         if wave <= self._last_wave and self._next in self._sets.pending:
             self._next += self._plan.samples_per_frame
         self._last_wave = wave
 
     def _note(self, frame: PlacedFrame) -> None:
-        """Note the values beside a counted frame's waveforms, for the samples it belongs to."""
+        """Store the side values of a frame with counter for the samples of this frame."""
         for key, value in self._early.items():
             self._builder.side.set(key, frame.first_index, value, self._plan.hold_uncounted)
         self._early.clear()
@@ -198,7 +198,7 @@ class FrameAssembler:
             self._builder.side.set(key, frame.first_index, read(frame.data), hold)
 
     def _note_now(self, part: Part, data: bytes) -> None:
-        """Note the values of a frame without counter: they hold from now on, for a while."""
+        """Store the side values of a frame without counter; valid for `hold_s` from now."""
         if part.epoch is not None:
             self._note_epoch(int(part.epoch(data)))
         start: int | None = self._next
@@ -212,7 +212,7 @@ class FrameAssembler:
                 self._builder.side.set(key, start, read(data), self._plan.hold_uncounted)
 
     def _note_epoch(self, reported: int) -> None:
-        """Begin another count if a device without counters reports another epoch."""
+        """Start a new epoch if a device without counters reports a changed epoch."""
         if reported != self._reported_epoch:
             self._reported_epoch = reported
             self._axis.epochs.begin(reported)
@@ -220,7 +220,7 @@ class FrameAssembler:
             self._begin_count()
 
     def _is_confirmed(self, now_ns: int) -> bool:
-        """Whether the clock agrees that as many samples were taken as are held."""
+        """Whether the host's clock confirms the number of held samples."""
         late_s, now_s = self._late_s(now_ns)
         is_counted = self._plan.counted
         if late_s < (JUMP_TOLERANCE.step_s if is_counted else self._instant_s / 2):
@@ -240,7 +240,7 @@ class FrameAssembler:
         return is_counted
 
     def _late_s(self, now_ns: int) -> tuple[float, float]:
-        """How late the held samples are, and the time since the count began."""
+        """Return the delay of the held samples and the time since the start of the count, s."""
         stop = self._held[-1].stop_index if self._plan.counted else self._next
         if self._origin_ns is None:
             self._origin_ns = now_ns
@@ -255,14 +255,14 @@ class FrameAssembler:
         return late_s, now_s
 
     def _begin_after_pause(self) -> None:
-        """Begin an epoch with the held samples: the device, and its counter, had stopped."""
+        """Start a new epoch with the held samples, after the device had paused sampling."""
         self._axis.epochs.begin()
         self._epoch = self._axis.epoch
         self._held = [replace(instant, epoch=self._epoch) for instant in self._held]
         self._begin_timing()
 
     def _lose_held(self) -> None:
-        """Drop the held samples: others are missing somewhere among them."""
+        """Drop the held samples, because other samples are missing among them."""
         n_instants = max(1, round(self._least_late_s / self._instant_s))
         n_lost = n_instants * self._plan.samples_per_frame
         n_held = sum(instant.n_samples for instant in self._held)

@@ -1,4 +1,4 @@
-"""Opening a bus of python-can; the one module that names its interfaces."""
+"""Opening of python-can buses; the only module that names python-can interfaces."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -16,15 +16,15 @@ _NO_SUCH_FAMILY = 97
 _SLCAN_CLOCK_HZ = 80_000_000
 _SAMPLE_POINT_PERCENT = 80.0
 _FILTERED_BY_KERNEL = ("socketcan",)
-"""Interfaces that filter before Python sees a frame, and let error frames through all the same."""
+"""Interfaces that filter ids in the kernel and still deliver error frames."""
 
 LINUX_ERROR_FRAMES = ("socketcan", "slcan", "gs_usb", "virtual")
-"""Interfaces whose error frames have the format of Linux."""
+"""Interfaces whose error frames have the SocketCAN format of Linux."""
 
 
 @contextmanager
 def foreign_errors_renamed(where: str) -> Iterator[None]:
-    """Rename every exception of python-can, pyserial and the system."""
+    """Convert exceptions of python-can, pyserial and the system to acquisition errors."""
     try:
         yield
     except AcquisitionError:
@@ -43,15 +43,15 @@ def open_bus(settings: CanLinkSettings, ids: Iterable[int]) -> can.BusABC:
     Parameters
     ----------
     ids
-        Frame ids that are wanted, as standard and as extended ones, so that a confusion of the two
-        is seen.
+        Frame ids to receive, both as standard and as extended ids, so that a wrong kind of id is
+        detected.
 
     Raises
     ------
     LinkError
-        If it is not there now.
+        If the bus is not available now.
     ConfigError
-        If this interface can never work here, or has no such option.
+        If the interface is not supported on this system, or rejects its options.
     """
     where = str(settings)
     with foreign_errors_renamed(where):
@@ -63,12 +63,12 @@ def open_bus(settings: CanLinkSettings, ids: Iterable[int]) -> can.BusABC:
                     f"{where}: this system's kernel has no SocketCAN; load its can modules, or use"
                     " another interface"
                 ) from exc
-            if exc.errno is None:  # a vendor's library that is not installed
+            if exc.errno is None:  # the vendor's library is not installed
                 raise ConfigError(f"{where}: {exc}") from exc
             raise
         except (ValueError, TypeError, NotImplementedError, NameError, AttributeError) as exc:
-            # python-can's interfaces check their arguments, and their vendors' libraries, in all
-            # of these ways
+            # python-can's interfaces raise any of these for invalid arguments or missing vendor
+            # libraries
             if isinstance(exc, can.CanError | UnicodeError):
                 raise
             raise ConfigError(f"{where}: cannot be opened with these settings: {exc}") from exc
@@ -92,7 +92,7 @@ def _opened(settings: CanLinkSettings, ids: list[int]) -> can.BusABC:
 
 
 def _slcan_speed(settings: CanLinkSettings) -> dict[str, Any]:
-    """Listen only unless an option says otherwise: some bus needs a second node to acknowledge."""
+    """Return the slcan options; listen-only by default, but some buses need acknowledgement."""
     SlcanBus.require_speed(settings.bitrate, settings.data_bitrate)
     speed: dict[str, Any] = {}
     if "listen_only" not in settings.options:

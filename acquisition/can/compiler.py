@@ -1,4 +1,4 @@
-"""Settings, calibration and DBC compiled into a plan; a misfit is found before any frame."""
+"""Compilation of settings, calibration and DBC into a plan; reports mismatches at the start."""
 
 from collections.abc import Mapping
 
@@ -21,12 +21,12 @@ _MAX_SHOWN = 12
 
 
 def compile_plan(settings: CanSettings, calibration: UnitCalibration) -> Plan:
-    """Read the DBC and find every signal in it.
+    """Return the decoding plan of a device; read the DBC and look up every signal.
 
     Raises
     ------
     ConfigError
-        Naming file, key, what was found and what is needed.
+        If a setting does not fit the DBC; the message contains file, key and expected value.
     """
     try:
         return _Compiler(settings, calibration).plan()
@@ -146,7 +146,7 @@ class _Compiler:
             self._part_of(signal, key).values.append((number, _scaled(slow, signal)))
 
     def _signal(self, path: str, key: str) -> DbcSignal:
-        """The signal "Message.Signal" that a key of the plant file names."""
+        """Return the signal "Message.Signal" that a key of the plant file names."""
         name, _, signal = path.partition(".")
         message = self._messages.get(name)
         if message is None:
@@ -173,7 +173,7 @@ class _Compiler:
         return message.signals[signal]
 
     def _own_signal(self, path: str, key: str) -> DbcSignal:
-        """A signal that no other channel may have."""
+        """Return a signal; raise ConfigError if another channel already uses it."""
         signal = self._signal(path, key)
         if path in self._taken:
             what = f"is already the signal of {self._taken[path]}; each channel needs its own"
@@ -182,7 +182,7 @@ class _Compiler:
         return signal
 
     def _integer(self, path: str, key: str) -> DbcSignal:
-        """A signal that is a plain number: neither scaled, signed nor a float."""
+        """Return a signal; raise ConfigError unless it is an unscaled unsigned integer."""
         signal = self._signal(path, key)
         source = signal.source
         if source.is_float or source.is_signed or (source.scale, source.offset) != (1.0, 0.0):
@@ -191,7 +191,7 @@ class _Compiler:
         return signal
 
     def _part_of(self, signal: DbcSignal, key: str) -> Part:
-        """The one part of a message that has a signal."""
+        """Return the only part of a message that contains a signal."""
         ids = signal.multiplexer_ids
         if len(ids) > 1 or (signal.message.multiplexer is not None and not ids):
             what = (
@@ -201,7 +201,7 @@ class _Compiler:
         return self._part(signal, ids[0] if ids else 0)
 
     def _parts_of(self, signal: DbcSignal) -> list[Part]:
-        """Where a signal can be used: a multiplexed message's common signals, in all its parts."""
+        """Return the parts that contain a signal; all parts if the signal is not multiplexed."""
         ids = signal.multiplexer_ids
         if signal.message.multiplexer is not None and not ids:
             ids = sorted({n for s in signal.message.signals.values() for n in s.multiplexer_ids})

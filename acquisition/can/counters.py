@@ -1,4 +1,4 @@
-"""Counted frames on the sample axis; a frame that does not fit needs a second one that agrees."""
+"""Sample index of frames with counters; a counter jump must be confirmed by a second frame."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,19 +9,19 @@ from core.samples.axis import ClockTolerance, SampleAxis, signed_distance
 from core.units import NS_PER_S
 
 _NEAR_FRAMES = 64
-"""A frame that is further ahead or behind needs a second one that agrees before it is believed."""
+"""Distance in frames beyond which a counter jump must be confirmed by a second frame."""
 
 _SILENCE_S = 1.0
-"""So does the first frame after a silence, in which the device may have begun anew."""
+"""Silence, s, after which the first frame must also be confirmed; the device may have restarted."""
 
 JUMP_TOLERANCE = ClockTolerance(step_s=0.5, drift=0.05)
-"""How far the host's clock and a counter may disagree about a jump over a wrap, or about a device
-that has stopped: one that samples ever later, by less than this share, has a wrong rate."""
+"""Largest difference between the host's clock and a counter in a jump over a wrap or in a pause of
+the device; a drift below this share is a wrong rate, not a pause."""
 
 
 @dataclass(frozen=True)
 class _CountedFrame:
-    """A frame and its counter in samples, from 0 to ``modulus``."""
+    """Frame with its counter in samples, 0 to ``modulus - 1``."""
 
     part: Part
     data: bytes
@@ -32,18 +32,19 @@ class _CountedFrame:
 
 
 class CounterFollower:
-    """Follows counters of any width on one sample axis.
+    """Unwrapper of frame counters of any width to one sample axis.
 
-    A frame close to the newest one is placed at once. Another one waits for a second frame that
-    agrees with it; both then show a gap, if the counter went up, if the clock explains that it has
-    wrapped, or if the device would have reported a restart; else the device counts anew.
+    A frame close to the newest frame gets its sample index at once. A frame farther away is held
+    until a second frame confirms it. Both then show a gap if the counter increased, if the clock
+    matches a counter wrap, or if a device that reports restarts has reported none; otherwise the
+    device has restarted its counter, and a new epoch begins.
 
     Parameters
     ----------
     axis
-        Where the newest frame's first sample stands.
+        Sample axis, at the first sample of the newest frame.
     refused
-        Where refused frames are counted.
+        Counts of refused frames; updated in place.
     """
 
     def __init__(
@@ -61,12 +62,12 @@ class CounterFollower:
         self._left: tuple[int, int, int, int | None] | None = None
 
     def place(self, part: Part, data: bytes, arrived_ns: int) -> list[PlacedFrame]:
-        """Place a frame; a doubted one is placed with the one that confirms it.
+        """Return the frames whose sample index is now known: this frame and those it confirms.
 
         Parameters
         ----------
         arrived_ns
-            By a clock of the host that is never set.
+            Arrival by the host's monotonic clock, ns.
         """
         if part.counter is None:
             return []
@@ -103,7 +104,7 @@ class CounterFollower:
         return [PlacedFrame(frame.part, frame.data, frame.counter)]
 
     def _near_index(self, counter: int, modulus: int, arrived_ns: int) -> int | None:
-        """Index of a frame that is close to the newest one; None if it is not."""
+        """Return the sample index of a frame close to the newest frame; None for other frames."""
         axis, half = self._axis, modulus // 2
         if axis.index is None:
             return None
@@ -120,7 +121,7 @@ class CounterFollower:
         return axis.index - behind if behind <= min(self._near_samples, half // 2) else None
 
     def _confirms(self, frame: _CountedFrame) -> bool:
-        """Whether a frame follows a doubted one closely."""
+        """Whether a frame confirms the last held frame by following it closely."""
         last = self._doubted[-1]
         repeats = last.part is frame.part and last.counter == frame.counter
         if repeats or (frame.epoch is not None and frame.epoch != self._epoch_of(self._doubted)):
@@ -134,7 +135,7 @@ class CounterFollower:
         return reported[-1] if reported else self._epoch
 
     def _jump(self, frames: Sequence[_CountedFrame]) -> list[PlacedFrame]:
-        """Go on at the place where frames agree that the device is."""
+        """Continue at the counter of frames that confirm each other, after a gap or a restart."""
         self._doubted = []
         axis, epoch = self._axis, self._epoch_of(frames)
         widest = max(frames, key=lambda frame: frame.modulus)
@@ -151,7 +152,7 @@ class CounterFollower:
         return [PlacedFrame(f.part, f.data, self._nearest(f, index)) for f in frames]
 
     def _is_gap(self, frames: Sequence[_CountedFrame], widest: _CountedFrame) -> bool:
-        """Whether the same count continues: it increased, wrapped, or reports its restarts."""
+        """Whether a jump is a gap in the same count rather than a restart of the counter."""
         axis, reports = self._axis, self._plan.reports_epoch
         if reports and all(frame.epoch is None for frame in frames):
             return True
@@ -164,7 +165,7 @@ class CounterFollower:
         return abs(deviation) <= axis.allowance(at_ns, JUMP_TOLERANCE)
 
     def _resumes(self, frame: _CountedFrame, epoch: int | None) -> bool:
-        """Whether a count continues that another one replaced within the last second."""
+        """Whether a frame continues the previous count, which ended within the last second."""
         if self._left is None:
             return False
         index, modulus, left_ns, left_epoch = self._left

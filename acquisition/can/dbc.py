@@ -1,4 +1,4 @@
-"""A DBC file as messages and signals; the one module that uses cantools."""
+"""Messages and signals of a DBC file; the only module that uses cantools."""
 
 import re
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from acquisition.errors import ConfigError, FrameError
 
 MAX_FILE_BYTES = 8_000_000
 MAX_REASON = 500
-"""Characters of a parser's message that are shown."""
+"""Maximum number of characters of a parser message in an error."""
 
 _MAX_CLASSIC_BYTES = 8
 _EXTENDED_FLAG = 1 << 31
@@ -26,40 +26,40 @@ _RANGE = re.compile(r"(\d{1,20})\s*-\s*(\d{1,20})")
 
 @dataclass(frozen=True)
 class DbcSignal:
-    """A signal as cantools describes it, and the message that carries it."""
+    """Signal of a DBC message, as parsed by cantools."""
 
     message: "DbcMessage"
     source: Signal
 
     @property
     def path(self) -> str:
-        """Message.Signal, as the plant file names it."""
+        """Name of the signal in the plant file: "Message.Signal"."""
         return f"{self.message.name}.{self.source.name}"
 
     @property
     def unit(self) -> str:
-        """Unit as the DBC writes it; empty without one."""
+        """Unit of the signal in the DBC; empty if the DBC states none."""
         return self.source.unit or ""
 
     @property
     def multiplexer_ids(self) -> list[int]:
-        """Values of the message's multiplexer at which the signal is there; empty if always."""
+        """Multiplexer values at which the message contains the signal; empty if always."""
         return self.source.multiplexer_ids or []
 
 
 class DbcMessage:
-    """A message of a DBC.
+    """Message of a DBC file.
 
     Attributes
     ----------
     key
-        Identifies its frames: standard and extended ids never share one.
+        Frame key of the message, see `frame_key`.
     length
-        Bytes that a frame of it has on the wire.
+        Data length of the message's frames in bytes.
     multiplexer
-        Its multiplexer, if it has one.
+        Signal that selects the multiplexed signals; None without one.
     nested
-        Whether a multiplexer of it is itself multiplexed, or it has several.
+        Whether the message has several multiplexers or a multiplexed one; not supported.
     """
 
     def __init__(self, source: Message) -> None:
@@ -75,12 +75,12 @@ class DbcMessage:
         self.multiplexer = next((s for s in multiplexers if not s.multiplexer_ids), None)
 
     def raw_value(self, name: str, data: bytes) -> int | float:
-        """Decode one signal of one frame, whatever its shape; not scaled.
+        """Return the unscaled value of a signal of any bit layout in one frame.
 
         Raises
         ------
         FrameError
-            If cantools cannot decode the frame, or it does not carry the signal.
+            If cantools cannot decode the frame, or the frame does not contain the signal.
         """
         try:
             values: Any = self._source.decode(data, decode_choices=False, scaling=False)
@@ -91,7 +91,7 @@ class DbcMessage:
 
 
 def frame_key(frame_id: int, extended: bool) -> int:
-    """One number for id and kind of id."""
+    """Return a key that is unique for a frame id and its kind (standard or extended)."""
     return frame_id | _EXTENDED_FLAG if extended else frame_id
 
 
@@ -101,7 +101,7 @@ def load_dbc(path: Path, text: str | None = None) -> dict[str, DbcMessage]:
     Parameters
     ----------
     text
-        Its text, where there is no file.
+        Content of the DBC; None to read the file.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def load_dbc(path: Path, text: str | None = None) -> dict[str, DbcMessage]:
     Raises
     ------
     ConfigError
-        If the file cannot be read, is no DBC, has overlapping signals, or two messages with one id.
+        If the file cannot be read, is no DBC, or has overlapping signals or duplicate messages.
     """
     text = _text(path) if text is None else text
     _refuse_wide_ranges(text, path)
@@ -145,11 +145,11 @@ def _text(path: Path) -> str:
     try:
         return content.decode("utf-8")
     except UnicodeDecodeError:
-        return content.decode("cp1252", errors="replace")  # what most DBC editors write
+        return content.decode("cp1252", errors="replace")  # the encoding of most DBC editors
 
 
 def _refuse_wide_ranges(text: str, path: Path) -> None:
-    """Refuse ranges that cantools would write out number by number until the memory is full."""
+    """Raise ConfigError for multiplexer ranges so large that cantools would exhaust the memory."""
     n_values = sum(
         max(0, int(last) - int(first))
         for line in _MULTIPLEXER_LINE.findall(text)

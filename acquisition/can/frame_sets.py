@@ -1,4 +1,4 @@
-"""Sample instants: complete sets of frames, and whether a single device sends them."""
+"""Assembly of frames to sample instants, and detection of duplicate senders."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,24 +7,24 @@ from typing import NamedTuple
 from acquisition.can.plan import Part, Plan, Refusal, RefusalCounts
 
 MAX_PENDING = 64
-"""Instants that may be incomplete at the same time."""
+"""Maximum number of incomplete instants at the same time."""
 
 _MAX_REMEMBERED = 256
-"""Frames of each message that are remembered, to be compared with those that come again."""
+"""Number of recent frames stored per message, for comparison with repeated frames."""
 
 _WINDOW_FRAMES = 100
 _CONFLICT_SHARE = 0.2
-"""A device that is alone repeats itself at most, or now and then sends a frame that is spoilt."""
+"""Share of contradictory frames that shows a second sender; a single device has few."""
 
 _CLEAN_WINDOWS = 4
 
 
 class DuplicateSenderDetector:
-    """Weighs waveform frames that fit the count against those that contradict it.
+    """Detector of two devices that send the same frame ids.
 
-    Two devices that send under the same ids contradict each other, and no sample of them can be
-    believed. The verdict holds until four windows without many contradictions have passed: devices
-    that send in turns do not contradict each other all the time.
+    Waveform frames of two devices contradict each other, and none of their samples are valid. The
+    detection is cleared after four windows with few contradictions, because two devices that send
+    alternately do not contradict each other in every window.
     """
 
     def __init__(self) -> None:
@@ -33,21 +33,21 @@ class DuplicateSenderDetector:
 
     @property
     def found(self) -> bool:
-        """Whether there is a second device."""
+        """Whether a second sender is detected."""
         return self._n_windows_to_wait > 0
 
     def note_fit(self) -> None:
-        """Note a frame that one device alone would have sent."""
+        """Count a frame that is consistent with a single sender."""
         self._n_fitting += 1
         self._judge()
 
     def note_contradiction(self) -> None:
-        """Note a frame that does not go with the others."""
+        """Count a frame that contradicts other frames."""
         self._n_contrary += 1
         self._judge()
 
     def note_return(self) -> None:
-        """Note that a replaced count continues: no single device does that."""
+        """Note that a replaced counter sequence continues, which shows a second sender."""
         self._end_window(contrary=True)
 
     def _judge(self) -> None:
@@ -62,7 +62,7 @@ class DuplicateSenderDetector:
 
 
 class PlacedFrame(NamedTuple):
-    """A frame whose place on the sample axis is known."""
+    """Frame with the index of its first sample."""
 
     part: Part
     data: bytes
@@ -71,20 +71,20 @@ class PlacedFrame(NamedTuple):
 
 @dataclass(frozen=True)
 class Instant:
-    """A complete set of frames.
+    """Sample instant: complete set of the frames, one per waveform message, at one index.
 
     Parameters
     ----------
     epoch
-        Of the device's count.
+        Epoch of the device's count.
     index
-        Of the first sample.
+        Index of the first sample.
     n_samples
-        Valid samples of each channel, at most those that a frame can carry.
+        Number of valid samples per channel, at most the capacity of a frame.
     frames
-        One for each waveform message.
+        Data of the frame of each waveform message.
     rejected
-        Samples refused directly before, by reason.
+        Number of samples refused directly before the instant, by reason.
     """
 
     epoch: int
@@ -95,13 +95,13 @@ class Instant:
 
     @property
     def stop_index(self) -> int:
-        """Index of the first sample after it."""
+        """Index after the last sample."""
         return self.index + self.n_samples
 
 
 @dataclass
 class _Pending:
-    """A set of frames, by number of the message, that is still being collected."""
+    """Incomplete set of frames by number of the waveform message."""
 
     n_samples: int
     frames: dict[int, bytes] = field(default_factory=dict)
@@ -109,12 +109,12 @@ class _Pending:
 
 
 class FrameSets:
-    """Collects the frames of each sample instant; what it returns is complete and in order.
+    """Collector of the frames of each sample instant; returns complete instants in order.
 
     Parameters
     ----------
     refused
-        Where refused frames are counted.
+        Counts of refused frames; updated in place.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class FrameSets:
         self.begin()
 
     def begin(self) -> None:
-        """Forget what belongs to the epoch that has ended."""
+        """Reset the collector for a new epoch."""
         n_waves = self._plan.n_waves
         self.pending: dict[int, _Pending] = {}
         self._seen: list[dict[int, bytes]] = [{} for _ in range(n_waves)]
@@ -133,26 +133,26 @@ class FrameSets:
         self._n_unusable = [0] * n_waves
 
     def refuse(self, wave: int) -> None:
-        """Note that a counted frame of a waveform message came but could not be used."""
+        """Count an unusable frame of a waveform message with counters."""
         self._n_unusable[wave] += self._plan.samples_per_frame
 
     def open(self, index: int) -> None:
-        """Begin a set, whether or not a frame of it can be used."""
+        """Start the set of a sample index, also if its first frame is unusable."""
         self.pending.setdefault(index, _Pending(self._plan.samples_per_frame))
 
     def lose(self, n_samples: int, n_dropped: int) -> None:
-        """Move the sets that are still collected, since samples before them were lost.
+        """Shift the index of incomplete sets by the number of samples lost before them.
 
         Parameters
         ----------
         n_dropped
-            Samples of complete sets that cannot be used since others among them were lost.
+            Number of samples of complete sets that are dropped because of the loss.
         """
         self._n_lost += n_samples + n_dropped
         self.pending = {index + n_samples: found for index, found in self.pending.items()}
 
     def add(self, frame: PlacedFrame, epoch: int) -> Instant | None:
-        """Put a frame to the others of its instant; return that, if it is complete."""
+        """Add a frame to the set of its instant; return the instant if it is complete."""
         part, data, index = frame
         wave = part.wave
         if wave is None or not self._is_new(wave, index, data):
@@ -172,7 +172,7 @@ class FrameSets:
         return None
 
     def _is_new(self, wave: int, index: int, data: bytes) -> bool:
-        """Whether a frame is of a sample that is not past; it is then remembered."""
+        """Whether a frame is newer than all others of its message; a new frame is stored."""
         seen = self._seen[wave]
         last = next(reversed(seen), -1)
         if index <= last or index < self.stop:
@@ -185,7 +185,7 @@ class FrameSets:
         return True
 
     def _refuse_old(self, seen: dict[int, bytes], index: int, data: bytes) -> None:
-        """Count a frame of a sample that is past; a device alone never sends one in two ways."""
+        """Count an old frame by reason; different data at one index show a second sender."""
         n_samples = self._plan.samples_per_frame
         near = range(index - n_samples + 1, index + n_samples)
         if seen[index] != data if index in seen else any(n in seen for n in near):
@@ -196,7 +196,7 @@ class FrameSets:
         self._refused[Refusal.DUPLICATE if again else Refusal.OUT_OF_ORDER] += 1
 
     def _finished(self, epoch: int, index: int, complete: _Pending) -> Instant | None:
-        """Hand an instant on; those before it will never be complete, since all parts are past."""
+        """Return a complete instant and drop incomplete older sets, whose frames cannot arrive."""
         for earlier in [i for i in self.pending if i <= index]:
             given_up = self.pending.pop(earlier)
             self._n_incomplete += given_up.n_samples if earlier < index else 0
@@ -208,7 +208,7 @@ class FrameSets:
         return Instant(epoch, index, complete.n_samples, frames, rejected)
 
     def _rejected(self, index: int) -> dict[Refusal, int]:
-        """What of the jump up to an index was refused; the rest of it never came."""
+        """Return the refused samples in the gap before an index, by reason; the rest was lost."""
         n_jump = index - self.stop if self.stop >= 0 else 0
         incomplete = min(self._n_incomplete, n_jump)
         unusable = min(*self._n_unusable, n_jump - incomplete)

@@ -1,4 +1,4 @@
-"""Only exact frames of configured messages pass; error frames are counted."""
+"""Filter for frames of configured messages with correct length; interpreter of error frames."""
 
 from typing import TypeAlias
 
@@ -9,16 +9,16 @@ from acquisition.can.plan import Plan, Refusal, RefusalCounts
 from acquisition.errors import LinkError
 
 Frame: TypeAlias = tuple[int, bytes | None]
-"""Frame key and data; None as data if it came but cannot be used."""
+"""Frame key and data; data is None for an unusable frame."""
 
 
 class FrameGate:
-    """Admits frames and counts the others by reason.
+    """Filter that admits frames of configured messages and counts refused frames by reason.
 
     Parameters
     ----------
     refused
-        Where they are counted.
+        Counts of refused frames; updated in place.
     """
 
     def __init__(self, plan: Plan, refused: RefusalCounts) -> None:
@@ -29,7 +29,7 @@ class FrameGate:
         self._refused = refused
 
     def admit(self, message: Message) -> Frame | None:
-        """Return the frame; None if it is not a configured one."""
+        """Return key and data of a frame; None for a frame of no configured message."""
         key = frame_key(message.arbitration_id, message.is_extended_id)
         shape = self._shapes.get(key)
         if shape is None or message.is_error_frame:
@@ -65,12 +65,12 @@ _CONTROLLER_BYTE = 1
 
 
 def require_bus(message: Message) -> None:
-    """Refuse an error frame that reports the controller off the bus, or nearly so.
+    """Raise LinkError for an error frame of a bus-off or error-passive controller.
 
     Raises
     ------
     LinkError
-        If it is bus-off or error-passive; what arrives then cannot be complete.
+        If the controller is bus-off or error-passive; the received frames are then incomplete.
     """
     if message.arbitration_id & BUS_OFF:
         raise LinkError("the CAN controller is bus-off: wrong bitrate, wiring or termination")
@@ -79,7 +79,7 @@ def require_bus(message: Message) -> None:
 
 
 def lost_in_controller(message: Message) -> bool:
-    """Whether an error frame reports frames lost before they could be read."""
+    """Whether an error frame reports a receive overflow in the controller."""
     return bool(_controller_state(message) & RX_OVERFLOW)
 
 

@@ -1,4 +1,4 @@
-"""Readers of a signal in one frame or in many, and the waveforms that many frames make."""
+"""Readers of signals in single and in joined frames; decoder of waveforms."""
 
 import struct
 from collections.abc import Callable, Sequence
@@ -17,10 +17,10 @@ from core.checks.channels import COUNTS_FULL_SCALE
 from core.samples.calibration import ChannelCalibration
 
 ScalarReader: TypeAlias = Callable[[bytes], int | float]
-"""Reads one signal from one frame, not scaled."""
+"""Function that returns the unscaled value of one signal in one frame."""
 
 ColumnReader: TypeAlias = Callable[[bytes], npt.NDArray[Any]]
-"""Reads one signal from joined frames of its message, (n_frames,), not scaled."""
+"""Function that returns the unscaled values of one signal in joined frames, (n_frames,)."""
 
 _BITS_PER_BYTE = 8
 _INTEGERS = {8: "b", 16: "h", 32: "i", 64: "q"}
@@ -28,7 +28,7 @@ _FLOATS = {32: "f", 64: "d"}
 
 
 def byte_offset(signal: DbcSignal) -> int | None:
-    """First byte of a signal that fills bytes and has a numpy type; else None."""
+    """Return the first byte of a byte-aligned signal with a numpy type; None for other signals."""
     source = signal.source
     offset, bit = divmod(source.start, _BITS_PER_BYTE)
     first_bit = _BITS_PER_BYTE - 1 if source.byte_order == "big_endian" else 0
@@ -37,9 +37,9 @@ def byte_offset(signal: DbcSignal) -> int | None:
 
 
 def scalar_reader(signal: DbcSignal) -> ScalarReader:
-    """Reader of a single frame's signal; where it does not fill bytes, cantools decodes it.
+    """Return a reader of a signal in one frame; cantools decodes signals without byte alignment.
 
-    It raises FrameError if cantools cannot decode the frame.
+    The reader raises FrameError if cantools cannot decode the frame.
     """
     offset, message, name = byte_offset(signal), signal.message, signal.source.name
     if offset is None:
@@ -49,9 +49,9 @@ def scalar_reader(signal: DbcSignal) -> ScalarReader:
 
 
 def column_reader(signal: DbcSignal) -> ColumnReader:
-    """Reader of a signal in joined frames, as fast as numpy where it fills bytes.
+    """Return a reader of a signal in joined frames; it uses numpy for byte-aligned signals.
 
-    It raises FrameError if cantools cannot decode a frame.
+    The reader raises FrameError if cantools cannot decode a frame.
     """
     offset, length = byte_offset(signal), signal.message.length
     if offset is None:
@@ -64,7 +64,7 @@ def column_reader(signal: DbcSignal) -> ColumnReader:
 
 
 def _format_of(signal: DbcSignal) -> str:
-    """Byte order and type of a signal, as numpy and struct write them."""
+    """Return byte order and type of a signal as a format of numpy and struct."""
     source = signal.source
     order = ">" if source.byte_order == "big_endian" else "<"
     if source.is_float:
@@ -77,19 +77,19 @@ _FACTOR_TOLERANCE = 1e-6
 _COUNT_BITS = 16
 _V_PER = {"V": 1.0, "mV": 1e-3}
 _COUNTS = ("", "1", "count", "counts")
-"""What stands for the unit of a plain count."""
+"""DBC units of a dimensionless count."""
 
 
 @dataclass(frozen=True)
 class WaveChannel:
-    """A waveform channel and where its samples lie.
+    """Waveform channel with the readers of its samples.
 
     Parameters
     ----------
     wave
-        Number of its message, among those that carry waveforms.
+        Number of the channel's message among the waveform messages.
     columns
-        A reader for each sample in a frame.
+        Reader of each sample in a frame.
     gain, offset
         Engineering units = raw value * gain + offset.
     """
@@ -102,7 +102,7 @@ class WaveChannel:
 
 @dataclass(frozen=True)
 class WaveformDecoder:
-    """Puts the samples of all channels into one array.
+    """Decoder of the frames of all waveform channels to one sample array.
 
     Parameters
     ----------
@@ -119,11 +119,11 @@ class WaveformDecoder:
         Parameters
         ----------
         frames
-            For each message, its frame of every instant.
+            For each waveform message, its frame of every instant.
 
         Returns
         -------
-        (n_channels, n_instants * samples per frame) int16 counts or float32 engineering units.
+        (n_channels, n_instants * samples_per_frame), int16 counts or float32 engineering units.
         """
         joined = [b"".join(of_message) for of_message in frames]
         n_per_frame = len(self.channels[0].columns)
@@ -142,7 +142,7 @@ class WaveformDecoder:
 
 
 def is_counts(signal: DbcSignal) -> bool:
-    """Whether a signal is a 16-bit converter's count: signed, in volts or without unit."""
+    """Whether a signal is the count of a 16-bit converter: signed, in volts or without unit."""
     source = signal.source
     plain = source.is_signed and not source.is_float and source.length == _COUNT_BITS
     return (
@@ -156,12 +156,12 @@ def is_counts(signal: DbcSignal) -> bool:
 def wave_channel(
     wave: int, channel: CanChannel, calibration: ChannelCalibration, signals: Sequence[DbcSignal]
 ) -> WaveChannel:
-    """Compile a channel whose samples are in these signals of a message.
+    """Return a waveform channel with the gain, offset and readers of its signals.
 
     Raises
     ------
     ConfigError
-        If unit, factor or full scale by the DBC do not fit the channel, or each other.
+        If unit, factor or full scale in the DBC do not match the channel, or differ in a channel.
     """
     scalings = {_gain_and_offset(channel, calibration, signal) for signal in signals}
     if len(scalings) > 1:
@@ -174,7 +174,7 @@ def wave_channel(
 def _gain_and_offset(
     channel: CanChannel, calibration: ChannelCalibration, signal: DbcSignal
 ) -> tuple[float, float]:
-    """How raw values become the channel's engineering unit."""
+    """Return gain and offset from raw values to the channel's engineering unit."""
     unit, source = known_unit(signal.unit), signal.source
     if is_counts(signal) and signal.unit in _COUNTS:
         return calibration.unit_per_count, 0.0
@@ -192,7 +192,7 @@ def _gain_and_offset(
 def _require_full_scale(
     channel: CanChannel, calibration: ChannelCalibration, signal: DbcSignal
 ) -> None:
-    """Refuse a count whose volts by the DBC differ from those by the plant file."""
+    """Raise ConfigError if the full scale in the DBC differs from that in the plant file."""
     v_per_unit = _V_PER.get(known_unit(signal.unit) or "")
     if v_per_unit is None:
         return

@@ -1,4 +1,4 @@
-"""What is done with each frame, and why frames are refused."""
+"""Decoding plan of a device's frames, and reasons for refusing frames."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -10,35 +10,35 @@ from acquisition.can.layout import ScalarReader, WaveformDecoder
 from core.samples.blocks import UNCOUNTED_LOSS as UNCOUNTED
 
 MAX_INSTANTS_PER_S = 1250.0
-"""Without counters: a second of drift is then less than half an instant, so that the loss of each
-one shows by the clock."""
+"""Maximum rate of instants without counters: a second of clock drift is then less than half an
+instant, so that the clock shows the loss of a single instant."""
 
 EPOCH, OK_BITS, HOLD = "epoch", "ok_bits", "hold_samples"
 SECONDS, MICROSECONDS = "seconds", "microseconds"
 QUANTITIES = (EPOCH, OK_BITS, SECONDS, MICROSECONDS, HOLD)
-"""Quantities beside the waveforms, as their keys in the settings; slow values go by number."""
+"""Side quantities by their key in the settings; slow values are identified by number."""
 
 
 @dataclass(eq=False)
 class Part:
-    """A message, or what it is at one value of its multiplexer.
+    """Signals of a message, or of one multiplexer value of a multiplexed message.
 
     Parameters
     ----------
     message
-        Its name.
+        Name of the message.
     wave
-        Its number among those that carry waveforms; None if it carries none.
+        Number among the waveform messages; None if the part has no waveforms.
     counter
-        Reader of its counter, in frames or samples; None if it has none.
+        Reader of the counter, in frames or samples; None without a counter.
     counter_step
-        Samples that the counter counts as one.
+        Samples per counter increment.
     modulus
-        Samples after which the counter is back where it was.
+        Period of the counter in samples; 0 without a counter.
     n_samples
-        Reader of the number of samples in a frame; None if it is always the same.
+        Reader of the number of samples in a frame; None if the number is constant.
     values
-        Quantities beside the waveforms and their readers.
+        Side quantities with their readers.
     """
 
     message: str
@@ -53,12 +53,12 @@ class Part:
 
 @dataclass(frozen=True)
 class MessagePlan:
-    """How to read the frames of one id.
+    """Decoding plan of the frames of one id.
 
     Parameters
     ----------
     parts
-        By value of the multiplexer; without one, the only key is 0.
+        Parts by multiplexer value; the only key is 0 for a message without multiplexer.
     """
 
     message: DbcMessage
@@ -67,33 +67,33 @@ class MessagePlan:
 
 
 class Plan:
-    """How all frames of a device are read.
+    """Decoding plan of all frames of a device.
 
     Parameters
     ----------
     messages
-        By frame key.
+        Decoding plan of each message by frame key.
     n_slow
-        Slow channels.
+        Number of slow channels.
     hold_samples
-        For how many samples a counted message without waveforms is valid; None if it is sent.
+        Validity in samples of a message with counter but no waveforms; None if a signal sets it.
     hold_s
-        For how long a message without waveforms and without counter is valid.
+        Validity in seconds of a message with neither waveforms nor counter.
 
     Attributes
     ----------
     samples_per_frame
-        Of each channel.
+        Number of samples per channel in one frame.
     n_waves
-        Messages that carry waveforms.
+        Number of waveform messages.
     widest_modulus
-        Of all counters; 0 without any.
+        Largest modulus of all counters; 0 without counters.
     quantities
-        All that is carried beside the waveforms.
+        All side quantities of the messages.
     reports_epoch
-        Whether counted messages carry the epoch of the count.
+        Whether any message with a counter contains the epoch of the count.
     needs_header
-        Whether a counted message without waveforms does.
+        Whether the epoch is in a message with a counter but no waveforms.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class Plan:
 
 
 class Refusal(StrEnum):
-    """Why a frame, or the samples it belongs to, are not used; the names become counters."""
+    """Reason for refusing a frame or its samples; the values are names of counters."""
 
     INCOMPLETE = "incomplete_frames"
     WRONG_LENGTH = "wrong_length"
@@ -145,4 +145,4 @@ class Refusal(StrEnum):
 
 
 RefusalCounts = Counter[Refusal]
-"""Frames, or samples, by reason."""
+"""Number of refused frames or samples by reason."""

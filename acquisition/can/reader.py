@@ -1,4 +1,4 @@
-"""Thread that listens on a bus, and its bounded queue to the event loop."""
+"""Reader thread of a CAN bus, with a bounded queue to the event loop."""
 
 import asyncio
 import threading
@@ -21,26 +21,26 @@ from core.samples.blocks import StampFault
 
 _RECEIVE_S = 0.1
 _REST_S = 0.005
-"""Frames are taken this often; until then they wait in the buffer of the system or the adapter."""
+"""Delay between reads; meanwhile the system or the interface buffers the frames."""
 
 _READS_PER_BATCH = 4
 _MAX_BATCH = 2000
 _MAX_NONSENSE = 1000
-"""Unreadable frames in a row after which the link counts as lost."""
+"""Successive unreadable frames after which the link counts as lost."""
 
 _JOIN_S = 10.0
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Frames in the order in which they came.
+    """Frames in order of arrival.
 
     Parameters
     ----------
     arrived
-        When the last of them had been read; or when it came, by the interface's stamps.
+        Time when the last frame was read, or its arrival time by the interface's time stamps.
     stamp_fault
-        Why a stamp of the interface was not used.
+        Reason why a time stamp of the interface was not used; None without a fault.
     """
 
     frames: list[Frame]
@@ -49,14 +49,14 @@ class Batch:
 
 
 class FrameReader:
-    """Listens from `start` to `stop`; an error that ends the thread is raised by `next_batch`.
+    """Reader thread from `start` to `stop`; `next_batch` raises an error that ended the thread.
 
     Parameters
     ----------
     open_bus
-        Called in the thread, since it may take seconds.
+        Function that opens the bus; called in the thread, because it may take seconds.
     refused
-        Where frames are counted that are not handed on.
+        Counts of refused frames; updated in place.
     """
 
     def __init__(
@@ -83,12 +83,12 @@ class FrameReader:
         self._loop: asyncio.AbstractEventLoop
 
     async def start(self) -> None:
-        """Open the bus.
+        """Start the thread and wait until the bus is open.
 
         Raises
         ------
         LinkError, ConfigError
-            As opening it does.
+            As `open_bus`.
         """
         self._loop = asyncio.get_running_loop()
         self._thread = threading.Thread(target=self._run, name=f"can {self._where}", daemon=True)
@@ -100,7 +100,7 @@ class FrameReader:
     async def stop(self) -> None:
         """Close the bus and wait for the thread to end.
 
-        A driver that hangs cannot be ended: its thread then dies with the process.
+        A thread blocked in a driver cannot be stopped; it ends with the process.
         """
         with self._room:
             self._is_stopping = True
@@ -114,7 +114,7 @@ class FrameReader:
             self._thread.join(_RECEIVE_S)
 
     async def next_batch(self, timeout_s: float) -> Batch | None:
-        """Return the next frames, or None if there are none in time.
+        """Return the next batch of frames; None if no frames arrive before the timeout.
 
         Raises
         ------
@@ -135,7 +135,7 @@ class FrameReader:
         return None
 
     async def _until(self, is_so: Callable[[], bool]) -> None:
-        """Wait until the thread has brought something about."""
+        """Wait until a condition that the reader thread changes is true."""
         while not is_so():
             self._news.clear()
             await self._news.wait()
@@ -158,11 +158,11 @@ class FrameReader:
             self._announce()
 
     def _announce(self) -> None:
-        with suppress(RuntimeError):  # the loop has ended while a driver was hanging
+        with suppress(RuntimeError):  # the loop ended while the thread was blocked in a driver
             self._loop.call_soon_threadsafe(self._news.set)
 
     def _listen(self, bus: can.BusABC) -> None:
-        """Wait for a frame, then go on for a while, since a batch costs more than its frames."""
+        """Wait for a frame, then read several times into one batch to save overhead per batch."""
         frames: list[Frame] = []
         try:
             self._receive(bus, frames, _RECEIVE_S)
@@ -171,7 +171,7 @@ class FrameReader:
                     break
                 time.sleep(_REST_S)
                 self._receive(bus, frames, 0.0)
-        finally:  # what came before the bus failed is good
+        finally:  # frames received before the failure are valid
             if frames:
                 self._hand_over(Batch(frames, self._arrived, self._stamp_fault))
                 self._stamp_fault = None
@@ -179,7 +179,7 @@ class FrameReader:
             raise LinkError(f"{self._where}: the interface reports that it is in error")
 
     def _receive(self, bus: can.BusABC, frames: list[Frame], timeout_s: float) -> None:
-        """Take all frames that have come, after waiting for the first."""
+        """Append all received frames, after waiting for the first frame."""
         n_before, stamp_s = len(frames), 0.0
         try:
             while len(frames) < _MAX_BATCH:
@@ -199,7 +199,7 @@ class FrameReader:
                     self._stamp_fault = self._stamp_fault or fault
 
     def _next_message(self, bus: can.BusABC, timeout_s: float) -> can.Message | None:
-        """Next readable message; a bus that delivers no others for long is lost."""
+        """Return the next readable message; raise LinkError after too many unreadable messages."""
         judges_errors = self._settings.link.interface in LINUX_ERROR_FRAMES
         for _ in range(_MAX_NONSENSE):
             try:

@@ -1,4 +1,4 @@
-"""Settings of a CAN source: the bus, the DBC, and what each signal means."""
+"""Settings of a CAN source: bus, DBC, and meaning of the signals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,20 +8,20 @@ from typing import Literal
 
 @dataclass(frozen=True, kw_only=True)
 class CanLinkSettings:
-    """A bus, in the words of python-can.
+    """Settings of a CAN bus, as arguments of python-can.
 
     Parameters
     ----------
     interface
-        One of python-can's interfaces: "socketcan", "slcan", "pcan", "kvaser", "vector", …
+        Interface of python-can: "socketcan", "slcan", "pcan", "kvaser", "vector", …
     channel
-        What that interface calls a channel: "can0", "/dev/ttyACM0", "socket://192.0.2.17:4001".
+        Channel of the interface: "can0", "/dev/ttyACM0", "socket://192.0.2.17:4001".
     bitrate, data_bitrate
-        In bit/s; None leaves the interface as it is, as socketcan must be.
+        Bit rates in bit/s; None keeps the rate of the interface, as required for socketcan.
     fd
         Whether the bus carries CAN FD frames.
     options
-        Further arguments of python-can's interface, handed on as they are.
+        Further arguments of python-can's interface, passed unchanged.
     """
 
     interface: str
@@ -37,14 +37,14 @@ class CanLinkSettings:
 
 @dataclass(frozen=True)
 class CanChannel:
-    """A waveform channel: one signal, or one for each sample that a frame carries, in order.
+    """Waveform channel: one signal for each sample in a frame, in order of time.
 
     Parameters
     ----------
     unit
         Engineering unit of the channel: "um", "mm/s", "m/s2" or "V".
     signals
-        As "Message.Signal".
+        Signals as "Message.Signal".
     """
 
     id: str
@@ -54,7 +54,7 @@ class CanChannel:
 
 @dataclass(frozen=True)
 class CanSlowChannel:
-    """A slow channel and the signal that carries it, as "Message.Signal"."""
+    """Slow channel with its signal as "Message.Signal"."""
 
     id: str
     unit: str
@@ -63,41 +63,41 @@ class CanSlowChannel:
 
 @dataclass(frozen=True, kw_only=True)
 class CanSettings:
-    """A measuring device on a CAN bus; signals are named "Message.Signal".
+    """Settings of a measuring device on a CAN bus; signals are named "Message.Signal".
 
     Parameters
     ----------
     dbc
-        The DBC file.
+        Path of the DBC file.
     dbc_text
-        Its text, where it follows from a profile and there is no file.
+        Content of the DBC if it is generated from a profile; None to read the file.
     counters
-        Signals that count the sample that a message belongs to, at most one for each message. All
-        messages of the waveform channels have one, or none has; without, frames are counted.
+        Counter signals of the messages, at most one per message. Either all waveform messages have
+        a counter, or none; without counters, the host counts the frames.
     counter_counts
-        Whether these counters count samples or frames.
+        Unit of the counters: "samples" or "frames".
     frame_samples
-        Signals that give the number of samples in a multi-sample frame, if it can be fewer.
+        Signals with the number of valid samples in a multi-sample frame, if it varies.
     epoch
-        Changes when the device begins to count anew.
+        Signal that changes when the device restarts its counters.
     ok_bits
-        Bit c, the lowest first, is set while waveform channel c is healthy.
+        Signal whose bit c, from the lowest, is set while waveform channel c is OK.
     seconds, microseconds
-        UTC of the sample that the message belongs to.
+        Signals with the UTC time of the sample to which the message belongs.
     hold_samples
-        For how many samples, from the one its counter names, a message without waveforms is valid:
-        a number, or the signal that gives it.
+        Validity of a message without waveforms, in samples from its counter value on: a number, or
+        the signal with the number.
     hold_s
-        For how long a message without waveforms and without counter is valid.
+        Validity in seconds of a message with neither waveforms nor counter.
     stale_after_s
-        A bus without a complete new sample for longer than this is not connected; above 0.
+        Longest time without a new complete sample before the link counts as lost; above 0.
     stamps
-        Whether the "host" stamps frames as they are read, or the "interface" does.
+        Source of arrival times: the "host" when it reads a frame, or the "interface".
     queue_frames
-        Frames that wait for the event loop at most.
+        Maximum number of frames queued for the event loop.
     when_full
-        "drop" and count frames if the queue is full, or "wait", so that a device that can wait,
-        as one that replays a recording does, loses nothing.
+        Behaviour if the queue is full: "drop" frames and count them, or "wait", for a device that
+        can be paused without loss, such as a replay of a recording.
     """
 
     link: CanLinkSettings

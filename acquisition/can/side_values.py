@@ -1,4 +1,4 @@
-"""Values beside the samples, each valid from one sample on; blocks of samples with their values."""
+"""Side values with their validity in samples; raw blocks of samples with side values."""
 
 import itertools
 from bisect import bisect_right
@@ -30,13 +30,13 @@ _US_PER_S = 1_000_000
 _START = itemgetter(0)
 
 _Entry = tuple[int, float, int | None]
-"""First sample, value, and for how many samples it holds; None if another quantity gives that."""
+"""First sample, value, validity in samples; None if the quantity `HOLD` sets the validity."""
 
 
 class SideTable:
-    """All quantities beside the waveforms of one epoch, as the device sent them.
+    """Table of the side values of one epoch by quantity and sample index.
 
-    An old value never passes for a new one: beyond the samples that it holds for there is none.
+    Each value is valid for a limited number of samples; after them the quantity has no value.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -44,11 +44,11 @@ class SideTable:
         self.clear()
 
     def clear(self) -> None:
-        """Forget all, as when the device begins to count anew."""
+        """Delete all values, at the start of a new epoch."""
         self._entries: dict[str | int, list[_Entry]] = {key: [] for key in self._plan.quantities}
 
     def set(self, key: str | int, start: int, value: float, hold: int | None) -> None:
-        """Note a value; see `_Entry`."""
+        """Store a value of a quantity from the sample `start` on, valid for `hold` samples."""
         entries = self._entries[key]
         at = bisect_right(entries, start, key=_START)
         replaces = at > 0 and entries[at - 1][0] == start
@@ -57,21 +57,21 @@ class SideTable:
             del entries[0]
 
     def forget_before(self, index: int) -> None:
-        """Forget what no coming sample can need."""
+        """Delete the values that no sample from an index on needs."""
         for entries in self._entries.values():
             del entries[: max(0, bisect_right(entries, index, key=_START) - 1)]
 
     def at(self, key: str | int, index: int) -> float | None:
-        """Value of a quantity at a sample; None if there is no valid one."""
+        """Return the value of a quantity at a sample; None without a valid value."""
         entry = self._entry(key, index)
         return None if entry is None or index >= self._stop(entry) else entry[1]
 
     def cuts(self, first: int, stop: int) -> list[int]:
-        """Samples between these at which any quantity begins or ends to hold."""
+        """Return the sample indices between two samples at which any value starts or expires."""
         return sorted({index for index in self._changes(first, stop) if first < index < stop})
 
     def stamp_ns(self, index: int) -> int | None:
-        """Time of a sample by the last stamp before it; None if there is none."""
+        """Return the UTC time of a sample by the last device time stamp; None without a stamp."""
         seconds = self._entries.get(SECONDS, [])
         for start, second, _ in reversed(seconds[: bisect_right(seconds, index, key=_START)]):
             part = self._entry(MICROSECONDS, start)
@@ -81,7 +81,7 @@ class SideTable:
         return None
 
     def _entry(self, key: str | int, index: int) -> _Entry | None:
-        """Newest entry that is not newer than a sample."""
+        """Return the last entry that starts at or before a sample."""
         entries = self._entries.get(key, [])
         at = bisect_right(entries, index, key=_START)
         return entries[at - 1] if at else None
@@ -93,7 +93,7 @@ class SideTable:
                 yield from (entry[0], self._stop(entry))
 
     def _stop(self, entry: _Entry) -> int:
-        """First sample at which an entry does not hold."""
+        """Return the first sample at which an entry is no longer valid."""
         start, _, hold = entry
         if hold is None:
             other = self._entry(HOLD, start)
@@ -102,12 +102,12 @@ class SideTable:
 
 
 class RawBlockBuilder:
-    """Cuts runs of samples wherever anything changes that a block has only one of.
+    """Builder of raw blocks; a block ends where a side value changes.
 
     Attributes
     ----------
     side
-        What the device sent beside the samples.
+        Side values of the current epoch.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -117,14 +117,14 @@ class RawBlockBuilder:
         self._rejected: RefusalCounts = Counter()
 
     def begin_epoch(self) -> None:
-        """Forget what was sent and refused in the epoch that has ended."""
+        """Delete side values and refusal counts at the start of a new epoch."""
         self.side.clear()
         self._rejected.clear()
 
     def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[RawBlock]:
-        """Build blocks of instants of one epoch, in index order, which had come by then."""
+        """Return raw blocks of instants of one epoch in index order, arrived by `arrived_ns`."""
         blocks = []
-        if instants:  # the last one has waited least
+        if instants:  # the last instant has the smallest delay
             self._stamps.add(instants[-1].epoch, instants[-1].stop_index, arrived_ns)
         for run in _runs(instants):
             first, stop = run[0].index, run[-1].stop_index
@@ -162,7 +162,7 @@ class RawBlockBuilder:
         )
 
     def _ok(self, index: int) -> tuple[bool, ...]:
-        """The device's verdict on each channel; good only while the device reports it so."""
+        """Return the OK state of each channel; False without a valid value of the OK bits."""
         if OK_BITS not in self._plan.quantities:
             return (True,) * self._plan.n_channels
         bits = int(self.side.at(OK_BITS, index) or 0)
@@ -185,7 +185,7 @@ class RawBlockBuilder:
 
 
 def _runs(instants: Sequence[Instant]) -> Iterator[Sequence[Instant]]:
-    """Instants that follow each other, with nothing refused in between."""
+    """Yield runs of consecutive instants without refused samples in between."""
     start = 0
     for n in range(1, len(instants) + 1):
         if n == len(instants) or not _continues(instants[n - 1], instants[n]):

@@ -1,8 +1,8 @@
-"""slcan, the text protocol of serial CAN adapters: python-can's bus with a reader that is strict.
+"""slcan, the text protocol of serial CAN adapters: python-can's bus with a strict parser.
 
-python-can reads byte by byte, accepts a line that is longer or shorter than its own length field,
-and raises ValueError or worse on a line that is not a frame. Here a line is exactly a frame, or it
-is refused, and bytes are read in chunks.
+python-can reads byte by byte, accepts lines whose length differs from their length field, and
+raises ValueError or other exceptions for lines that are no frames. This parser reads in chunks and
+refuses each line that is not exactly one frame.
 """
 
 from binascii import Error as HexError
@@ -43,18 +43,18 @@ _FORMS = {
     b"B": (True, False, True),
 }
 _ANSWERS = b"zZVvNF"
-"""First letters of what an adapter answers to commands."""
+"""First letters of an adapter's replies to commands."""
 
 _STATES = {b"a": None, b"w": None, b"p": RX_PASSIVE | TX_PASSIVE, b"b": 0}
 
 
 class SlcanBus(slcanBus):
-    """An slcan adapter at a serial port, a pseudo-terminal or a TCP port.
+    """python-can bus of an slcan adapter at a serial port, a pseudo-terminal or a TCP port.
 
     Parameters
     ----------
     ids
-        Frame ids that are wanted, whatever their kind.
+        Frame ids to receive, standard or extended.
     """
 
     def __init__(self, channel: str, ids: Container[int], **options: Any) -> None:
@@ -64,14 +64,14 @@ class SlcanBus(slcanBus):
         self._skipping = True  # the stream may begin in the middle of a line
         try:
             super().__init__(channel, **{"timeout": 0.0, **options})
-        except Exception:  # its commands could not be sent
+        except Exception:  # the opening commands could not be sent
             port = getattr(self, "serialPortOrig", None)
             if port is not None:
                 port.close()
             raise
 
     def _recv_internal(self, timeout: float | None) -> tuple[Message | None, bool]:
-        """Return the next frame; raise FrameError for a line that is neither frame nor answer."""
+        """Return the next frame; raise FrameError for a line that is neither frame nor reply."""
         if not self._found:
             self._read_chunk(timeout)
         if not self._found:
@@ -82,7 +82,7 @@ class SlcanBus(slcanBus):
         return message, True
 
     def _read_chunk(self, timeout: float | None) -> None:
-        """Wait until there is something, then take all there is."""
+        """Wait for received bytes, then read and parse all of them."""
         with error_check("could not read from the serial device"):
             ready, _, _ = select([self.fileno()], [], [], timeout)
             data = self.serialPortOrig.read(_CHUNK_BYTES) if ready else b""
@@ -108,12 +108,12 @@ class SlcanBus(slcanBus):
 
     @classmethod
     def require_speed(cls, bitrate: int | None, data_bitrate: int | None) -> None:
-        """Refuse speeds that the protocol cannot express; python-can calls that a lost link.
+        """Check the bit rates against those of slcan; python-can would report a lost link.
 
         Raises
         ------
         ConfigError
-            Naming those it has.
+            If a bit rate is not supported; the message lists the supported rates.
         """
         for name, speed, known in (
             ("bitrate", bitrate, cls._BITRATES),
@@ -126,7 +126,7 @@ class SlcanBus(slcanBus):
     def shutdown(self) -> None:
         """Close the adapter's channel and the port, even if the adapter is gone."""
         port = self.serialPortOrig
-        socket = getattr(port, "_socket", None)  # pyserial forgets to close one that was reset
+        socket = getattr(port, "_socket", None)  # pyserial does not close a reset socket
         try:
             super().shutdown()
         finally:
@@ -136,12 +136,12 @@ class SlcanBus(slcanBus):
 
 
 def _parsed(line: bytes, ids: Container[int]) -> Message | None:
-    """Return the frame of a line; None if it is an answer or not wanted.
+    """Return the frame of a line; None for a reply or for an id that is not received.
 
     Raises
     ------
     FrameError
-        If it is neither.
+        If the line is neither a frame nor a reply.
     """
     kind = line[:1]
     form = _FORMS.get(kind)
@@ -150,7 +150,7 @@ def _parsed(line: bytes, ids: Container[int]) -> Message | None:
     extended, remote, fd = form
     end = 9 if extended else 4
     try:
-        # not int(…, 16), which takes "0x1", "1_0" and " 1" for numbers
+        # not int(…, 16), which accepts "0x1", "1_0" and " 1"
         frame_id = int.from_bytes(unhexlify(line[1:end].rjust(8, b"0")), "big")
         if frame_id not in ids:
             return None
@@ -175,7 +175,7 @@ def _parsed(line: bytes, ids: Container[int]) -> Message | None:
 
 
 def _state(line: bytes) -> Message | None:
-    """Lines about the controller, as newer adapters send them: "sb256256", "e1o"."""
+    """Return the error frame of a status line, or None; examples: "sb256256", "e1o"."""
     kind, what = line[:1], line[1:2]
     if not line or kind in _ANSWERS:
         return None

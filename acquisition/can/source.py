@@ -1,4 +1,4 @@
-"""`CanSource`: a measuring device on a CAN bus as a sample source."""
+"""`CanSource`: sample source for a measuring device on a CAN bus."""
 
 import asyncio
 from collections.abc import AsyncGenerator, AsyncIterator, Callable, Iterable, Mapping
@@ -21,34 +21,34 @@ from core.samples.calibration import UnitCalibration
 from core.units import ns_from_s
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
-"""Opens a bus that delivers frames of these ids; `acquisition.can.bus.open_bus`."""
+"""Function that opens a bus for frames of these ids, as `acquisition.can.bus.open_bus`."""
 
 _LOOK_S = 0.2
 
 _PAUSE_S = 0.1
-"""Samples that are held for a longer block are delivered if no others follow for so long."""
+"""Time without new samples, s, after which samples held for a longer block are delivered."""
 
 _MAX_DOUBT_S = 2 * MAX_UNSURE_S
-"""Time in which the clock has to place samples; it observes them for half of that at a time."""
+"""Time beyond `stale_after_s` in which the clock must confirm samples; two attempts fit."""
 
 _MIN_STALE_INSTANTS = 3
-"""A silence shorter than this many sample instants is normal."""
+"""Minimum time without a new sample before a bus is stale, in sample instants."""
 
 
 class CanSource:
-    """Samples of one unit from CAN frames; keeps its place across connections.
+    """Sample source of one unit from CAN frames; keeps its sample index across connections.
 
-    It only listens. A CAN device keeps nothing: what passes while the bus is not open is a gap.
+    Listen-only. CAN devices do not buffer samples: frames sent while the bus is closed are a gap.
 
     Parameters
     ----------
     opener
-        What opens the bus.
+        Function that opens the bus.
 
     Raises
     ------
     ConfigError
-        If DBC, settings and calibration do not fit together.
+        If DBC, settings and calibration do not match.
     """
 
     def __init__(
@@ -73,19 +73,19 @@ class CanSource:
 
     @property
     def refused_frames(self) -> Mapping[str, int]:
-        """Frames since the start that were not used, by reason."""
+        """Number of refused frames since the start, by reason."""
         return {reason.value: n for reason, n in self._assembler.refused.items() if n}
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the bus; leaving the context closes it.
+        """Open the bus; close it on exit of the context.
 
         Raises
         ------
         LinkError
-            If the bus is not there, goes bus-off or error-passive, or brings no complete samples.
+            If the bus is not available, bus-off or error-passive, or has no complete samples.
         ConfigError
-            If the interface can never work here.
+            If the interface is not supported on this system.
         """
         settings, plan = self._settings, self._plan
         ids = [message.message.frame_id for message in plan.messages.values()]
@@ -113,7 +113,7 @@ class CanSource:
             await asyncio.sleep(0)
 
     async def _next_blocks(self, reader: FrameReader) -> list[SampleBlock]:
-        """Blocks that the next frames complete; those that are held, if no samples follow."""
+        """Return the blocks that the next frames complete; held blocks too if no samples follow."""
         looked_s = self._clock.monotonic_s()
         look_s = _PAUSE_S if self._delivery.holds_whole_cells else _LOOK_S
         batch = await reader.next_batch(min(look_s, self._stale_after_s - self._silent_s))
@@ -129,7 +129,7 @@ class CanSource:
             if self._assembler.trouble:
                 raw_blocks = []
             blocks = self._delivery.take_together(raw_blocks, arrived)
-        # a process that stood still has not listened for all that time
+        # a suspended process was not listening; its suspension is no silence of the bus
         passed_s = min(self._clock.monotonic_s() - looked_s, 2 * _LOOK_S)
         has_come = self._assembler.n_complete > n_complete and not self._assembler.trouble
         self._silent_s = 0.0 if raw_blocks or has_come else self._silent_s + passed_s
@@ -140,7 +140,7 @@ class CanSource:
         return blocks
 
     def _require_fresh(self, silent_s: float, doubtful_s: float) -> None:
-        """Give up a bus that brings no samples, or only samples that the clock contradicts."""
+        """Raise LinkError for a bus without samples, or with samples that the clock contradicts."""
         is_doubtful = doubtful_s >= self._stale_after_s + _MAX_DOUBT_S
         if silent_s >= self._stale_after_s or is_doubtful:
             refused = ", ".join(f"{reason} {n}" for reason, n in self.refused_frames.items())

@@ -1,1 +1,1 @@
-"""Modbus devices as sample sources; nothing here can write."""
+"""Sample sources for Modbus devices; read requests only, registers are never written."""

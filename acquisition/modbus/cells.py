@@ -1,4 +1,4 @@
-"""`Cell`: address, type and byte order of one number in a device."""
+"""`Cell`: address, type and byte order of one number in the registers of a Modbus device."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -9,7 +9,7 @@ BITS_PER_REGISTER = 16
 
 
 class NumberType(StrEnum):
-    """Type of a number."""
+    """Data type of a number in registers."""
 
     INT16 = "int16"
     UINT16 = "uint16"
@@ -29,7 +29,7 @@ DTYPES = {
     NumberType.FLOAT64: ">f8",
     NumberType.BIT: ">u2",
 }
-"""As numpy reads them once their bytes are in the order ABCD."""
+"""numpy dtype of each number type, for bytes in the order ABCD (big-endian)."""
 
 N_BYTES = {type_: int(name[-1]) for type_, name in DTYPES.items()}
 FLOATS = (NumberType.FLOAT32, NumberType.FLOAT64)
@@ -37,10 +37,10 @@ INTEGERS = (NumberType.INT16, NumberType.UINT16, NumberType.INT32, NumberType.UI
 
 
 def reads_as(found: float, type_: NumberType, number: float) -> bool:
-    """Whether a number that was read is the one in a manual.
+    """Whether a number read from the device equals a number from its manual.
 
-    Integers are compared by their bits, so that 0x8000 is -32768; a number in the manual is
-    rounded to float32 before it is compared with one.
+    Integers are compared by their bits: 0x8000 equals -32768. For float32, the number from the
+    manual is rounded to float32 before the comparison.
     """
     if type_ in INTEGERS:
         return number % 1 == 0 and (int(found) - int(number)) % (1 << 8 * N_BYTES[type_]) == 0
@@ -51,10 +51,10 @@ def reads_as(found: float, type_: NumberType, number: float) -> bool:
 
 
 class ByteOrder(StrEnum):
-    """Order in which four bytes come; A is the most significant.
+    """Byte order of a four-byte number in two registers; A is the most significant byte.
 
-    The order of the words and the order of the bytes in each word may each be reversed. A single
-    register has only the second; of four registers all words are reversed.
+    The order of the words and the order of the bytes in each word can be reversed independently.
+    A single register has only a byte order. In a float64, the order of all four words is reversed.
     """
 
     ABCD = "ABCD"
@@ -64,7 +64,7 @@ class ByteOrder(StrEnum):
 
     @property
     def low_word_first(self) -> bool:
-        """Whether the first register is the least significant."""
+        """Whether the first register holds the least significant word."""
         return self in (ByteOrder.CDAB, ByteOrder.DCBA)
 
     @property
@@ -80,16 +80,16 @@ class ByteOrder(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class Cell:
-    """One number in a device.
+    """Location and type of one number in the registers, coils or inputs of a device.
 
     Parameters
     ----------
     address
-        As the manual writes it.
+        Address as printed in the manual, counted from `RegisterMap.base`.
     function
         1 (coils) or 2 (discrete inputs) for single bits, 3 (holding) or 4 (input registers).
     bit
-        Of a register, 0 the least significant; for type "bit" read by function 3 or 4.
+        Bit number in a register, 0 = least significant; for type "bit" read by function 3 or 4.
     """
 
     address: int
@@ -100,13 +100,13 @@ class Cell:
 
     @property
     def n_places(self) -> int:
-        """Addresses that it takes: registers, or one bit of functions 1 and 2."""
+        """Number of addresses of the cell: registers, or one bit for functions 1 and 2."""
         return N_BYTES[self.type] // 2
 
     def start(self, base: int) -> int:
-        """Address on the wire, counted from 0."""
+        """Return the first address of the cell on the wire, counted from 0."""
         return self.address - base
 
     def stop(self, base: int) -> int:
-        """First address on the wire after it."""
+        """Return the address after the last address of the cell on the wire."""
         return self.start(base) + self.n_places

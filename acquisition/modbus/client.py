@@ -1,6 +1,6 @@
-"""`ModbusClient`: reads a Modbus device over TCP or RTU; nothing can be written.
+"""`ModbusClient`: read-only client of a Modbus device over TCP or RTU.
 
-pymodbus serves the simulated devices; why it does not read real ones is in decision record 31.
+pymodbus serves only the simulated devices; decision record 31 explains why.
 """
 
 import asyncio
@@ -35,33 +35,33 @@ from acquisition.modbus.requests import (
 from acquisition.modbus.transport import LinkSettings, SerialTransport, TcpTransport
 
 _N_TRANSACTIONS = 65_000
-"""Ids are 1 to this; some devices answer to 0 as to any."""
+"""Largest transaction id; id 0 is not used, because some devices treat it as a wildcard."""
 
 _MAX_IDENTIFICATION_REPLIES = 8
 _N_IDENTITY_TRIES = 2
-"""A reply that was changed on the way is not another device."""
+"""Identity reads before a mismatch is an error; one reply may be corrupted in transmission."""
 
 _MAX_SILENCE_TRIES = 5
 _MAX_CLOSED_BURSTS = 2
 _BUSY_WAIT_S = 0.05
-"""Wait before a request to a busy device is repeated: some replies, less than a poll period."""
+"""Delay before a request to a busy device is repeated; shorter than a poll period."""
 
 
 class ModbusClient:
-    """One device, and the connection to it; a closed client can be opened again.
+    """Client of one Modbus device with its connection; a closed client can be opened again.
 
-    The connection is closed after a wrong or a missing reply, so that a late reply is never taken
-    for the next one. Transactions are numbered on from one connection to the next, because a
-    gateway may pass a late reply on to the next connection. A serial line stays the same line when
-    it is opened again: all bytes are discarded until the line has been silent for `timeout_s`. If
-    connections are not kept, each request opens and closes one of its own.
+    The connection is closed after a wrong or missing reply, so that a late reply is never mistaken
+    for the reply to the next request. Transaction ids continue across connections, because a
+    gateway may forward a late reply to the next connection. When a serial line is reopened, all
+    received bytes are discarded until the line has been silent for `timeout_s`. If connections
+    are not kept, each request opens and closes its own connection.
 
     Attributes
     ----------
     requests_in_flight
-        Most requests that are sent before the first is answered: as the settings say; one as soon
-        as the device has not answered several in order, or has closed the connection on them twice
-        running.
+        Maximum number of requests sent before the first reply. Starts at the configured number; 1
+        after the device has not answered several requests in order, or has closed the connection
+        twice in succession while several requests were in flight.
     """
 
     def __init__(self, settings: LinkSettings) -> None:
@@ -74,17 +74,17 @@ class ModbusClient:
 
     @property
     def where(self) -> str:
-        """Host and port, or path of the serial port."""
+        """Host and port, or path of the serial port; for messages."""
         return str(self._settings.transport)
 
     @property
     def is_kept(self) -> bool:
-        """Whether one connection serves all requests, so that all go to the same device."""
+        """Whether one connection is used for all requests, so that all reach the same device."""
         return self._settings.keeps_connection
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
-        """Open the connection, and close it when the context is left.
+        """Open the connection; close it on exit of the context.
 
         Raises
         ------
@@ -98,15 +98,15 @@ class ModbusClient:
             self.close()
 
     async def open(self) -> None:
-        """Connect, on a serial line wait until it is silent, and check the device's identity.
+        """Connect and check the device's identity; on a serial line, first wait for silence.
 
         Raises
         ------
         LinkError
             If the connection is not accepted in time, the port does not exist, the line is never
-            silent, or the device does not give its identity; the message says why.
+            silent, or the device does not report its identity; the message states the cause.
         ConfigError
-            If there can be no such host, or the device is not the expected one.
+            If the host name is invalid, or the device's identity is not the configured one.
         """
         await self._connect()
         if not self.is_kept:
@@ -114,12 +114,12 @@ class ModbusClient:
         await self.require_device()
 
     async def require_device(self) -> None:
-        """Refuse another device than the expected one, if the settings name one.
+        """Check that the device has the configured identity; no check without an identity.
 
         Raises
         ------
         ConfigError
-            Naming what was found and what was expected.
+            If the identity differs; the message contains the found and the expected identity.
         LinkError
             As `read`.
         """
@@ -133,51 +133,51 @@ class ModbusClient:
         raise ConfigError(f"{self.where}: another device answers: {misfit}")
 
     def close(self) -> None:
-        """Close the connection; again is harmless."""
+        """Close the connection; no effect on a closed connection."""
         self._protocol.close()
 
     async def read(self, address: int, count: int, function: int = READ_HOLDING_REGISTERS) -> bytes:
-        """Read one `Span`; errors as those of `read_spans`, ConfigError too if it cannot exist."""
+        """Read one span; errors as `read_spans`, and ConfigError if the span is invalid."""
         return await self.read_spans([Span(address, count, function)])
 
     async def read_spans(self, spans: Sequence[Span]) -> bytes:
-        """Read spans in as many requests as it takes, `requests_in_flight` at a time.
+        """Read spans; a long span takes several requests, `requests_in_flight` at a time.
 
         Returns
         -------
         bytes
-            Contents of the spans, one after another: registers as big-endian words, bits eight a
-            byte, the first one lowest.
+            Concatenated contents of the spans: registers as big-endian words, bits packed eight to
+            a byte, the first bit least significant.
 
         Raises
         ------
         LinkError
-            If the device does not answer, answers that it cannot now, or a reply is not the one to
+            If the device does not answer, reports a temporary failure, or a reply does not match
             its request.
         ConfigError
-            If the device answers that it has no such registers or function.
+            If the device reports an illegal function, address or value.
         """
         requests = [request for span in spans for request in span_requests(span)]
         return b"".join([reply[2:] for reply in await self._replies(requests)])
 
     async def read_fifos(self, addresses: Sequence[int]) -> list[bytes]:
-        """Read queues of 0 to 31 registers, big-endian words; one for each address.
+        """Read FIFO queues of 0 to 31 registers, as big-endian words; one queue for each address.
 
         Raises
         ------
         LinkError, ConfigError
-            As `read_spans`; a LinkError too if the device claims more than 31.
+            As `read_spans`; also LinkError if the device states more than 31 registers.
         """
         replies = await self._replies([fifo_request(address) for address in addresses])
         return [fifo_registers(reply) for reply in replies]
 
     async def identify(self) -> Identification:
-        """Read vendor, product code and revision, by function 43/14.
+        """Read vendor, product code and revision by function 43/14.
 
         Raises
         ------
         LinkError, ConfigError
-            As `read_spans`; a LinkError too if the identification has no end.
+            As `read_spans`; also LinkError if the identification takes too many replies.
         """
         objects: dict[int, bytes] = {}
         following: int | None = 0
@@ -197,7 +197,7 @@ class ModbusClient:
         return identity.misfit(found)
 
     async def _replies(self, requests: Sequence[ReadRequest]) -> list[memoryview]:
-        """Replies to requests, from their function codes on."""
+        """Return the replies to requests, each from its function code on."""
         replies: list[memoryview] = []
         while len(replies) < len(requests):
             burst = requests[len(replies) : len(replies) + self.requests_in_flight]
@@ -207,7 +207,7 @@ class ModbusClient:
         return replies
 
     async def _retry_busy(self, request: ReadRequest, reply: memoryview) -> memoryview:
-        """Repeat a request to a busy device, for as long as a reply may take."""
+        """Repeat a request to a busy device for at most `timeout_s`."""
         for _ in range(int(self._settings.timeout_s / _BUSY_WAIT_S)):
             if reply[1] != BUSY:
                 break
@@ -218,7 +218,7 @@ class ModbusClient:
         raise exception_error(self.where, reply[1], request)
 
     async def _exchange(self, burst: Sequence[ReadRequest]) -> list[memoryview]:
-        """Send requests once, on a connection of its own if each is to have one."""
+        """Send requests once; open a new connection first if connections are not kept."""
         unit, transport = self._settings.device_id, self._settings.transport
         try:
             if not self.is_kept:
@@ -244,7 +244,7 @@ class ModbusClient:
         return replies
 
     def _shows_too_many(self, error: LinkError | FrameError) -> bool:
-        """Whether the device cannot take several requests, by the error that they ended with."""
+        """Whether an error indicates that the device cannot handle several requests in flight."""
         if isinstance(error, SilenceError | FrameError):
             return True
         self._n_closed_bursts += 1
@@ -261,10 +261,10 @@ class ModbusClient:
             await self._connect_to(transport)
 
     async def _connect_to(self, transport: TcpTransport) -> None:
-        """Connect to the first address of the device that answers."""
+        """Connect to the first of the host's IP addresses that accepts the connection."""
         try:
             transport.host.encode("idna")
-        except ValueError as error:  # no resolver takes such a host name
+        except ValueError as error:  # a host name that no resolver accepts
             raise ConfigError(f"{self.where}: {error}") from error
         if self._addresses is None:
             self._addresses = KnownAddresses(transport.host, transport.port)
@@ -290,7 +290,7 @@ class ModbusClient:
         raise LinkError(f"{self.where}: {why}")
 
     async def _await_silence(self) -> None:
-        """Discard what still comes, until nothing has come for the time a reply may take."""
+        """Discard received bytes until the line has been silent for `timeout_s`."""
         protocol, timeout_s = self._protocol, self._settings.timeout_s
         try:
             for _ in range(_MAX_SILENCE_TRIES):

@@ -1,4 +1,4 @@
-"""`ReplyProtocol`: requests in flight on one connection; `SerialLine`: a port as a connection."""
+"""`ReplyProtocol`: requests in flight on a connection; `SerialLine`: transport of a serial port."""
 
 import asyncio
 import errno
@@ -19,7 +19,7 @@ _RECEIVE_BYTES = 1024
 
 
 def reason_of(error: OSError | EOFError) -> str:
-    """Why there is no connection, without what event loop and pyserial wrap around it."""
+    """Return the cause of a failed connection, without the text of event loop and pyserial."""
     code = error.errno if isinstance(error, OSError) else None
     if code == errno.EWOULDBLOCK:
         return "another program has the port"
@@ -27,16 +27,16 @@ def reason_of(error: OSError | EOFError) -> str:
 
 
 class SilenceError(LinkError):
-    """A device did not answer in time."""
+    """The device did not reply within the timeout."""
 
 
 class ReplyProtocol(asyncio.Protocol):
-    """One connection to a device: requests, and the replies to them in the same order.
+    """Connection to a device that matches replies to requests in the order of the requests.
 
     Attributes
     ----------
     unsolicited
-        Description of bytes that came while nothing was in flight; empty if none did.
+        Description of bytes received while no request was in flight; empty if there were none.
     """
 
     def __init__(self, transport: Transport) -> None:
@@ -53,24 +53,24 @@ class ReplyProtocol(asyncio.Protocol):
 
     @property
     def is_open(self) -> bool:
-        """Whether there is a connection."""
+        """Whether the connection is open."""
         return self._transport is not None and not self._transport.is_closing()
 
     def close(self) -> None:
-        """Close the connection; again is harmless."""
+        """Close the connection; no effect on a closed connection."""
         if self._transport is not None:
             self._transport.close()
 
     async def exchange(self, burst: Sequence[PendingRequest], timeout_s: float) -> list[memoryview]:
-        """Send requests by one write; return the replies from their function codes on.
+        """Send requests in one write; return the replies, each from its function code on.
 
         Raises
         ------
         LinkError
-            If the connection is closed, or the device does not answer each request in time,
-            counted from the reply before.
+            If the connection is closed, or a reply takes longer than `timeout_s`, counted from the
+            previous reply.
         FrameError
-            If what comes is not the next reply, or came before any request.
+            If the received bytes are not the next reply, or arrived before any request.
         """
         transport = self._transport
         if transport is None or transport.is_closing():
@@ -90,16 +90,16 @@ class ReplyProtocol(asyncio.Protocol):
             self._done = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin."""
-        # uvloop's transports are asyncio.Transports by their methods, but not by their class
+        """Store the transport of the new connection."""
+        # uvloop's transports have the methods of asyncio.Transport, but are no subclasses
         self._transport = transport  # type: ignore[assignment]
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """End a wait for replies at once."""
+        """Fail a pending exchange at once with a LinkError."""
         self._fail(LinkError(f"{self._where}: {CLOSED}" + (f": {exc}" if exc else "")))
 
     def data_received(self, data: bytes) -> None:
-        """Judge what came as replies to what is in flight."""
+        """Parse received bytes as replies to the requests in flight."""
         if not self._in_flight:
             self.unsolicited = f"{len(data)} bytes came unsolicited: {data[:_SHOWN_BYTES].hex()}"
             return
@@ -111,7 +111,7 @@ class ReplyProtocol(asyncio.Protocol):
             self._fail(FrameError(f"{self._where}: {fault}: {shown}"))
 
     def _take(self, received: memoryview) -> int:
-        """Take whole replies; return how many bytes they fill."""
+        """Store complete replies; return the number of bytes that they occupy."""
         at = 0
         while self._in_flight:
             found = self._framing.take(received[at:], self._in_flight[0])
@@ -132,7 +132,7 @@ class ReplyProtocol(asyncio.Protocol):
         self._watch = loop.call_later(timeout_s, self._look_at_time, timeout_s, len(self._replies))
 
     def _look_at_time(self, timeout_s: float, n_seen: int) -> None:
-        """Give up if no reply has come since the last look."""
+        """Fail the exchange if no reply has arrived since the timer was started."""
         if len(self._replies) > n_seen:
             self._watch_for(timeout_s)
             return
@@ -148,7 +148,7 @@ class ReplyProtocol(asyncio.Protocol):
 
 
 class SerialLine(asyncio.Transport):
-    """A serial port as an asyncio transport: what arrives goes to a protocol."""
+    """asyncio transport of a serial port; received bytes are passed to a protocol."""
 
     def __init__(self, port: serial.Serial, protocol: asyncio.Protocol) -> None:
         super().__init__()
@@ -158,24 +158,24 @@ class SerialLine(asyncio.Transport):
         protocol.connection_made(self)
 
     def is_closing(self) -> bool:
-        """Whether it is closed."""
+        """Whether the port is closed."""
         return not self._port.is_open
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
-        """Send a request; a port that does not take it at once is lost."""
+        """Write a request; the connection is lost if the port does not accept it at once."""
         try:
             self._port.write(data)
         except OSError as error:
             self._lose(error)
 
     def close(self) -> None:
-        """Give the port back; again is harmless."""
+        """Close the port; no effect on a closed port."""
         self._lose(None)
 
     def _receive(self) -> None:
         try:
             data = self._port.read(_RECEIVE_BYTES)
-        except (OSError, TypeError) as error:  # pyserial subtracts from None where a line is gone
+        except (OSError, TypeError) as error:  # pyserial raises TypeError if the port has vanished
             self._lose(OSError(str(error)))
             return
         if data:
@@ -189,22 +189,22 @@ class SerialLine(asyncio.Transport):
 
 
 def open_line(settings: SerialTransport, protocol: asyncio.Protocol) -> SerialLine:
-    """Open a port for this program alone.
+    """Open a serial port for exclusive use.
 
     Raises
     ------
     LinkError
-        If there is no such port, or another program has it.
+        If the port does not exist, or another program has opened it.
     ConfigError
-        If the port refuses its settings.
+        If the port rejects the settings.
     """
     port = serial.Serial()
     port.port, port.baudrate, port.stopbits = settings.device, settings.baudrate, settings.stop_bits
     port.parity, port.exclusive, port.write_timeout = settings.parity[0].upper(), True, 0
     try:
         port.open()
-        port.timeout = 0  # configures it again: a port reports an ignored setting only then
-    except termios.error as error:  # of a port that exists but cannot be set up so
+        port.timeout = 0  # configures the port again: only then an ignored setting is reported
+    except termios.error as error:  # the port exists but rejects the settings
         port.close()
         kind = ConfigError if error.args[0] == errno.EINVAL else LinkError
         raise kind(f"{settings}: the port refuses its settings: {error.args[-1]}") from None

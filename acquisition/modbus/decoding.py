@@ -1,4 +1,4 @@
-"""Decoding: contents of all spans to the numbers of cells, and to the values of a map."""
+"""Decoding of the contents of all spans to the numbers of cells and the values of a map."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ from core.arrays import FloatArray
 
 
 class ValueState(IntEnum):
-    """Whether a device gives a value; ordered from best to worst."""
+    """State of a value as reported by a device; ordered from best to worst."""
 
     OK = 0
     CLIPPED = 1
@@ -25,18 +25,18 @@ class ValueState(IntEnum):
 
 @dataclass(frozen=True)
 class MapReading:
-    """Values of a map from one poll.
+    """Values of a register map from one poll.
 
     Parameters
     ----------
     values
-        (n_values,) as the device gives them, whatever their state.
+        (n_values,) values of the map, regardless of their state.
     states
-        One for each value.
+        State of each value.
     time_ns
-        UTC by the device's clock; None without a clock, or if there is no such time.
+        Device time, UTC ns since 1970; None if the map has no time or the time is invalid.
     alive
-        Bytes that change from time to time while the device lives.
+        Bytes for the freshness check: the heartbeat, else the time, else all contents.
     """
 
     values: FloatArray
@@ -46,7 +46,7 @@ class MapReading:
 
 
 class CellDecoder:
-    """Numbers of cells from the contents of all spans of a plan."""
+    """Decoder of the numbers of cells from the contents of all spans of a read plan."""
 
     def __init__(self, cells: Sequence[Cell], plan: ReadPlan) -> None:
         self._places: dict[Cell, tuple[tuple[int, ...], np.dtype[np.generic], int | None]] = {}
@@ -59,7 +59,7 @@ class CellDecoder:
             self._places[cell] = tuple(positions), np.dtype(DTYPES[cell.type]), cell.bit
 
     def numbers(self, content: bytes) -> Mapping[Cell, float]:
-        """Numbers of the cells, before any scale."""
+        """Return the raw number of each cell, before scaling."""
         numbers = {}
         for cell, (positions, dtype, bit) in self._places.items():
             number = np.frombuffer(bytes([content[n] for n in positions]), dtype)[0].item()
@@ -68,12 +68,12 @@ class CellDecoder:
 
 
 class MapDecoder:
-    """Values of a map from the contents of all spans of its plan.
+    """Decoder of the values of a register map from the contents of all spans of its read plan.
 
     Raises
     ------
     MapError
-        If the map cannot be read as it demands.
+        If its blocks and scale registers cannot be read as the map requires.
     """
 
     def __init__(self, registers: RegisterMap) -> None:
@@ -88,7 +88,7 @@ class MapDecoder:
         Parameters
         ----------
         content
-            Of all spans, one after the other.
+            Concatenated contents of all spans of the plan.
         """
         numbers = self._cells.numbers(content)
         times = [numbers[cell] for cell in self._time_cells]
@@ -110,7 +110,7 @@ class MapDecoder:
 
 
 def _value(value: MapValue, numbers: Mapping[Cell, float]) -> float:
-    """Value in the unit of its channel; not a number where its range is empty."""
+    """Return a value in the unit of its channel; NaN if its scale or its range is zero."""
     scaled = numbers[value.cell]
     if value.scale_register is not None:
         register = numbers[value.scale_register.cell]
@@ -126,7 +126,7 @@ def _value(value: MapValue, numbers: Mapping[Cell, float]) -> float:
 
 
 def _state(value: MapValue, numbers: Mapping[Cell, float], found: float) -> ValueState:
-    """The worst of what range, invalid numbers and status registers say of a value."""
+    """Return the worst state of a value by its range, its invalid numbers and its flags."""
     raw, span = numbers[value.cell], value.full_scale
     states = [flag_state(flag, int(numbers[flag.cell])) for flag in value.flags]
     if span is not None and not span.raw_minimum < raw < span.raw_maximum:
@@ -138,7 +138,7 @@ def _state(value: MapValue, numbers: Mapping[Cell, float], found: float) -> Valu
 
 
 def flag_state(flag: FlagCheck, word: int) -> ValueState:
-    """State of a value by its status register."""
+    """Return the state of a value by the content of its status register."""
     masked = word & flag.mask
     if flag.set_means is Meaning.BAD:
         return ValueState.FLAGGED if masked else ValueState.OK
@@ -151,7 +151,7 @@ def flag_state(flag: FlagCheck, word: int) -> ValueState:
 
 
 def byte_permutation(type_: NumberType, order: ByteOrder) -> list[int]:
-    """Positions of a number's bytes, most significant first, counted from its first byte."""
+    """Return the byte positions of a number, most significant first; 0 is its first byte."""
     n_words = N_BYTES[type_] // 2
     words = range(n_words)
     ordered = reversed(words) if order.low_word_first else words

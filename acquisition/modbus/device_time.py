@@ -1,4 +1,4 @@
-"""The time at which a device measured, by its own clock."""
+"""Time of measurement in the registers of a device, by the device's own clock."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -13,19 +13,19 @@ CALENDAR_FIELDS = ("year", "month", "day", "hour", "minute", "second")
 _CENTURY = 2000
 
 _LATEST_S = 2.0**33
-"""In the year 2242: nanoseconds since 1970 have 63 bits, and what lies beyond is no time."""
+"""Upper limit (year 2242), s since 1970; int64 nanoseconds since 1970 end in 2262."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EpochTime:
-    """Seconds since 1970, and perhaps parts of a second.
+    """Device time as seconds since 1970, with an optional cell for the fraction of a second.
 
     Parameters
     ----------
     parts
-        Where these stand.
+        Cell of the fraction; None if the device has whole seconds only.
     parts_per_s
-        Example: 1e6 for microseconds.
+        Units of the fraction per second; example: 1e6 for microseconds.
     """
 
     seconds: Cell
@@ -34,17 +34,17 @@ class EpochTime:
 
     @property
     def resolution_s(self) -> float:
-        """Least difference of two times."""
+        """Resolution of the device time, s."""
         return 1.0 if self.parts is None else 1.0 / self.parts_per_s
 
     def cells(self) -> Iterator[Cell]:
-        """All that has to be read."""
+        """Yield the cells that hold the time."""
         yield self.seconds
         if self.parts is not None:
             yield self.parts
 
     def time_ns(self, numbers: Sequence[float]) -> int | None:
-        """UTC, from the numbers of its cells; None if there is no such time."""
+        """Return UTC ns since 1970 from the numbers of the cells; None for an invalid time."""
         if not all(map(math.isfinite, numbers)) or numbers[0] <= 0.0:
             return None
         parts = numbers[1] / self.parts_per_s if self.parts is not None else 0.0
@@ -55,17 +55,17 @@ class EpochTime:
 
 @dataclass(frozen=True, kw_only=True)
 class CalendarTime:
-    """Six registers with the parts of a date and time, in any order.
+    """Device time as date and time of day in six consecutive registers.
 
     Parameters
     ----------
     first
-        The first of the six.
+        Cell of the first of the six registers.
     fields
-        "year", "month", "day", "hour", "minute" and "second" as they follow each other. A year
-        below 100 is of this century.
+        "year", "month", "day", "hour", "minute" and "second" in the order of the registers. A
+        year below 100 belongs to the current century (2000 to 2099).
     utc_offset_s
-        What the device's clock is ahead of UTC.
+        Device clock minus UTC, s.
     """
 
     first: Cell
@@ -74,11 +74,11 @@ class CalendarTime:
 
     @property
     def resolution_s(self) -> float:
-        """Least difference of two times."""
+        """Resolution of the device time, s."""
         return 1.0
 
     def cells(self) -> Iterator[Cell]:
-        """All that has to be read."""
+        """Yield the cells that hold the time."""
         for n in range(len(self.fields)):
             yield Cell(
                 address=self.first.address + n,
@@ -87,7 +87,7 @@ class CalendarTime:
             )
 
     def time_ns(self, numbers: Sequence[float]) -> int | None:
-        """UTC, from the numbers of its cells; None if there is no such time."""
+        """Return UTC ns since 1970 from the numbers of the cells; None for an invalid time."""
         part = dict(zip(self.fields, map(int, numbers), strict=True))
         part["year"] += _CENTURY if part["year"] < 100 else 0
         try:

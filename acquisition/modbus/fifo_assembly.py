@@ -1,4 +1,4 @@
-"""From readings of queues to samples of all channels on one sample axis."""
+"""Assembly of FIFO queue readings into samples of all channels on one sample axis."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -13,21 +13,21 @@ from core.samples.axis import ClockTolerance, Epochs, SampleAxis, signed_distanc
 from core.units import ns_from_s
 
 WRAP = 1 << 16
-"""Samples after which the counter of a queue begins again."""
+"""Samples after which the 16-bit counter of a queue wraps to 0."""
 
 _TOLERANCE = ClockTolerance(step_s=0.5)
-"""Half a second: how far a device may be ahead of the host's clock, or hold samples back."""
+"""Largest difference between a device's sample count and the host's clock: half a second."""
 
 _MAX_REPEATED = 31
-"""Samples that a queue shows again if reading does not remove them."""
+"""Maximum number of repeated samples in a queue from which reading does not remove them."""
 
 _MAX_DRIFT = 1e-3
-"""Share by which a device that does not count may sample too slowly."""
+"""Relative error by which the rate of a device without counter may be too low."""
 
 _MAX_EPOCHS = 2
 
 _MAX_APART = 1024
-"""Samples by which the queues of two channels may differ, since they are read one by one."""
+"""Samples by which the queues of two channels may differ; they are read one after another."""
 
 
 @dataclass(frozen=True)
@@ -39,16 +39,16 @@ class SamplePlace:
 
 
 class CountedSamples:
-    """Unwraps a 16-bit counter with the help of the host's clock, across connections.
+    """Unwrapper of a 16-bit sample counter by the host's clock; continues across connections.
 
-    A jump that the time since the last sample explains is a gap, exact however often the counter
-    has wrapped. One that it does not explain means that the device counts anew, or that it stopped
-    and its counter with it: a new epoch.
+    A counter jump that matches the time since the last sample is a gap; its length is exact even
+    if the counter has wrapped several times. Any other jump starts a new epoch: the device has
+    restarted its counter, or has stopped sampling for a while.
 
     Parameters
     ----------
     removes
-        If reading removes nothing, samples come again; their counter identifies them.
+        Whether reading removes samples from the queue; if not, repeated samples are dropped.
     """
 
     def __init__(self, rate_hz: float, epochs: Epochs, *, removes: bool) -> None:
@@ -57,19 +57,19 @@ class CountedSamples:
         self._drained_ns = 0
 
     def note_drained(self, now_s: float) -> None:
-        """Note that the device has no more samples: those that come next are taken from now on."""
+        """Note that the queue is empty: all later samples are measured from now on."""
         self._drained_ns = ns_from_s(now_s)
 
     def is_ambiguous(self, now_s: float) -> bool:
-        """Whether so much time has passed that old samples could pass for new ones.
+        """Whether old samples could be mistaken for new ones after half a counter period.
 
-        What is in the queue must then be thrown away first; what comes after it is fresh.
+        The content of the queue must then be discarded before the counter is used again.
         """
         now_ns = ns_from_s(now_s)
         return self._axis.index is not None and not self._is_within_half_a_wrap(now_ns)
 
     def place(self, counter: int, now_s: float) -> SamplePlace | None:
-        """Return where the next sample belongs; None if it came before."""
+        """Return epoch and index of the next sample; None if the sample is repeated."""
         axis, now_ns = self._axis, ns_from_s(now_s)
         if axis.index is None:
             return self._put(counter, now_ns)
@@ -93,15 +93,15 @@ class CountedSamples:
 
 
 class UncountedSamples:
-    """Counts for a device that does not, and begins a new epoch when samples were lost.
+    """Sample counter in the host for a device without one; a loss starts a new epoch.
 
-    A loss shows by the host's clock alone: how many samples are missing is not known, and nothing
-    is joined across it. A loss shorter than the tolerance cannot be seen.
+    Losses are detected by the host's clock alone: the number of missing samples is unknown, so no
+    samples are joined across a loss. A loss shorter than the tolerance is not detected.
 
     Parameters
     ----------
     tolerance_s
-        Above the jitter of polls and replies.
+        Shortest detectable loss, s; longer than the jitter of polls and replies.
     """
 
     def __init__(self, rate_hz: float, epochs: Epochs, *, tolerance_s: float) -> None:
@@ -117,18 +117,18 @@ class UncountedSamples:
         self._delay = LeastDelay(_MAX_DRIFT)
 
     def place(self, n_samples: int) -> SamplePlace:
-        """Return where the first of the next samples belongs."""
+        """Return epoch and index of the first of the next samples."""
         first, self._next = self._next, self._next + n_samples
         return SamplePlace(self._epochs.number, first)
 
     def has_lost(self, now_s: float) -> bool:
-        """Whether samples are missing, now that the device has no more to give."""
+        """Whether samples have been lost; to be called when the queue is empty."""
         return self._delay.late_s(now_s - self._next / self._rate_hz, now_s) > self._tolerance_s
 
 
 @dataclass(frozen=True)
 class PlacedSamples:
-    """Consecutive samples of all channels: (n_channels, n_samples) counts."""
+    """Consecutive samples of all channels with epoch and index; counts (n_channels, n_samples)."""
 
     epoch: int
     first_index: int
@@ -136,19 +136,19 @@ class PlacedSamples:
 
     @property
     def stop_index(self) -> int:
-        """Index of the first sample after them."""
+        """Index after the last sample."""
         return self.first_index + int(self.counts.shape[1])
 
 
 def place_records(
     piece: FifoPiece, samples: CountedSamples | UncountedSamples, now_s: float
 ) -> list[PlacedSamples]:
-    """Place the records of an interleaved queue; those that came before are left out.
+    """Return the records of an interleaved queue with epoch and index, without repeated records.
 
     Raises
     ------
     LinkError
-        If the counter does not count: no device restarts twice within a reading.
+        If the counter restarts more than once in a reading: it is not a sample counter.
     """
     if isinstance(samples, UncountedSamples):
         place = samples.place(piece.n_samples)
@@ -172,9 +172,9 @@ def _joined(places: Iterable[SamplePlace | None], counts: CountArray) -> Iterato
 
 
 class ChannelAssembly:
-    """Puts the queues of single channels side by side, by the counter of the first of them.
+    """Alignment of the queues of single channels by the counter of the first channel.
 
-    Samples wait until all channels have them; what one channel has lost is a gap of all.
+    A sample is held until it has arrived in all channels; a loss in one channel is a gap in all.
     """
 
     def __init__(self, n_channels: int, samples: CountedSamples) -> None:
@@ -184,17 +184,17 @@ class ChannelAssembly:
         self._waiting: list[dict[int, int]] = [{} for _ in range(n_channels)]
 
     def forget(self) -> None:
-        """Drop what waits, as on a new connection."""
+        """Drop the held samples, for example on a new connection."""
         for waiting in self._waiting:
             waiting.clear()
 
     def place(self, pieces: list[FifoPiece], now_s: float) -> list[PlacedSamples]:
-        """Place one reading of each queue, in the order of the channels.
+        """Add one reading of each queue, in the order of the channels; return the aligned samples.
 
         Raises
         ------
         LinkError
-            If the channels count differently, as when the device restarts between two of them.
+            If the counters of two channels differ too much, as after a restart between the reads.
         """
         first, *others = pieces
         for sample in place_records(first, self._samples, now_s):
@@ -221,9 +221,9 @@ class ChannelAssembly:
         self._waiting[channel].update((i, count) for i, count in fresh if i >= self._next)
 
     def _common(self) -> list[PlacedSamples]:
-        """What all channels have, and nothing older than that ever again.
+        """Return the samples that all channels have; drop them and all older samples.
 
-        Without any, what waits for a channel that gives nothing is bounded.
+        If a channel delivers no samples, the held samples of the others are limited in number.
         """
         shared = sorted(set.intersection(*map(set, self._waiting)))
         counts = np.array(

@@ -1,4 +1,4 @@
-"""`FifoLayout`: how samples lie in a device's queues, as function 0x18 reads them."""
+"""`FifoLayout`: arrangement of samples in a device's FIFO queues (function 0x18)."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,7 +12,7 @@ from core.arrays import CountArray
 
 
 class FifoKind(StrEnum):
-    """One queue for all channels, or one for each."""
+    """Kind of queue: one interleaved queue for all channels, or one queue per channel."""
 
     INTERLEAVED = "interleaved"
     PER_CHANNEL = "per_channel"
@@ -20,14 +20,14 @@ class FifoKind(StrEnum):
 
 @dataclass(frozen=True)
 class FifoPiece:
-    """Consecutive or single records of a queue.
+    """Decoded samples from one reading of a queue.
 
     Parameters
     ----------
     counters
-        (n_samples,) of each sample, modulo 65536; None if the device does not count.
+        (n_samples,) counter of each sample, modulo 65536; None if the device has no counter.
     counts
-        (n_channels, n_samples) int16.
+        (n_channels, n_samples) int16 counts.
     """
 
     counters: npt.NDArray[np.int64] | None
@@ -41,19 +41,19 @@ class FifoPiece:
 
 @dataclass(frozen=True, kw_only=True)
 class FifoLayout:
-    """Addresses of the queues, and the form of their records.
+    """Addresses of the queues and format of their records.
 
-    An interleaved queue holds records: a counter of samples, if the device counts, then one sample
-    of each channel. A queue of one channel holds the counter of its first sample, then samples.
+    A record of an interleaved queue is a sample counter, if the device has one, and one sample of
+    each channel. A queue of one channel holds the counter of its first sample, then samples.
 
     Parameters
     ----------
     addresses
-        Of the queue, or of one queue for each channel; counted from 0 as on the wire.
+        Address of the queue, or of the queue of each channel; counted from 0 as on the wire.
     has_counter
-        Unsigned 16 bit, one more with every sample, wrapping to 0.
+        Whether records carry an unsigned 16-bit counter that increases by 1 per sample.
     removes
-        Whether reading removes the samples from the queue; devices differ.
+        Whether reading removes the samples from the queue; depends on the device.
     """
 
     addresses: tuple[int, ...]
@@ -64,13 +64,13 @@ class FifoLayout:
 
     @property
     def record_registers(self) -> int:
-        """Registers of an interleaved record, or of the shortest useful reading of one channel."""
+        """Registers of an interleaved record, or of one channel's counter and one sample."""
         n_samples = self.n_channels if self.kind is FifoKind.INTERLEAVED else 1
         return n_samples + self.has_counter
 
     @property
     def most_samples(self) -> int:
-        """Most samples per channel in one reading."""
+        """Maximum number of samples per channel in one reading."""
         if self.kind is FifoKind.INTERLEAVED:
             return MAX_FIFO_REGISTERS // self.record_registers
         return MAX_FIFO_REGISTERS - 1
@@ -81,7 +81,7 @@ class FifoLayout:
         Raises
         ------
         LinkError
-            If it does not hold whole records.
+            If the reading contains an incomplete record.
         """
         words = np.frombuffer(data, ">u2").astype(np.uint16)
         if self.kind is FifoKind.PER_CHANNEL:

@@ -1,4 +1,4 @@
-"""`FifoSource`: a device whose samples are read from queues, by function 0x18."""
+"""`FifoSource`: sample source that reads FIFO queues of a Modbus device (function 0x18)."""
 
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager
@@ -26,17 +26,17 @@ from core.samples.calibration import UnitCalibration
 
 @dataclass(frozen=True, kw_only=True)
 class FifoSettings(LinkSettings):
-    """Queues behind a Modbus device.
+    """Settings of a Modbus device with FIFO queues.
 
     Parameters
     ----------
     poll_period_s
-        Wait after a reading that has emptied the queue, above 0; the queue must hold much more.
+        Delay after the queue has been emptied, above 0; much shorter than the queue's capacity.
     stale_after_s
-        A device without a new sample, or a queue that never runs empty, for longer than this is
-        not connected.
+        Longest time without a new sample, or without emptying the queue, before the link counts as
+        lost.
     loss_tolerance_s
-        For a device that does not count: a loss shorter than this is indistinguishable from jitter.
+        Shortest detectable loss of a device without counter; shorter losses look like jitter.
     """
 
     poll_period_s: float = 0.005
@@ -45,9 +45,9 @@ class FifoSettings(LinkSettings):
 
 
 class FifoSource:
-    """Samples of one unit from queues; a reading is never repeated, because it may remove samples.
+    """Sample source of one unit from FIFO queues.
 
-    It has no slow values: all those of the calibration are not measured.
+    A read is never repeated, because it may remove samples. All slow values are NaN.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class FifoSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link, as `SampleSource`; LinkError too if the device is faster than the link."""
+        """Open the link, as `SampleSource`; also LinkError if the link is too slow for the rate."""
         async with self._client.connected():
             await self._begin()
             self._freshness.opened(self._clock.monotonic_s())
@@ -82,7 +82,7 @@ class FifoSource:
                 yield blocks
 
     async def _begin(self) -> None:
-        """Discard samples that are no longer distinguishable from new ones."""
+        """Discard old samples in the queue that could be mistaken for new samples."""
         self._channels.forget()
         uncounted = not self._layout.has_counter
         if uncounted and self._connections:
@@ -116,7 +116,7 @@ class FifoSource:
                 continue
             self._counted.note_drained(arrived.steady_s)
             if not self._layout.has_counter and self._uncounted.has_lost(arrived.steady_s):
-                waiting.clear()  # where among these the loss is remains unknown
+                waiting.clear()  # the position of the loss among these samples is unknown
                 self._uncounted.begin()
             for block in self._delivered(waiting, arrived):
                 yield block
@@ -125,9 +125,9 @@ class FifoSource:
             await self._clock.sleep(self._settings.poll_period_s)
 
     def _saved(self, waiting: list[PlacedSamples], arrived: Arrival) -> list[SampleBlock]:
-        """Blocks of the samples before a link was lost: the queue will not give them again.
+        """Return blocks of the samples read before the link was lost; they cannot be read again.
 
-        Without a counter, a loss among them cannot be excluded, and they are dropped.
+        Without a counter, the samples are dropped, because a loss among them cannot be excluded.
         """
         return self._delivered(waiting, arrived) if self._layout.has_counter else []
 
@@ -146,7 +146,7 @@ class FifoSource:
         return place_records(pieces[0], samples, now_s)
 
     def _is_drained(self, pieces: list[FifoPiece]) -> bool:
-        """Whether the queues are empty after this reading."""
+        """Whether the queues were emptied by this reading."""
         full = any(piece.n_samples >= self._layout.most_samples for piece in pieces)
         return not self._layout.removes or not full
 

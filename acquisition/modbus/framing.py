@@ -1,7 +1,7 @@
-"""Framing, TCP and RTU: a request as bytes, and the one reply that it allows out of bytes.
+"""Modbus framing over TCP and RTU: encodes requests and extracts replies from received bytes.
 
-All of a right reply but its values is known from its request; any other byte is a fault. Judging
-stops at the first fault, because nothing that follows it can be trusted.
+The request determines its reply except for the register values; any other byte is an error.
+Parsing stops at the first error, because the position of the following replies is then unknown.
 """
 
 import struct
@@ -15,7 +15,7 @@ _POLYNOMIAL, _CRC_START = 0xA001, 0xFFFF
 
 
 class PendingRequest(NamedTuple):
-    """A request in flight to a unit; RTU has no transaction."""
+    """Request in flight to a unit; the transaction id is used by TCP only."""
 
     request: ReadRequest
     unit: int
@@ -23,25 +23,25 @@ class PendingRequest(NamedTuple):
 
 
 class TcpFraming:
-    """Modbus TCP: transaction, protocol, length and unit before the reply."""
+    """Modbus TCP framing: MBAP header of transaction, protocol, length and unit."""
 
     def frame(self, pending: PendingRequest) -> bytes:
-        """Bytes of a request."""
+        """Return the frame of a request as bytes."""
         pdu = pending.request.pdu
         return _MBAP.pack(pending.transaction, 0, len(pdu) + 1, pending.unit) + pdu
 
     def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
-        """Judge received bytes as the reply to a request.
+        """Extract the reply to a request from received bytes.
 
         Returns
         -------
-        Bytes that the reply fills, and the reply from its function code on; None while the bytes
-        may still become the right one.
+        Length of the reply in bytes, and the reply from its function code on; None if the reply is
+        still incomplete.
 
         Raises
         ------
         FrameError
-            If they never can.
+            If the bytes are not the start of a valid reply.
         """
         if len(data) <= _MBAP.size:
             return None
@@ -52,22 +52,22 @@ class TcpFraming:
         n_stated = length - 1
         pdu = data[_MBAP.size : _MBAP.size + max(n_stated, 1)]
         n_arrived, n_min = len(pdu), pending.request.min_bytes(pdu)
-        # a reply whose length is not known from the request has to agree with itself
+        # the two lengths of a reply of variable length must agree
         if n_stated < n_min or n_stated > MAX_PDU_BYTES or (n_arrived >= n_min < n_stated):
             raise FrameError(f"length is {length}, expected {n_min + 1}")
         return (_MBAP.size + n_stated, pdu) if n_arrived == n_stated else None
 
 
 class RtuFraming:
-    """Modbus RTU: unit before the reply, CRC-16 behind it."""
+    """Modbus RTU framing: unit before the PDU, CRC-16 after it."""
 
     def frame(self, pending: PendingRequest) -> bytes:
-        """Bytes of a request."""
+        """Return the frame of a request as bytes."""
         body = bytes((pending.unit,)) + pending.request.pdu
         return body + crc16(body).to_bytes(2, "little")
 
     def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
-        """Judge received bytes as `TcpFraming.take` does."""
+        """Extract the reply to a request from received bytes, as `TcpFraming.take`."""
         if len(data) < 2:
             return None
         if data[0] != pending.unit:
@@ -94,7 +94,7 @@ _CRC_OF_BYTE = tuple(map(_crc_of_byte, range(256)))
 
 
 def crc16(data: bytes | memoryview) -> int:
-    """CRC-16 of Modbus RTU (Modbus over Serial Line 1.02, 6.2.2)."""
+    """Return the CRC-16 of Modbus RTU (Modbus over Serial Line 1.02, 6.2.2)."""
     crc = _CRC_START
     for byte in data:
         crc = crc >> 8 ^ _CRC_OF_BYTE[(crc ^ byte) & 0xFF]

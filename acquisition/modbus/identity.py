@@ -1,4 +1,4 @@
-"""How a device is known to be the configured one: by registers, or by function 43/14."""
+"""Expected identity of a device: register contents, or identification by function 43/14."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -9,7 +9,7 @@ from acquisition.modbus.requests import READ_HOLDING_REGISTERS
 
 @dataclass(frozen=True)
 class Identification:
-    """The basic objects of function 43/14; empty where the device gives none."""
+    """Basic identification objects of function 43/14; empty if the device does not report one."""
 
     vendor: str
     product_code: str
@@ -17,21 +17,21 @@ class Identification:
 
     @classmethod
     def of_objects(cls, objects: Mapping[int, bytes]) -> "Identification":
-        """Build from objects 0 to 2 as they were read; what is not ASCII is shown escaped."""
+        """Return the identification from objects 0 to 2; bytes outside ASCII are escaped."""
         texts = (objects.get(number, b"") for number in range(3))
         return cls(*(text.decode("ascii", "backslashreplace").strip("\0 ") for text in texts))
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExpectedIdentification:
-    """Answers of function 43/14; None where any answer is right."""
+    """Expected identification by function 43/14; a field of None matches any value."""
 
     vendor: str | None = None
     product_code: str | None = None
     revision: str | None = None
 
     def misfit(self, found: Identification) -> str | None:
-        """What differs from a device's answer, in words; None if nothing does."""
+        """Return a description of the first mismatch with an identification; None without one."""
         for field in fields(self):
             expected, value = getattr(self, field.name), getattr(found, field.name)
             if expected not in (None, value):
@@ -41,16 +41,16 @@ class ExpectedIdentification:
 
 @dataclass(frozen=True, kw_only=True)
 class ExpectedRegisters:
-    """Registers that never change in this device and differ in others: type, firmware, serial.
+    """Expected contents of registers that identify a device: type, firmware, serial number.
 
     Parameters
     ----------
     address
-        Of the first one, counted from 0.
+        Address of the first register, counted from 0.
     words
-        What they contain, 1 to 125 words.
+        Expected register contents, 1 to 125 words.
     function
-        3 or 4.
+        3 (holding registers) or 4 (input registers).
     """
 
     address: int
@@ -58,7 +58,7 @@ class ExpectedRegisters:
     function: int = READ_HOLDING_REGISTERS
 
     def misfit(self, content: bytes) -> str | None:
-        """What differs from a device's registers, in words; None if nothing does."""
+        """Return a description of the mismatch with the read registers; None without one."""
         expected = b"".join(word.to_bytes(2, "big") for word in self.words)
         if content == expected:
             return None

@@ -1,6 +1,6 @@
-"""`PolledSource`: registers that are read again and again as a sample source.
+"""`PolledSource`: sample source that polls the registers of a Modbus device.
 
-A sample is a poll, its index the number of the poll's tick: a missed poll is an exact gap.
+Each poll is a sample. Its index is the number of the clock tick: a missed poll is an exact gap.
 """
 
 from collections.abc import AsyncGenerator, AsyncIterator, Sequence
@@ -25,34 +25,34 @@ from core.samples.calibration import UNLIMITED, UnitCalibration
 from core.spectra.polls import VectorPart, VectorRow
 
 _MIN_STAMP_STEPS = 2.0
-"""A device's clock must tell neighbouring polls apart, or its stamps would seem to stand still."""
+"""Minimum poll period in steps of the device clock, so that successive time stamps differ."""
 
 _LARGEST = float(np.finfo(np.float32).max)
 
 
 class MapReader:
-    """Reads all values of one device's register map; no request is repeated."""
+    """Reader of all values of one device's register map; failed requests are not repeated."""
 
     def __init__(self, settings: LinkSettings, decoder: MapDecoder) -> None:
         self._client, self._decoder = ModbusClient(settings), decoder
 
     @asynccontextmanager
     async def connected(self) -> AsyncIterator[None]:
-        """Open the link and check identity and signature; leaving the context closes the link.
+        """Open the link and check identity and signature; close the link on exit of the context.
 
         Raises
         ------
         LinkError
-            If the device does not answer, or answers wrongly.
+            If the device does not reply, or replies incorrectly.
         ConfigError
-            If it is another device, naming what was found and what was expected.
+            If identity or signature differ; the message contains found and expected values.
         """
         async with self._client.connected():
             await self._require_signature()
             yield
 
     async def read(self) -> MapReading:
-        """Read and decode all values; from the right device, also if connections are not kept.
+        """Read and decode all values; check the identity first if connections are not kept.
 
         Raises
         ------
@@ -62,7 +62,7 @@ class MapReader:
         return self._decoder.read(await self.content())
 
     async def content(self) -> bytes:
-        """Read everything once: the bytes that `MapDecoder.read` takes.
+        """Read the concatenated contents of all spans, the argument of `MapDecoder.read`.
 
         Raises
         ------
@@ -90,15 +90,15 @@ class MapReader:
 
 @dataclass(frozen=True, kw_only=True)
 class PolledSettings(LinkSettings):
-    """A device whose registers are polled.
+    """Settings of a polled Modbus device.
 
     Parameters
     ----------
     poll_period_s
-        Time between polls, above 0: one over the sampling rate.
+        Time between polls, above 0; the reciprocal of the sampling rate.
     stale_after_s
-        A device in which nothing changes for longer than this is not connected: its heartbeat, else
-        its time, else everything that is read. At least two poll periods.
+        Longest time without a change of the device's heartbeat before the link counts as lost; at
+        least two poll periods. Without a heartbeat its time is used, else all contents.
     """
 
     poll_period_s: float = 1.0
@@ -106,14 +106,13 @@ class PolledSettings(LinkSettings):
 
 
 class PolledSource:
-    """Samples, slow values and vectors of one unit from polled registers.
+    """Sample source of the samples, slow values and vectors of one unit from polled registers.
 
     Parameters
     ----------
     rows
-        Which value of the map each row of a block is, by id; as many as the calibration has
-        channels. Its slow channels are found by their own ids; one that the map lacks is not
-        measured here.
+        Id of the map value in each row of a block; one for each channel of the calibration. The
+        slow channels are matched by id; a slow channel without a map value is NaN.
     """
 
     def __init__(
@@ -146,7 +145,7 @@ class PolledSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link and check the device's signature, as `SampleSource`."""
+        """Open the link and check identity and signature, as `SampleSource`."""
         async with self._reader.connected():
             self._freshness.opened(self._clock.monotonic_s())
             async with aclosing(self._blocks()) as blocks:
@@ -185,21 +184,21 @@ class PolledSource:
 def vector_calibration(
     calibration: UnitCalibration, channels: Sequence[str], rows: Sequence[VectorRow]
 ) -> UnitCalibration:
-    """Calibration of a vector rack: one sample for each poll, one row for each vector.
+    """Return the calibration of a vector rack: one sample per poll, one channel per vector row.
 
-    Only a gap has the limits of its transducer.
+    Only gap rows have the limits of their transducer; the other rows are unlimited.
 
     Parameters
     ----------
     calibration
-        Of the unit's physical channels.
+        Calibration of the unit's physical channels.
     channels
-        Their ids, in the same order.
+        Ids of the physical channels, in the order of the calibration.
 
     Raises
     ------
     LookupError
-        If a row is of a channel that is not there.
+        If a row refers to an unknown channel.
     """
     by_id = dict(zip(channels, calibration.channels, strict=True))
     return replace(
@@ -212,13 +211,13 @@ def vector_calibration(
 
 
 def slow_number(reading: MapReading, position: int) -> float:
-    """A slow value; not a number unless its state is OK."""
+    """Return a slow value; NaN unless its state is OK."""
     is_ok = reading.states[position] is ValueState.OK
     return float(reading.values[position]) if is_ok else float("nan")
 
 
 def _sample(value: float, state: ValueState, full_scale: float) -> float:
-    """A value as calibration takes it: not a number if invalid, at full scale if clipped."""
+    """Return a value as input of the calibration: NaN if invalid, full scale if clipped."""
     if state is ValueState.INVALID or not abs(value) <= _LARGEST:
         return float("nan")
     if state is ValueState.CLIPPED:

@@ -1,4 +1,4 @@
-"""`ReadPlan`: the fewest requests that read all cells of a map, and no register beside them."""
+"""`ReadPlan`: minimum number of requests that read all cells of a register map."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -11,12 +11,12 @@ from acquisition.modbus.requests import BIT_FUNCTIONS, Span
 
 
 class MapError(ConfigError):
-    """A register map that cannot be read as it demands.
+    """Error in a register map: its cells cannot be read as the map requires.
 
     Parameters
     ----------
     at
-        Where in the map: field names and element numbers.
+        Path in the map: field names and element numbers.
     """
 
     def __init__(self, message: str, *at: int | str) -> None:
@@ -26,16 +26,16 @@ class MapError(ConfigError):
 
 @dataclass(frozen=True)
 class ReadPlan:
-    """Spans in the order in which they are read, each by one request.
+    """Spans in reading order, each read by one request.
 
-    Their contents, one after the other, are the bytes that cells are found in.
+    Cells are located by their byte position in the concatenated contents of the spans.
     """
 
     spans: tuple[Span, ...]
     base: int
 
     def span_of(self, cell: Cell) -> Span:
-        """Span that holds a cell."""
+        """Return the span that contains a cell."""
         start, stop = cell.start(self.base), cell.stop(self.base)
         return next(
             span
@@ -44,7 +44,7 @@ class ReadPlan:
         )
 
     def place_of(self, cell: Cell) -> tuple[int, int]:
-        """Byte of all contents where a cell begins, and bit of it for functions 1 and 2."""
+        """Return the first byte of a cell in all contents, and its bit for functions 1 and 2."""
         span = self.span_of(cell)
         n_before = sum(s.n_bytes for s in self.spans[: self.spans.index(span)])
         places = cell.start(self.base) - span.address
@@ -54,17 +54,17 @@ class ReadPlan:
 
 
 Stretch = tuple[int, int]
-"""First address, and first one after it; must be read as a whole."""
+"""Address range that must be read in one request: first address, address after the last."""
 
 
 def plan_reads(registers: RegisterMap) -> ReadPlan:
-    """Plan the reads of a map.
+    """Return the read plan of a register map.
 
     Raises
     ------
     MapError
-        If a cell lies across the edge of a block that must be read as one, or a value and its
-        scale register are not read together.
+        If a cell crosses the edge of a block that must be read in one request, or a value and its
+        scale register are in different requests.
     """
     plan = _plan(registers, list(registers.cells()), registers.together)
     for n, value in enumerate(registers.values):
@@ -81,7 +81,7 @@ def plan_reads(registers: RegisterMap) -> ReadPlan:
 
 
 def plan_signature(registers: RegisterMap) -> ReadPlan:
-    """Plan the reads of a map's signature."""
+    """Return the read plan of a register map's signature."""
     return _plan(registers, [signature.cell for signature in registers.signature], ())
 
 
@@ -111,7 +111,7 @@ def _plan(registers: RegisterMap, cells: Sequence[Cell], together: Sequence[Toge
 def _wanted(
     blocks: Sequence[Stretch], stretches: Sequence[Stretch], registers: RegisterMap
 ) -> list[Stretch]:
-    """Blocks that hold at least one cell that is read."""
+    """Return the blocks that contain a cell; raise MapError if blocks overlap or cut a cell."""
     for (_, stop), (start, _) in pairwise(sorted(blocks)):
         if start < stop:
             raise MapError(
@@ -130,7 +130,7 @@ def _wanted(
 
 
 def _whole(stretches: Iterable[Stretch]) -> list[Stretch]:
-    """Join stretches that share a register: they have to be read as a whole."""
+    """Merge address ranges that share a register, so that they are read in one request."""
     joined: list[Stretch] = []
     for start, stop in sorted(stretches):
         if joined and start < joined[-1][1]:
@@ -141,7 +141,7 @@ def _whole(stretches: Iterable[Stretch]) -> list[Stretch]:
 
 
 def _packed(stretches: Sequence[Stretch], max_gap: int, most: int) -> list[Stretch]:
-    """Put neighbours into one request while they fit; from left to right this needs the fewest."""
+    """Merge adjacent ranges up to the maximum size; left to right gives the fewest requests."""
     packed: list[Stretch] = []
     for start, stop in stretches:
         if packed and start - packed[-1][1] <= max_gap and stop - packed[-1][0] <= most:

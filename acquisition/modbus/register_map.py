@@ -1,6 +1,6 @@
-"""`RegisterMap`: the values of one device, as its manual describes them.
+"""`RegisterMap`: the values of one device and their registers, as described in its manual.
 
-The settings of a register map refuse what no device can have; nothing is checked here again.
+The settings of a register map are validated when they are loaded, and not checked here again.
 """
 
 import math
@@ -22,19 +22,19 @@ class Meaning(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class FlagCheck:
-    """State of a value by a status register: by its bits, or by its numbers.
+    """Rule for the state of a value from a status register, by bits or by numbers.
 
     Parameters
     ----------
     mask
-        Bits that count; numbers are shifted to its lowest bit before they are compared. 1 for a
-        cell that is a single bit.
+        Bits that are evaluated. A number is the masked content, shifted right to the lowest bit of
+        the mask. 1 for a cell of a single bit.
     set_means
-        "bad": the value is bad if any of these bits is set. "ok": it is bad unless all are.
+        "bad": the value is bad if any masked bit is set. "ok": it is bad unless all are set.
     ok_values
-        Numbers of a good value, instead of `set_means`; all others are bad.
+        Status numbers of a good value, instead of `set_means`; all other numbers are bad.
     clipped_values
-        Numbers of a clipped value.
+        Status numbers of a clipped value.
     """
 
     cell: Cell
@@ -45,13 +45,13 @@ class FlagCheck:
 
     @property
     def lowest_bit(self) -> int:
-        """The lowest bit that counts, alone."""
+        """Lowest bit of the mask, as a power of 2."""
         return self.mask & -self.mask
 
 
 @dataclass(frozen=True, kw_only=True)
 class ScaleRegister:
-    """Register with the value of a full mantissa: value = raw / divisor * register."""
+    """Register with the full scale of a value: value = raw / divisor * register."""
 
     cell: Cell
     divisor: float = 32767.0
@@ -59,12 +59,12 @@ class ScaleRegister:
 
 @dataclass(frozen=True, kw_only=True)
 class FullScale:
-    """A range that is mapped linearly onto the raw numbers; a raw number at its end is clipped.
+    """Linear mapping of raw numbers to a range; a raw number at either end is clipped.
 
     Parameters
     ----------
     minimum, maximum
-        Values at the ends: numbers, or the cells of the device that hold them.
+        Values at the ends of the range: numbers, or the cells that contain them.
     """
 
     minimum: float | Cell
@@ -75,15 +75,15 @@ class FullScale:
 
 @dataclass(frozen=True, kw_only=True)
 class MapValue:
-    """One value of a device: raw * scale + offset, with a scale register or a range before that.
+    """One value of a device: raw * scale + offset, after an optional scale register or range.
 
     Parameters
     ----------
     invalid_values
-        Raw numbers of no value; integers are compared by their bits, so that 0x8000 is -32768.
-        Not-a-number is always one.
+        Raw numbers that mark an invalid value; integers are compared by their bits: 0x8000 equals
+        -32768. NaN is always invalid.
     invalid_below, invalid_above
-        Raw numbers beyond these are errors.
+        Limits of the raw number; a raw number outside them is invalid.
     """
 
     id: str
@@ -98,7 +98,7 @@ class MapValue:
     invalid_above: float = math.inf
 
     def cells(self) -> Iterator[Cell]:
-        """Cells that are read for it, its own number first."""
+        """Yield the cells that the value needs, first the cell of the value itself."""
         yield self.cell
         if self.scale_register is not None:
             yield self.scale_register.cell
@@ -110,7 +110,7 @@ class MapValue:
 
 @dataclass(frozen=True, kw_only=True)
 class Together:
-    """Registers that must be read as one block, as the manual demands."""
+    """Block of registers that must be read in one request, as the manual requires."""
 
     address: int
     count: int
@@ -119,7 +119,7 @@ class Together:
 
 @dataclass(frozen=True, kw_only=True)
 class Signature:
-    """Number by which the device is identified; read on connecting."""
+    """Cell with a known number that identifies the device; read on connecting."""
 
     cell: Cell
     expected: float
@@ -127,25 +127,25 @@ class Signature:
 
 @dataclass(frozen=True, kw_only=True)
 class RegisterMap:
-    """Values of a device, and how they must be read.
+    """Values of a device, and the rules for reading their registers.
 
     Parameters
     ----------
     base
-        Number that the manual gives to the first register: 0, 1, or such as 40001.
+        Number of the first register in the manual; examples: 0, 1, 40001.
     together
-        Blocks that must not be split.
+        Blocks of registers that must be read in one request.
     heartbeat
-        A counter that changes with each measurement of the device.
+        Cell that changes with each measurement of the device.
     time
-        Time of the measurement by the device's own clock.
+        Cells with the time of the measurement by the device's clock.
     signature
-        Numbers that the device must hold before any value is used.
+        Cells with known numbers; they are checked on connecting, before any value is used.
     max_registers
-        Most registers in one read, 1 to 125.
+        Maximum number of registers in one read, 1 to 125.
     max_gap
-        Unconfigured registers that may be read between two cells to save a request. If the device
-        does not have one of them, the whole read fails.
+        Maximum number of unconfigured registers between two cells that are read in one request. If
+        one of these registers does not exist, the whole read fails.
     """
 
     values: tuple[MapValue, ...]
@@ -159,11 +159,11 @@ class RegisterMap:
 
     @property
     def ids(self) -> tuple[str, ...]:
-        """Ids of the values, in their order."""
+        """Ids of the values, in the order of the map."""
         return tuple(value.id for value in self.values)
 
     def cells(self) -> Iterator[Cell]:
-        """Cells that are read in every poll."""
+        """Yield the cells that are read in every poll."""
         for value in self.values:
             yield from value.cells()
         if self.heartbeat is not None:

@@ -1,6 +1,6 @@
-"""Requests that only read, and the reply that each of them allows.
+"""Modbus read requests, and the checks of their replies.
 
-Requests and replies are taken from their function code on (the PDU), the same over TCP and RTU.
+Requests and replies are PDUs: the bytes from the function code on, identical over TCP and RTU.
 """
 
 import struct
@@ -19,17 +19,17 @@ BIT_FUNCTIONS = (READ_COILS, READ_DISCRETE_INPUTS)
 REGISTER_FUNCTIONS = (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS)
 SPAN_FUNCTIONS = (*BIT_FUNCTIONS, *REGISTER_FUNCTIONS)
 READ_FUNCTIONS = (*SPAN_FUNCTIONS, READ_FIFO_QUEUE, READ_IDENTIFICATION)
-"""The only function codes that can leave this process."""
+"""The only function codes that are ever sent."""
 
 ADDRESS_SPACE = 0x10000
 MAX_REGISTERS_PER_READ = 125
 MAX_FIFO_REGISTERS = 31
-"""Modbus Application Protocol 1.1b3, 6.18: a longer queue cannot be read."""
+"""Maximum length of a readable FIFO queue (Modbus Application Protocol 1.1b3, 6.18)."""
 
 MAX_PDU_BYTES = 253
 EXCEPTION_BIT = 0x80
 BUSY = 6
-"""The device could not take the request, and asks for it again later (MODBUS V1.1b3, section 7)."""
+"""Exception code of a busy device: repeat the request later (MODBUS V1.1b3, section 7)."""
 
 _EXCEPTIONS = {
     1: "illegal function",
@@ -56,21 +56,21 @@ _SPAN_REQUEST = struct.Struct(">BHH")
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """Consecutive registers, or bits, of a device.
+    """Range of consecutive registers or bits of a device.
 
     Parameters
     ----------
     address
-        Of the first one, counted from 0 as on the wire.
+        Address of the first register or bit, counted from 0 as on the wire.
     count
-        Registers, or bits of functions 1 and 2.
+        Number of registers, or of bits for functions 1 and 2.
     function
         1 (coils), 2 (discrete inputs), 3 (holding registers) or 4 (input registers).
 
     Raises
     ------
     ConfigError
-        If no device can have them.
+        If the function or the address range is invalid.
     """
 
     address: int
@@ -88,30 +88,30 @@ class Span:
 
     @property
     def stop(self) -> int:
-        """First address after it."""
+        """Address after the last address of the span."""
         return self.address + self.count
 
     @property
     def n_bytes(self) -> int:
-        """Bytes of its content: two for each register, one for each eight bits."""
+        """Length of the content in bytes: two per register, one per eight bits."""
         return -(-self.count // 8) if self.function in BIT_FUNCTIONS else 2 * self.count
 
 
 @dataclass(frozen=True, slots=True)
 class ReadRequest:
-    """One request: its bytes from the function code on.
+    """Read request as a PDU.
 
     Raises
     ------
     ConfigError
-        If it does not only read. Nothing else can be framed.
+        If the PDU is not a read request; only read requests can be framed.
     """
 
     pdu: bytes
 
     def __post_init__(self) -> None:
         function = self.pdu[0]
-        # function 43 carries other services too
+        # function 43 also has other services
         is_other_service = function == READ_IDENTIFICATION and (
             len(self.pdu) < 3 or self.pdu[1] != _MEI or self.pdu[2] not in _READ_CODES
         )
@@ -131,17 +131,17 @@ class ReadRequest:
         return f"a read of {count} at {address}, function {function}"
 
     def min_bytes(self, reply: memoryview) -> int:
-        """Bytes that the reply has, or has at least, by what has arrived of it.
+        """Return the minimum length of the reply in bytes, given the bytes received so far.
 
         Parameters
         ----------
         reply
-            What has arrived, from the function code on; at least that.
+            Received bytes, from the function code on; at least the function code.
 
         Raises
         ------
         FrameError
-            If what has arrived can become neither the right reply nor an exception.
+            If the bytes are the start of neither a valid reply nor an exception.
         """
         function, found = self.pdu[0], reply[0]
         if found != function:
@@ -160,7 +160,7 @@ class ReadRequest:
 
 
 def _fifo_bytes(reply: memoryview) -> int:
-    """Length of a queue's reply, which states how many registers follow."""
+    """Return the length of a FIFO reply; its head contains the number of registers."""
     if len(reply) < _FIFO_HEAD.size:
         return _FIFO_HEAD.size
     n_bytes: int
@@ -174,7 +174,7 @@ def _fifo_bytes(reply: memoryview) -> int:
 
 
 def _identification_bytes(reply: memoryview, expected: bytes) -> int:
-    """Length of an identification, as far as its objects are known; each states its own."""
+    """Return the minimum length of an identification reply by the objects received so far."""
     found = bytes(reply[1:3])
     if not expected.startswith(found):
         raise FrameError(f"MEI type and read code are {found.hex()}, not {expected.hex()}")
@@ -191,9 +191,9 @@ def _identification_bytes(reply: memoryview, expected: bytes) -> int:
     return end
 
 
-@lru_cache(maxsize=1024)  # the spans of a device are read again in every poll
+@lru_cache(maxsize=1024)  # the same spans are read in every poll
 def span_requests(span: Span) -> tuple[ReadRequest, ...]:
-    """Requests that read a span, in the order of their addresses."""
+    """Return the requests that read a span, in address order."""
     step = _MAX_BITS_PER_READ if span.function in BIT_FUNCTIONS else MAX_REGISTERS_PER_READ
     return tuple(
         ReadRequest(_SPAN_REQUEST.pack(span.function, at, min(step, span.stop - at)))
@@ -202,29 +202,29 @@ def span_requests(span: Span) -> tuple[ReadRequest, ...]:
 
 
 def fifo_request(address: int) -> ReadRequest:
-    """Request for a queue, by function 0x18.
+    """Return the request for a FIFO queue (function 0x18).
 
     Raises
     ------
     ConfigError
-        If there is no such address.
+        If the address is invalid.
     """
     pointer = Span(address, 1)
     return ReadRequest(bytes((READ_FIFO_QUEUE,)) + pointer.address.to_bytes(2, "big"))
 
 
 def identification_request(first_object: int = 0) -> ReadRequest:
-    """Request for the basic objects of function 43/14, from one of them on."""
+    """Return the request for the basic objects of function 43/14 from `first_object` on."""
     return ReadRequest(bytes((READ_IDENTIFICATION, _MEI, _READ_BASIC, first_object)))
 
 
 def fifo_registers(reply: memoryview) -> bytes:
-    """Registers of a FIFO reply, big-endian words."""
+    """Return the registers of a FIFO reply as big-endian words."""
     return bytes(reply[_FIFO_HEAD.size :])
 
 
 def identification_objects(reply: memoryview) -> tuple[dict[int, bytes], int | None]:
-    """Objects of an identification by their number, and the next one to ask for, if any."""
+    """Return the objects of an identification by number, and the next object to request or None."""
     _, _, _, _, more_follows, next_object, n_objects = _IDENTIFICATION_HEAD.unpack_from(reply)
     objects, at = {}, _IDENTIFICATION_HEAD.size
     for _ in range(n_objects):
@@ -235,7 +235,7 @@ def identification_objects(reply: memoryview) -> tuple[dict[int, bytes], int | N
 
 
 def exception_error(where: str, code: int, request: ReadRequest) -> AcquisitionError:
-    """Error that an exception code stands for: LinkError if asking again later can help."""
+    """Return the error of an exception code: LinkError if a later request can succeed."""
     kind = ConfigError if code in _CONFIG_EXCEPTIONS else LinkError
     name = _EXCEPTIONS.get(code, "unknown")
     return kind(f"{where}: device answers exception {code} ({name}) to {request}")

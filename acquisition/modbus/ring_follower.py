@@ -1,4 +1,4 @@
-"""`RingFollower`: which slots of a block ring are new, lost, or refused."""
+"""`RingFollower`: reads the new slots of a block ring; counts refused slots."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -23,11 +23,11 @@ from core.samples.blocks import Rejection
 from core.samples.calibration import UnitCalibration
 
 _N_TRIES = 4
-"""A header is short and quickly written; still wrong after this many reads, it is wrong."""
+"""Reads of an invalid header before an error is raised; a header is written quickly."""
 
 
 class RingReader:
-    """One device's ring as it is found: slots are not judged here."""
+    """Reader of the header and slots of one block ring; slots are not checked."""
 
     def __init__(self, client: ModbusClient, base_address: int, function: int) -> None:
         self._client = client
@@ -35,18 +35,18 @@ class RingReader:
 
     @property
     def where(self) -> str:
-        """Host and port, or path of the serial port."""
+        """Host and port, or path of the serial port; for messages."""
         return self._client.where
 
     async def header(self) -> RingHeader:
-        """Read and decode the header alone.
+        """Read and decode the header.
 
         Raises
         ------
         ConfigError
-            If this is no block ring.
+            If the registers contain no valid block-ring header.
         LinkError
-            As the client does, and if the checksum is wrong, however often it is read.
+            As `ModbusClient.read_spans`; also if the checksum is wrong in every read.
         """
         for _ in range(_N_TRIES):
             content = await self._client.read_spans([self._header])
@@ -58,12 +58,12 @@ class RingReader:
         raise kind(f"{self.where}: {fault}") from fault
 
     async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> list[Slot]:
-        """Read the places where these sequence numbers belong, whatever lies there.
+        """Read the ring positions of these sequence numbers, without checking the slots.
 
         Returns
         -------
         list
-            One slot for each sequence number.
+            Slot at the position of each sequence number.
         """
         spans: list[Span] = []
         for sequence in sequences:
@@ -75,26 +75,26 @@ class RingReader:
 
 
 _N_REREADS = 3
-"""A device needs milliseconds to write a slot; still torn after this many round trips, it lies."""
+"""Maximum number of repeated reads of a torn slot; a slot is written in milliseconds."""
 
 _MAX_READ_S = 0.5
-"""Longest stretch of samples in one poll. A ring that is read after an outage takes a slow line
-seconds, and all of it would be read again if that failed before its end."""
+"""Maximum duration of the samples in one poll, s. On a slow line, reading a full ring takes
+seconds; after a failure, only the slots of the last poll are read again."""
 
 
 class RingFollower:
-    """Position of a reader in one device's ring, kept across connections.
+    """Reader of the new slots of one block ring; keeps its position across connections.
 
-    On the first connection it starts with the newest slot. Later it continues after the last slot
-    it has handled, as far back as the ring holds; the oldest slot is left alone, because the
-    device may be overwriting it.
+    The first connection starts with the newest slot. Later connections continue after the last
+    slot that was read, as far as the ring still contains it. The oldest slot is never read,
+    because the device may be overwriting it.
 
     Parameters
     ----------
     calibration
-        Its channels, rate and slow channels are those that the device must have.
+        Numbers of channels and slow channels, and the rate, that the device must have.
     begun_ns
-        When this run of the adapter began, UTC.
+        Start of this adapter, UTC ns since 1970.
     """
 
     def __init__(self, reader: RingReader, calibration: UnitCalibration, begun_ns: int) -> None:
@@ -112,18 +112,18 @@ class RingFollower:
 
     @property
     def newest(self) -> tuple[int, int] | None:
-        """Epoch and newest sequence of the header read last; None before the first."""
+        """Epoch and newest sequence number of the last header; None before the first header."""
         return None if self._header is None else (self._header.epoch, self._header.newest)
 
     async def header(self) -> RingHeader:
-        """Read the header of a device that delivers what is configured.
+        """Read the header; check its channels and rate against the calibration.
 
         Raises
         ------
         ConfigError
-            If it does not, naming the field, what was found and what was expected.
+            If a field differs; the message contains the found and the expected value.
         LinkError
-            As the reader does.
+            As `RingReader.header`.
         """
         header = await self._reader.header()
         ring = header.layout
@@ -137,16 +137,16 @@ class RingFollower:
 
     @property
     def n_waiting(self) -> int:
-        """Slots up to the newest of the header that were not read yet."""
+        """Number of unread slots up to the newest slot of the last header."""
         return 0 if self._header is None else max(0, ahead(self._header.newest, self._handled))
 
     async def poll(self) -> list[RawBlock]:
-        """Read the new slots, in order; of many only the first.
+        """Read the new slots in order; the oldest ones first if one poll cannot read all.
 
         Raises
         ------
         LinkError, ConfigError
-            As the reader does; the next call then reads the same slots again.
+            As `RingReader`; the next call then reads the same slots again.
         """
         header = await self.header()
         await self._enter(header)
@@ -158,7 +158,7 @@ class RingFollower:
         return self._placed(list(zip(wanted, found, strict=True)), header)
 
     async def _enter(self, header: RingHeader) -> None:
-        """Set the position to read from where it is not simply the slot after the last."""
+        """Set the read position at the start, after a restart, or if the sequence went back."""
         before = self._header
         if before is None:
             self._timeline = Timeline(header.layout, self._epochs)
@@ -180,9 +180,9 @@ class RingFollower:
         self._header = header
 
     async def _require_again(self, header: RingHeader) -> None:
-        """Accept another epoch only if a second reading of the header has it too.
+        """Read the header again; raise LinkError if a changed epoch or layout is not confirmed.
 
-        Otherwise one stale or changed reply would make old samples new.
+        Otherwise one stale or corrupted reply would start a new epoch with old samples.
         """
         again = await self.header()
         if (again.epoch, again.layout) != (header.epoch, header.layout):
@@ -192,9 +192,9 @@ class RingFollower:
             )
 
     def _go_back_to_start(self, newest: Slot | None, header: RingHeader) -> None:
-        """Set the position to the first slot of a new epoch, if the ring still holds it.
+        """Set the read position to the first slot of a new epoch, or to the oldest readable slot.
 
-        Slots contain their epoch, so that all can be read if the newest is not usable.
+        Each slot contains its epoch, so that all slots can be read if the newest is unusable.
         """
         n_before = header.layout.n_slots
         if newest is not None:
@@ -213,7 +213,7 @@ class RingFollower:
         return slot if known and slot.whole and not slot.blank else None
 
     async def _read(self, layout: RingLayout, wanted: Sequence[int]) -> list[Slot]:
-        """Read slots, and doubtful ones again: the device may be writing them at this moment."""
+        """Read slots; repeat the read of inconsistent slots, which the device may be writing."""
         slots = await self._reader.slots(layout, wanted)
         for i, sequence in enumerate(wanted):
             for _ in range(_N_REREADS):
@@ -233,7 +233,7 @@ class RingFollower:
         return blocks
 
     def _judge(self, sequence: int, slot: Slot, header: RingHeader) -> int | Refusal | None:
-        """Index of the slot's first sample; None if it was never written or is overwritten."""
+        """Return the index of the first sample; None if the slot is blank or of another turn."""
         if slot.blank or _overwritten_or_old(slot, sequence, header.layout):
             return None
         if slot.damage:
@@ -267,13 +267,13 @@ def _verdicts(ok_bits: int, n_channels: int) -> tuple[bool, ...]:
 
 
 def _overwritten_or_old(slot: Slot, sequence: int, layout: RingLayout) -> bool:
-    """Whether another slot lies here, one that belongs into the same place of the ring."""
+    """Whether the ring position contains the slot of an earlier or later turn of the ring."""
     other = slot.sequence != sequence
     return other and slot.sequence % layout.n_slots == sequence % layout.n_slots
 
 
 def _doubtful(slot: Slot, sequence: int, layout: RingLayout) -> bool:
-    """Whether a second reading of the slot may give something else."""
+    """Whether a slot is torn, damaged or misplaced, so that a second read may differ."""
     if slot.blank:
         return False
     misplaced = slot.sequence != sequence and not _overwritten_or_old(slot, sequence, layout)

@@ -1,6 +1,6 @@
-"""Block-ring profile: how a DAQ lays a ring of sample slots out in Modbus registers.
+"""Block-ring profile: layout of a ring of sample slots in the Modbus registers of a DAQ.
 
-Register addresses are counted from the header's base, everything is big-endian::
+Register addresses are relative to the base address of the header; byte order is big-endian::
 
     +0 magic        +1 version      +2 n_channels   +3 samples_per_slot  +4 n_slots
     +5..6 rate mHz  +7..8 epoch     +9..10 newest   +11 n_slow           +12 ring address
@@ -11,8 +11,8 @@ Register addresses are counted from the header's base, everything is big-endian:
           int16 samples channel by channel, low word of the sequence again,
           CRC-32 of all before it
 
-The version is 2. The slow values behind the header are there for simple clients, and not used here.
-The CRC-32 is that of IEEE 802.3, as `zlib.crc32` has it, over the registers as bytes on the wire.
+The version is 2. The slow values after the header are for simple clients, and not used here.
+The CRC-32 is that of IEEE 802.3 (`zlib.crc32`), computed over the register bytes on the wire.
 """
 
 import struct
@@ -35,19 +35,19 @@ MAX_CHANNELS = 32
 U32 = 1 << 32
 
 HEADER = struct.Struct(">5H3I3H")
-"""The header up to its checksum."""
+"""Fields of the header before its checksum."""
 
 _HEAD_REGISTERS, _TRAILER_REGISTERS, _CRC_REGISTERS = 12, 1, 2
 
 
 @dataclass(frozen=True)
 class RingLayout:
-    """Shape and place of a ring: what stays the same while a device runs.
+    """Dimensions and addresses of a ring; constant while a device runs.
 
     Parameters
     ----------
     rate_mhz
-        Samples per 1000 s and channel: the rate in millihertz.
+        Sampling rate per channel in millihertz.
     ring_address
         Register address of the first slot.
     slot_stride
@@ -64,7 +64,7 @@ class RingLayout:
 
     @cached_property
     def slot_type(self) -> np.dtype[Any]:
-        """Numbers of one slot as they lie in its registers; of a layout that is possible."""
+        """Structured dtype of one slot; valid after `require_possible` only."""
         return np.dtype(
             [
                 ("head", ">u4", (6,)),
@@ -77,31 +77,31 @@ class RingLayout:
 
     @property
     def slot_registers(self) -> int:
-        """Registers that one slot fills."""
+        """Number of registers of one slot."""
         n_counts = self.n_channels * self.samples_per_slot
         return _HEAD_REGISTERS + 2 * self.n_slow + n_counts + _TRAILER_REGISTERS + _CRC_REGISTERS
 
     @property
     def end_address(self) -> int:
-        """First register address after the ring."""
+        """Register address after the last register of the ring."""
         return self.ring_address + (self.n_slots - 1) * self.slot_stride + self.slot_registers
 
     @property
     def slot_duration_s(self) -> float:
-        """Time that one slot covers."""
+        """Duration of the samples in one slot, s."""
         return self.samples_per_slot * 1000.0 / self.rate_mhz
 
     def slot_address(self, sequence: int) -> int:
-        """Register address at which the slot of this sequence number lies."""
+        """Return the register address of the slot with a sequence number."""
         return self.ring_address + sequence % self.n_slots * self.slot_stride
 
     def require_possible(self) -> None:
-        """Refuse a layout that cannot exist.
+        """Check the limits of all fields.
 
         Raises
         ------
         ConfigError
-            Naming the field, what was found and what is allowed.
+            If a field is out of its limits; the message contains field, value and limits.
         """
         for name, value, lowest, highest in (
             ("n_channels", self.n_channels, 1, MAX_CHANNELS),
@@ -119,7 +119,7 @@ class RingLayout:
 
 @dataclass(frozen=True)
 class RingHeader:
-    """Header of a ring: its layout, the device's epoch and the sequence of the newest slot."""
+    """Header of a ring: layout, epoch of the device, and sequence number of the newest slot."""
 
     layout: RingLayout
     epoch: int
@@ -127,14 +127,14 @@ class RingHeader:
 
 
 def decode_header(data: bytes) -> RingHeader:
-    """Read the first 16 registers of a device.
+    """Decode a header from the contents of its 16 registers.
 
     Raises
     ------
     ConfigError
-        If this is not a block ring of this version, or one that cannot exist.
+        If magic, version or layout are invalid.
     FrameError
-        If its checksum says that it was changed on the way or while it was written.
+        If the checksum is wrong: the header was corrupted in transmission, or being written.
     """
     magic, version, n_channels, samples_per_slot, n_slots, rate_mhz, *rest = HEADER.unpack_from(
         data
@@ -156,7 +156,7 @@ def decode_header(data: bytes) -> RingHeader:
 
 @lru_cache(maxsize=256)
 def _possible_layout(*fields: int) -> RingLayout:
-    """Layout of these fields, checked once for all polls."""
+    """Return a checked layout; cached, because the fields are the same in every poll."""
     layout = RingLayout(*fields)
     layout.require_possible()
     return layout
@@ -164,24 +164,24 @@ def _possible_layout(*fields: int) -> RingLayout:
 
 @dataclass(frozen=True)
 class Slot:
-    """One slot as it was read, unchecked.
+    """Decoded slot, not checked.
 
     Parameters
     ----------
     ok_bits
-        Bit c is the device's verdict on channel c.
+        Bit c is set if the device reports channel c as OK.
     counts
-        (n_channels, samples_per_slot)
+        (n_channels, samples_per_slot) int16 counts.
     trailer
-        Low word of the sequence, once more, behind the samples.
+        Low word of the sequence number, repeated after the samples.
     epoch
-        The device's epoch when it wrote the slot.
+        Epoch of the device when it wrote the slot.
     slow
-        Slow values of this slot, NaN where there is none.
+        Slow values of this slot; NaN for a missing value.
     damage
-        Found checksum exclusive-or the right one: 0 if they are equal.
+        Exclusive-or of the stored and the computed checksum; 0 if they are equal.
     blank
-        Whether nothing has been written here since the device started.
+        Whether all registers are 0: the slot has not been written since the device started.
     """
 
     sequence: int
@@ -208,12 +208,12 @@ class Slot:
 
     @property
     def whole(self) -> bool:
-        """Whether trailer and checksum show no change, by its writer or on the way."""
+        """Whether trailer and checksum are correct."""
         return not self.torn and not self.damage
 
 
 def decode_slots(content: bytes, layout: RingLayout) -> list[Slot]:
-    """Read slots that lie one behind the other."""
+    """Decode consecutive slots from their concatenated registers."""
     records, view = np.frombuffer(content, layout.slot_type), memoryview(content)
     counts, n_bytes = records["counts"].astype(np.int16), records.itemsize
     columns = (records[name].tolist() for name in ("head", "slow", "trailer", "crc"))

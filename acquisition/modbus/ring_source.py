@@ -1,4 +1,4 @@
-"""`RingSource`: a DAQ with a block ring as a sample source."""
+"""`RingSource`: sample source for a DAQ with a block ring in Modbus registers."""
 
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager
@@ -17,12 +17,12 @@ from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
 
 _MIN_STALE_SLOTS = 3
-"""A device with long slots may be silent for more than a slot without being stale."""
+"""Minimum time without a new slot before a device is stale, in slot durations."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RingSettings(LinkSettings):
-    """A block ring behind a Modbus device.
+    """Settings of a Modbus device with a block ring.
 
     Parameters
     ----------
@@ -31,9 +31,9 @@ class RingSettings(LinkSettings):
     base_address
         Register address of the header, counted from 0.
     poll_period_s
-        Longest time between polls, above 0; the ring must hold much more than that.
+        Longest time between polls, above 0; much shorter than the duration of the ring.
     stale_after_s
-        A device without a usable new sample for longer than this is not connected; above 0.
+        Longest time without a new usable sample before the link counts as lost; above 0.
     """
 
     function: int = READ_HOLDING_REGISTERS
@@ -43,7 +43,7 @@ class RingSettings(LinkSettings):
 
 
 class RingSource:
-    """Samples of one unit from a block ring; a new connection continues after the last slot."""
+    """Sample source of one unit from a block ring; a reconnection continues after the last slot."""
 
     def __init__(self, settings: RingSettings, calibration: UnitCalibration, clock: Clock) -> None:
         self._settings = settings
@@ -58,7 +58,7 @@ class RingSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link and check that the device has the configured ring, as `SampleSource`."""
+        """Open the link and check the header of the ring, as `SampleSource`."""
         async with self._client.connected():
             await self._identify()
             async with aclosing(self._blocks()) as blocks:
@@ -91,7 +91,7 @@ class RingSource:
             else:
                 self._require_fresh()
             now_s = self._clock.monotonic_s()
-            due_s = max(due_s + period_s, now_s)  # overdue polls are left out, never piled up
+            due_s = max(due_s + period_s, now_s)  # missed polls are skipped
             await self._clock.sleep(due_s - now_s)
 
     def _require_fresh(self) -> None:

@@ -1,4 +1,4 @@
-"""`PolledSlowValues`: slow values of one device, polled beside another device's waveforms."""
+"""`PolledSlowValues`: slow values of a separate device, polled in addition to the waveforms."""
 
 import asyncio
 import random
@@ -19,20 +19,20 @@ _CONFIG_RETRY_S = 15.0
 
 
 class PolledSlowValues:
-    """The newest slow values of a device.
+    """Newest slow values of one polled device.
 
-    Unlike a source it opens a lost link again by itself, about once a poll period, because the
-    unit continues without it.
+    Unlike a source, it reopens a lost link itself, about once per poll period, because the unit
+    continues without these values.
 
     Parameters
     ----------
     channels
-        The slow channels that it measures.
+        Slow channels that the device measures.
 
     Attributes
     ----------
     trouble
-        Why there are no values, in words; None while there are.
+        Reason for missing values, in words; None while values are available.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class PolledSlowValues:
 
     @asynccontextmanager
     async def watch(self) -> AsyncIterator[None]:
-        """Poll in the background until the context is left; entering waits for the first poll."""
+        """Poll in a background task until the context exits; entry waits for the first poll."""
         self._task = task = asyncio.create_task(self._run(), name="poll slow values")
         try:
             await self._tried.wait()
@@ -66,7 +66,7 @@ class PolledSlowValues:
             self._raise_bug()
 
     def current(self) -> Mapping[str, Reading]:
-        """The newest values, or why there are none: not connected, or too old."""
+        """Return the newest values; missing values with their reason if not connected or stale."""
         self._raise_bug()
         if self._newest is None:
             return self._missing(Reason.NOT_CONNECTED)
@@ -76,7 +76,7 @@ class PolledSlowValues:
         return self._missing(Reason.STALE if self.trouble is None else Reason.NOT_CONNECTED)
 
     def _raise_bug(self) -> None:
-        """Raise what has ended the polling task: any error but that of a link."""
+        """Raise the exception that has ended the polling task; link errors do not end it."""
         if self._task is not None and self._task.done() and not self._task.cancelled():
             self._task.result()
 
@@ -93,11 +93,11 @@ class PolledSlowValues:
 
     def _retry_s(self, error: AcquisitionError) -> float:
         min_s = _CONFIG_RETRY_S if isinstance(error, ConfigError) else _MIN_RETRY_S
-        # devices that vanish together must not be opened again together
+        # devices that fail together are not reopened at the same moment
         return max(self._settings.poll_period_s, min_s) * random.uniform(1.0, 1.5)  # noqa: S311
 
     async def _poll(self) -> None:
-        """Open the link and poll until something goes wrong."""
+        """Open the link and poll until an error occurs."""
         try:
             async with self._reader.connected():
                 self._freshness.opened(self._clock.monotonic_s())

@@ -1,4 +1,4 @@
-"""Sample axis of a block ring: slots placed by two 32-bit counters, and those that are refused."""
+"""Sample axis of a block ring: sample index of each slot by two 32-bit counters."""
 
 from enum import StrEnum
 
@@ -10,12 +10,12 @@ _US_PER_S = 1_000_000
 _TOLERANCE = ClockTolerance()
 
 _MAX_MISCOUNTED = 8
-"""Longest run of slots whose sequence number alone may be wrong; a longer run means that the device
-was reset."""
+"""Maximum number of successive slots with a wrong sequence number but correct index and time; a
+longer run means that the device was reset."""
 
 
 class Refusal(StrEnum):
-    """Why the samples of a slot are not used; the names become counters."""
+    """Reason for refusing the samples of a slot; the values are names of counters."""
 
     TORN = "torn_slot"
     DAMAGED = "damaged_slot"
@@ -25,18 +25,18 @@ class Refusal(StrEnum):
 
 
 def ahead(sequence: int, of: int) -> int:
-    """Signed distance between two 32-bit counters, the short way round."""
+    """Return the signed distance between two 32-bit counters, modulo wrap-around."""
     return signed_distance(sequence, of, U32)
 
 
 class Timeline:
-    """The sample axis of one epoch.
+    """Sample axis of one epoch.
 
-    A slot fits if sequence number and sample index have advanced by the same amount since the last
-    slot that did. A single slot that does not is refused. Two in a row that agree with each other
-    show that the counters were reset: a new epoch, since the old axis has ended. A few whose index
-    and time go on as before, or back together, were written twice or counted wrongly: these are no
-    reset. Else stamps decide nothing here; they are judged where all adapters' stamps are.
+    A slot is accepted if sequence number and sample index have advanced equally since the last
+    accepted slot. A single inconsistent slot is refused. Two successive slots that are consistent
+    with each other show that the counters were reset, and start a new epoch. Up to eight slots with
+    consistent index and time are refused without a new epoch: only their sequence number is wrong.
+    Time stamps are otherwise not used here; `BlockAssembler` checks them for all adapters.
     """
 
     def __init__(self, layout: RingLayout, epochs: Epochs) -> None:
@@ -49,16 +49,16 @@ class Timeline:
         self.epochs = epochs
 
     def anchor(self, slot: Slot) -> None:
-        """Start the axis at a slot, at the index it names itself."""
+        """Start the axis at the sample index of a slot."""
         self._accept(slot, slot.first_index)
 
     def restart(self, slot: Slot) -> None:
-        """End the axis, since the device's counters went back, and start a new one."""
+        """Start a new epoch and axis at a slot, because the device's counters were reset."""
         self.epochs.begin()
         self.anchor(slot)
 
     def place(self, slot: Slot) -> int | Refusal:
-        """Index of the slot's first sample on the unwrapped axis, or why it has none."""
+        """Return the unwrapped index of a slot's first sample, or the reason for its refusal."""
         if slot.microseconds >= _US_PER_S:
             return Refusal.IMPOSSIBLE_TIME
         if self._accepted is None:
@@ -77,9 +77,9 @@ class Timeline:
         return self._accepted_index
 
     def repeats(self, slot: Slot) -> bool:
-        """Whether a slot is an older one of this axis, offered again.
+        """Whether a slot is an older slot of this axis, delivered again.
 
-        A device that was reset counts the same numbers again, but not at the same time.
+        A device that was reset repeats the counter values, but with other time stamps.
         """
         before = self._accepted
         if before is None or not self._on_one_axis(before, slot):
@@ -91,9 +91,9 @@ class Timeline:
         self._refused, self._n_miscounted = None, 0
 
     def _is_miscounted(self, reference: Slot, slot: Slot) -> bool:
-        """Whether index and time agree about where a slot belongs, whatever its sequence number.
+        """Whether index and time of a slot are consistent, regardless of its sequence number.
 
-        A device that was reset lately counts low numbers at a later time, by two slots at least.
+        After a reset they are not: the index is low, and the time is at least two slots later.
         """
         n_samples = ahead(slot.first_index, reference.first_index)
         return self._is_then(reference, slot, n_samples, self._miscounted)
@@ -105,7 +105,7 @@ class Timeline:
         n_samples: int,
         tolerance: ClockTolerance = _TOLERANCE,
     ) -> bool:
-        """Whether a slot was taken so many samples after another one, by the device's clock."""
+        """Whether the time stamps of two slots differ by `n_samples` sample periods."""
         expected_ns = n_samples * 1000 * NS_PER_S // self._layout.rate_mhz
         deviation_ns = slot.start_ns - reference.start_ns - expected_ns
         return abs(deviation_ns) <= tolerance.over(expected_ns)

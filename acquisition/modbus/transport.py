@@ -1,6 +1,6 @@
-"""Settings of a link: a TCP address or a serial line, and how the device wants to be asked.
+"""Settings of a Modbus link: TCP address or serial line, timeouts and requests in flight.
 
-The plant file's settings refuse values out of their limits; nothing is checked here again.
+The values are validated by the settings of the plant file, and not checked here again.
 """
 
 from dataclasses import dataclass
@@ -12,24 +12,24 @@ from acquisition.modbus.identity import Identity
 _BITS_AROUND_A_CHARACTER = 9  # a start bit and eight of data
 _FRAME_GAP_CHARACTERS = 3.5
 _SHORTEST_FRAME_GAP_S = 0.00175
-"""Modbus over Serial Line 1.02, 2.5.1.1: above 19,200 Bd the gap between frames stays this."""
+"""Gap between frames above 19,200 Bd (Modbus over Serial Line 1.02, 2.5.1.1)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TcpTransport:
-    """A Modbus TCP device.
+    """Address of a Modbus TCP device.
 
     Parameters
     ----------
     host
-        Name or address; example: "192.0.2.17".
+        Host name or IP address; example: "192.0.2.17".
     port
-        1 to 65535.
+        TCP port, 1 to 65535.
 
     Raises
     ------
     ConfigError
-        If the port is 0, which only a simulated device may have in a plant file.
+        If the port is 0; a plant file allows port 0 for simulated devices only.
     """
 
     host: str
@@ -45,7 +45,7 @@ class TcpTransport:
 
 @dataclass(frozen=True, kw_only=True)
 class SerialTransport:
-    """A serial line with Modbus RTU on it; always eight data bits.
+    """Serial line with Modbus RTU; always eight data bits.
 
     Parameters
     ----------
@@ -65,13 +65,13 @@ class SerialTransport:
 
     @property
     def character_s(self) -> float:
-        """Time that one character takes on the line."""
+        """Duration of one character on the line, s."""
         n_bits = _BITS_AROUND_A_CHARACTER + (self.parity != "none") + self.stop_bits
         return n_bits / self.baudrate
 
     @property
     def frame_gap_s(self) -> float:
-        """Silence that has to go before every request."""
+        """Silence required before each request, s."""
         return max(_FRAME_GAP_CHARACTERS * self.character_s, _SHORTEST_FRAME_GAP_S)
 
 
@@ -80,23 +80,23 @@ Transport: TypeAlias = TcpTransport | SerialTransport
 
 @dataclass(frozen=True, kw_only=True)
 class LinkSettings:
-    """How to reach a Modbus device, and how it wants to be asked.
+    """Transport of a Modbus device, and limits of its connections and requests.
 
     Parameters
     ----------
     device_id
         Unit id: 1 to 255 over TCP, 1 to 247 on a serial line.
     timeout_s
-        For connecting and for each reply, above 0. On a serial line it must be longer than the
-        slowest reply: it is also the silence that is awaited when the line is opened.
+        Timeout for connecting and for each reply, above 0. On a serial line it must exceed the
+        slowest reply: it is also the required silence after the line is opened.
     identity
-        What the device must answer before anything else is read from it.
+        Expected identity of the device, checked before any other read; None for no check.
     keeps_connection
-        Whether a connection is kept for as long as it works. False is for TCP devices that close it
-        after each reply or when they are not asked for a while, or that have a single one for all.
+        Whether the connection is kept open. False is for TCP devices that close the connection
+        after each reply or when idle, or that accept a single connection at a time.
     requests_in_flight
-        Most requests that are sent at once, 1 to 16; over TCP, on a connection that is kept. Most
-        devices answer them one after another and save the round trips; some lose all but one.
+        Maximum number of requests sent before the first reply, 1 to 16; above 1 for TCP with a kept
+        connection only. It saves round trips, but some devices lose all requests but one.
     """
 
     transport: Transport

@@ -1,1 +1,1 @@
-"""Builds processes from a plant file and a set of roles, and runs them."""
+"""Construction and execution of the padwatch processes of a plant file, by role."""

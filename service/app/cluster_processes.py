@@ -1,4 +1,4 @@
-"""`padwatch acquire` and `padwatch analyse`: measuring divided between processes."""
+"""`padwatch acquire` and `padwatch analyse`: acquisition and analysis in separate processes."""
 
 import asyncio
 import socket
@@ -40,7 +40,7 @@ from service.settings.storage import Origin
 from service.store.holds import exclusive_use
 
 DRAIN_S = 3.0
-"""Time for the servers to accept waiting blocks when the process stops."""
+"""Longest time to publish the waiting blocks when the process stops, s."""
 
 
 async def run_acquire(
@@ -52,7 +52,7 @@ async def run_acquire(
     announce: Callable[[str], None],
     manager: ServiceManager = NO_MANAGER,
 ) -> None:
-    """Acquire and publish until SIGINT or SIGTERM.
+    """Acquire and publish the samples of units until SIGINT or SIGTERM.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ async def run_acquire(
     async def drain() -> None:
         for task in acquiring:
             task.cancel()
-        with suppress(TimeoutError):  # then the rings of the devices may still hold the samples
+        with suppress(TimeoutError):  # the rings of the devices may still contain the samples
             await asyncio.wait_for(publisher.waiting.drained(), DRAIN_S)
 
     health = _health(publisher, live, beats, list(units))
@@ -116,7 +116,7 @@ async def run_analyse(
     Parameters
     ----------
     plant
-        The whole plant.
+        Complete plant, with the units of all partitions.
     monitors
         Monitors of the units of the partition.
     listener, announce
@@ -125,7 +125,7 @@ async def run_analyse(
     Raises
     ------
     StoreError
-        If the database cannot be used, or another process may have taken the units over.
+        If the database cannot be used, or the process may no longer hold its units.
     StreamAnewError
         If the stream has been replaced since the start.
     """
@@ -154,7 +154,7 @@ async def run_analyse(
 
 
 class Analysing:
-    """Analysis of the units of a partition: stand by, analyse, stop."""
+    """Analysis of the units of a partition, from standby to stop."""
 
     def __init__(
         self,
@@ -198,7 +198,7 @@ class Analysing:
         )
 
         async def begin(stream: str, newest: int) -> dict[str, UnitProgress]:
-            """Return where each unit resumes."""
+            """Return the progress of each unit, at which its analysis resumes."""
             parts = (analysis.analyser, process.live, analysis.recorder, clock)
             progress = {}
             for unit in process.plant.unit:
@@ -217,7 +217,7 @@ class Analysing:
         silence = SilenceWatch(after_s, analysis.analyser, process.live, clock)
 
         async def watch(pulse: Pulse) -> None:
-            """Check that this process still holds its units, and which units are silent."""
+            """Check periodically that this process holds its units, and which units are silent."""
             while True:
                 pulse.beat(WATCH_EVERY_S)
                 await asyncio.to_thread(self._holds.require)
@@ -225,14 +225,14 @@ class Analysing:
                 await clock.sleep(WATCH_EVERY_S)
 
         def held() -> list[str]:
-            """Return the units and shared parts that this process publishes now."""
+            """Return the units and shared parts whose state this process publishes now."""
             service = [PLANT] if self._share.leads else []
             return [*self._monitors, *service, *([SHARED] if silent.is_watching else [])]
 
         async def deliver(pulse: Pulse) -> None:
             pulse.rest()  # each sender has its own heartbeat
             await analysis.deliveries.run(process.beats)
-            await asyncio.Event().wait()  # without receivers there is nothing to do
+            await asyncio.Event().wait()  # without receivers the loop only waits
 
         shared = {**analysis.shared_loops, "deliver": deliver, "silent units": silent.run}
         leadership = Leadership(store.hold, shared, process.beats, clock)
@@ -248,11 +248,11 @@ class Analysing:
             start_loops(loops, process.beats, tasks)
 
     def _trouble(self) -> str | None:
-        """Return why no blocks arrive from the stream, or None."""
+        """Return the reason for which the stream delivers no blocks; None if it delivers."""
         return None if self._consumer is None else self._consumer.trouble
 
     def _behind_s(self) -> float:
-        """Return how far the analysed blocks lag behind their devices."""
+        """Return the largest delay of the analysed blocks behind their devices, s."""
         units = self._consumer.units if self._consumer else {}
         return max((progress.behind_s for progress in units.values()), default=0.0)
 

@@ -26,11 +26,11 @@ class Health:
     Parameters
     ----------
     checks
-        Fault of each part that must work; None if it works.
+        Fault of each required part by name; None for a working part.
     shown
-        Information that does not affect readiness, such as a disconnected device.
+        Status texts by name that do not affect readiness, such as a disconnected device.
     metrics
-        Metric families for Prometheus.
+        Returns the metric families for Prometheus.
     """
 
     checks: Callable[[], Mapping[str, str | None]]
@@ -39,7 +39,7 @@ class Health:
 
 
 def health_app(health: Health) -> FastAPI:
-    """Build the application; it needs no login and shows no secrets."""
+    """Return the ASGI application of the health page; no login, no secrets."""
     app = FastAPI(title="padwatch", docs_url=None, redoc_url=None, openapi_url=None)
 
     @app.get("/livez")
@@ -62,19 +62,19 @@ def health_app(health: Health) -> FastAPI:
     @app.get("/metrics")
     async def metrics() -> Response:
         """Return the metrics in the text format of Prometheus."""
-        families = SimpleNamespace(collect=health.metrics)  # in place of a registry
+        families = SimpleNamespace(collect=health.metrics)  # instead of a registry
         return Response(exposition.generate_latest(families), headers={"content-type": TEXT})
 
     return app
 
 
 HOST = "127.0.0.1"
-"""Loopback only; other hosts use a proxy or an agent on this computer."""
+"""Host of the health page: loopback only; other hosts need a proxy or an agent on this host."""
 
 
 def health_server(
     health: Health, listener: socket.socket, clock: Clock, announce: Callable[[str], None]
 ) -> ProcessServer:
-    """Build the server of the health page on a socket."""
+    """Return the server of the health page on a socket."""
     config = GuardedConfig(health_app(health), HttpLimitSettings(), [HOST], clock.monotonic_s)
     return ProcessServer("health", GuardedServer(config), listener, announce)

@@ -1,4 +1,4 @@
-"""The measuring part of a process: from blocks to results, alarms, evidence and messages."""
+"""Analysis part of a process: results, alarms, evidence and messages from sample blocks."""
 
 import asyncio
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -46,7 +46,7 @@ from service.store.retention import ages_of
 
 @dataclass(frozen=True)
 class Analysis:
-    """Parts of the analysis; the caller feeds `analyser` and runs `recorder`."""
+    """Parts of the analysis; the caller passes blocks to `analyser` and runs `recorder`."""
 
     process: ProcessContext
     part: PlantPart
@@ -71,7 +71,7 @@ class Analysis:
         beats, loops = self.process.beats, self.own_loops
         if self.part != WHOLE:
             return start_loops(loops, beats, tasks)
-        # no other process shares the plant
+        # the only process of the plant
         begun = start_loops(loops | self.shared_loops, beats, tasks)
         return [*begun, tasks.create_task(self.deliveries.run(beats), name="deliver")]
 
@@ -88,13 +88,13 @@ class Analysis:
             "load": self.load.run,
             "soundness": self.soundness.run,
         }
-        if self.process.origin is Origin.LIVE:  # a replay is not the history of a machine
+        if self.process.origin is Origin.LIVE:  # replayed data are not part of the machine history
             loops |= {"learn": self.films.run, "recordings": self.recordings.run}
         return loops
 
     @property
     def shared_loops(self) -> dict[str, Loop]:
-        """Loops that one process runs for the whole plant, besides the delivery of messages."""
+        """Loops that only one process runs for the plant, without the delivery of messages."""
         loops: dict[str, Loop] = {"gather": self.rolling.run}
         if self.process.origin is Origin.LIVE:
             loops["retain"] = self.retaining.run
@@ -102,7 +102,7 @@ class Analysis:
         return loops
 
     async def close(self) -> None:
-        """Write all pending data; also called when a bug ends the program."""
+        """Write all pending data; also called after an unexpected exception."""
         await self.captures.close()
         await self.recorder.flush()
         await self.evidence.close()
@@ -119,31 +119,31 @@ async def analysis_on(
     memories: Mapping[str, UnitMemory] = NO_MEMORIES,
     stream: StreamStatus | None = None,
 ) -> Analysis:
-    """Build the parts of the analysis and resume where the service stopped.
+    """Build the parts of the analysis; resume from the stored state.
 
     Parameters
     ----------
     bus
         Queue of blocks to the analysis.
     alarm_context
-        Context of alarms for messages; receives the film monitors.
+        Source of the values in alarm messages; receives the newest films.
     part
-        Units that this process is responsible for.
+        Part of the plant for which this process is responsible.
     memories
-        State of units in memory, for units without a gap in their samples since.
+        Saved state of the units whose samples have no gap since it was saved.
     stream
-        Status of the stream, if blocks come over a stream.
+        Status of the stream; None if the blocks come directly from the sources.
 
     Raises
     ------
     StoreError
-        If stored state cannot be read; a start without it would lose it.
+        If stored state cannot be read; a start without the state would lose it.
     """
     plant, origin, store, clock = process.plant, process.origin, process.store, process.clock
     live = process.live
     soundness = IntegrityMonitor(store, clock, live)
-    await soundness.look()  # before anything is written
-    if origin is Origin.LIVE:  # a replay starts anew and has no gap
+    await soundness.look()  # before the first write
+    if origin is Origin.LIVE:  # a replay starts without stored results and has no gap
         for unit, monitor in monitors.items():
             monitor.go_on(await asyncio.to_thread(store.reach, unit))
     deliveries = Deliveries(receivers_of(plant, origin, clock), store.outbox, clock)

@@ -1,4 +1,4 @@
-"""Metrics of a process that measures."""
+"""Prometheus metrics of a process that analyses."""
 
 import platform
 from collections.abc import Iterator, Mapping, Sequence
@@ -35,14 +35,14 @@ from service.store.port import StoreError
 
 @dataclass(frozen=True)
 class Scrape:
-    """Collector that reads all parts at once on the event loop, so that numbers are consistent.
+    """Prometheus collector that reads all parts at once on the event loop, for consistent numbers.
 
     Parameters
     ----------
     sources
-        Timed sources by unit.
+        Timed sample sources by unit id.
     receivers
-        Queued messages by receiver; None if the outbox cannot be read.
+        Queue state of each message receiver; None if the outbox cannot be read.
     """
 
     analysis: Analysis
@@ -51,7 +51,7 @@ class Scrape:
     receivers: Sequence[ReceiverView] | None
 
     def collect(self) -> Iterator[Metric]:
-        """Yield all families."""
+        """Yield all metric families."""
         parts, process = self.analysis, self.analysis.process
         live, timings, now_ns = process.live, process.timings, process.clock.now_ns()
         units = {unit.id: [bearing.id for bearing in unit.bearing] for unit in process.plant.unit}
@@ -78,7 +78,7 @@ class Scrape:
 
 
 async def scrape(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource]) -> Scrape:
-    """Prepare a scrape; an outbox that cannot be read is reported as a metric."""
+    """Return the collector of one scrape; an unreadable outbox is reported as a metric."""
     try:
         return Scrape(analysis, bus, sources, await analysis.deliveries.look())
     except StoreError:
@@ -86,7 +86,7 @@ async def scrape(analysis: Analysis, bus: Bus, sources: Mapping[str, TimedSource
 
 
 def evidence_metrics(captures: Captures, evidence: EvidenceCollector) -> Iterator[Metric]:
-    """Yield the families of captures and evidence."""
+    """Yield the metric families of captures and evidence."""
     counts = (
         ("captures_written", "Captures of samples around alarms.", captures.n_written),
         ("captures_failed", "Attempts to write such captures in vain.", captures.n_failed),

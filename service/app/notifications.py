@@ -1,4 +1,4 @@
-"""Receivers and routes of notifications, built from the plant file."""
+"""Construction of the receivers and the router of notifications from the plant file."""
 
 from acquisition.clock import Clock
 from service.notifications.channel import Channel, TrustedAuthorities
@@ -14,7 +14,7 @@ from service.store.outbox import Address, no_recipients
 
 
 def channels_of(settings: AnyReceiver, clock: Clock) -> list[Channel]:
-    """Build the channels of one entry of the plant file, in the order of its names."""
+    """Return the channels of one receiver entry of the plant file, in the order of its names."""
     match settings:
         case WebhookSettings():
             return [Webhook(settings, clock)]
@@ -24,7 +24,7 @@ def channels_of(settings: AnyReceiver, clock: Clock) -> list[Channel]:
 
 
 def receivers_of(plant: PlantFile, origin: Origin, clock: Clock) -> list[Receiver]:
-    """Return all receivers, one for each mail recipient; a replay has none."""
+    """Return all receivers, with one for each mail recipient; none for a replay."""
     if origin is not Origin.LIVE:
         return []
     return [
@@ -35,14 +35,14 @@ def receivers_of(plant: PlantFile, origin: Origin, clock: Clock) -> list[Receive
 
 
 def router_of(plant: PlantFile, origin: Origin, context: FindContext, clock: Clock) -> Address:
-    """Return the router that queues messages of stored events; a replay queues none."""
+    """Return the router of messages about stored events; a replay queues no messages."""
     if origin is not Origin.LIVE or not plant.delivery.receiver:
         return no_recipients
     return Router(plant.delivery.receiver, composer_of(plant, context), clock.now_ns)
 
 
 def composer_of(plant: PlantFile, context: FindContext) -> Composer:
-    """Build the composer of messages about a plant."""
+    """Return the composer of the message texts of a plant."""
     service = plant.service
     host = f"[{service.host}]" if ":" in service.host else service.host
     scheme = "http" if service.tls is None else "https"

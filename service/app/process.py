@@ -1,4 +1,4 @@
-"""Parts that every process of a plant shares: context, live view, supervision, server."""
+"""Common parts of all processes of a plant: context, live view, supervision, server."""
 
 import asyncio
 import socket
@@ -24,7 +24,7 @@ from service.settings.storage import Origin
 from service.store.store import Store
 
 STALE_HOPS = 2.5
-"""A result older than this many refreshes is no longer current."""
+"""Age of a result in refresh periods above which the result is stale."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +34,9 @@ class ProcessContext:
     Parameters
     ----------
     origin
-        Origin of the data in the store and in all answers.
+        Origin of the data in the store and in all API responses.
     beats
-        Heartbeats of every loop of the process.
+        Heartbeats of all loops of the process.
     """
 
     plant: PlantFile
@@ -49,12 +49,12 @@ class ProcessContext:
 
 
 def live_view(plant: PlantFile, clock: Clock) -> LiveView:
-    """Return the live view of a plant before its first samples."""
+    """Return an empty live view of the units of a plant."""
     return LiveView([unit.id for unit in plant.unit], clock, STALE_HOPS * refresh_s(plant))
 
 
 def refresh_s(plant: PlantFile) -> float:
-    """Return the seconds between results of a plant's slowest unit."""
+    """Return the result period of the slowest unit of a plant, s."""
     hop_samples = analysis_of(plant.analysis).hop_samples
     return max(
         (unit.source.hop_polls if isinstance(unit.source, ModbusVectorSettings) else hop_samples)
@@ -66,7 +66,7 @@ def refresh_s(plant: PlantFile) -> float:
 def start_loops(
     loops: Mapping[str, Loop], beats: Heartbeats, tasks: asyncio.TaskGroup
 ) -> list[asyncio.Task[None]]:
-    """Start loops as tasks with their names; their heartbeats are recorded."""
+    """Start each loop as a named task with a heartbeat."""
     return [tasks.create_task(beats.tend(name, loop), name=name) for name, loop in loops.items()]
 
 
@@ -84,9 +84,9 @@ class Links(Protocol):
 
 
 class Supervision:
-    """Notifies the watchdog while every loop is alive, and logs loops that are not.
+    """Supervision of loops: notifies the watchdog while all loops are alive, logs dead loops.
 
-    It runs on the event loop, so a blocked event loop stops the notifications.
+    Supervision runs on the event loop, so that a blocked event loop stops the notifications.
     """
 
     def __init__(
@@ -112,13 +112,13 @@ class Supervision:
         self._manager.notify(STOPPING="1", STATUS="stopping")
 
     async def run(self) -> None:
-        """Check the loops until cancelled."""
+        """Check the heartbeats of all loops periodically until cancelled."""
         while True:
             self.look()
             await self._clock.sleep(self._every_s)
 
     def look(self) -> None:
-        """Check the loops once."""
+        """Check the heartbeats of all loops once."""
         troubles = self._beats.troubles
         words = [f"{name} {trouble}" for name, trouble in troubles.items()]
         if set(troubles) != self._logged:
@@ -138,7 +138,7 @@ class Supervision:
 
 
 Begin = Callable[[asyncio.TaskGroup, asyncio.Event], list[asyncio.Task[None]]]
-"""Starts the tasks of a process; setting the event stops the process."""
+"""Function that starts the tasks of a process; setting the event stops the process."""
 
 
 async def _nothing() -> None:
@@ -147,16 +147,16 @@ async def _nothing() -> None:
 
 @dataclass(frozen=True)
 class ProcessServer:
-    """HTTP server of a process; the process runs from its start to its end.
+    """HTTP server of a process; the tasks of the process run while it serves.
 
     Parameters
     ----------
     name
         Name of the server's heartbeat.
     announce
-        Called with the URL once the server answers.
+        Called with the URL when the server accepts requests.
     prepare
-        Preparation that can follow the first answers.
+        Awaited after `announce`; for preparation that may follow the first requests.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Recordings of a plant's units: writers, selection, and replay in place of the sources."""
+"""Recordings of a plant's units: writers, channel selection and replay."""
 
 import threading
 from collections.abc import AsyncGenerator, AsyncIterator, Iterable
@@ -24,7 +24,7 @@ from service.settings.units import UnitSettings
 
 
 def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> RecordingWriter:
-    """Create the writer of a recording of a unit; the first block decides on counts or values.
+    """Return the writer of a unit's recording; the first block determines counts or values.
 
     Raises
     ------
@@ -35,12 +35,12 @@ def recording_writer(unit: UnitSettings, folder: Path, made_by: str) -> Recordin
 
 
 def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, Path]:
-    """Return recordings by unit.
+    """Return the recording folder of each unit by unit id.
 
     Raises
     ------
     ConfigError
-        If one has no readable manifest, an unknown unit, or the same unit as another.
+        If a recording has no readable manifest or an unknown unit, or two have the same unit.
     """
     known = [unit.id for unit in plant.unit]
     found: dict[str, Path] = {}
@@ -55,12 +55,12 @@ def recordings_by_unit(folders: Iterable[Path], plant: PlantFile) -> dict[str, P
 
 
 def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
-    """Return the part of a recording that a unit needs.
+    """Return the selection of a unit's channels in a recording.
 
     Raises
     ------
     ConfigError
-        If a channel is missing, or has another rate or another unit.
+        If a channel is missing, or its rate or unit differs from the plant file.
     """
     slow_units = {channel.id: channel.unit for channel in unit.slow_channel}
     machine = replace(machine_of(unit), rate_hz=unit.sampling_hz)
@@ -70,17 +70,17 @@ def selection_of(recording: Recording, unit: UnitSettings) -> Selection:
 def replay_source(
     folder: Path, unit: UnitSettings, clock: Clock, speed: float | None
 ) -> SampleSource:
-    """Return a recording in place of a unit's source, with the unit's calibration.
+    """Return a source that replays a recording, with the calibration of the unit.
 
     Parameters
     ----------
     speed
-        Seconds of the recording per second; None to play as fast as the reader reads.
+        Seconds of the recording per second; None for the maximum speed of the reader.
 
     Raises
     ------
     ConfigError
-        If it is damaged or does not fit the unit.
+        If the recording is damaged or does not match the unit.
     """
     recording = open_recording(folder)
     selection = replace(selection_of(recording, unit), calibration=calibration_of(unit))
@@ -88,11 +88,11 @@ def replay_source(
 
 
 REPLAYS = "replays"
-"""Folder below the plant's data folder, separate from its live database."""
+"""Subfolder of the data folder for replay results, separate from the live database."""
 
 
 def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> PlantFile:
-    """Return the replayed part of a plant: own folder, SQLite, reachable from this host only."""
+    """Return a plant of the replayed units with own data folder, SQLite and loopback host."""
     closed = {"host": "127.0.0.1", "socket": None, "tls": None}
     service = plant.service.model_copy(update={"data_folder": str(folder), **closed})
     chosen = tuple(unit for unit in plant.unit if unit.id in set(units))
@@ -101,24 +101,24 @@ def replayed_plant(plant: PlantFile, units: Iterable[str], folder: Path) -> Plan
 
 
 def replay_folder(plant: PlantFile, recordings: Iterable[Path], now_ns: int) -> Path:
-    """Return the folder of the results of one replay, named after recordings and time."""
+    """Return the results folder of one replay, named after its recordings and the time."""
     moment = datetime.fromtimestamp(now_ns // NS_PER_S, UTC).strftime("%Y%m%dT%H%M%SZ")
     name = "+".join(path.resolve().name for path in recordings)[:80]
     return Path(plant.service.data_folder) / REPLAYS / f"{name}-{moment}"
 
 
 class PlayedOut:
-    """Source behind a simulated DAQ that plays a recording; it ends when the recording has ended.
+    """Source on a simulated DAQ that plays a recording; ends at the end of the recording.
 
-    The DAQ still answers after the end, like a device whose converter has stopped. Its reader
-    reports a lost link, which ends the stream here.
+    After the end, the DAQ still replies like a device whose converter has stopped. The wrapped
+    source then raises LinkError, which ends the blocks of this source.
 
     Parameters
     ----------
     over
-        Set when the DAQ has reported the end of the recording.
+        Event that is set when the DAQ has reported the end of the recording.
     gone
-        Set when the DAQ process has ended, which also ends the stream; None to wait for the DAQ.
+        Event that is set when the DAQ process has exited, which also ends the blocks; or None.
     """
 
     def __init__(
@@ -133,7 +133,7 @@ class PlayedOut:
         Raises
         ------
         LinkError, ConfigError
-            As the source does, until the recording is over.
+            As the wrapped source, until the end of the recording.
         """
         async with AsyncExitStack() as stack:
             try:
@@ -149,7 +149,7 @@ class PlayedOut:
     ) -> AsyncGenerator[SampleBlock, None]:
         try:
             async for block in blocks:
-                yield replace(block, clock=None)  # the device's times are those of the recording
+                yield replace(block, clock=None)  # the device reports the times of the recording
         except LinkError:
             if not self._is_over:
                 raise

@@ -1,4 +1,4 @@
-"""The whole service in one process, from start to orderly stop."""
+"""Complete service in one process: acquisition, analysis and API."""
 
 import asyncio
 import socket
@@ -29,18 +29,18 @@ from service.store.holds import exclusive_use
 
 @dataclass(frozen=True)
 class ServiceRun:
-    """Configuration of a service run: a live plant, or recordings of it.
+    """Configuration of a service run with live data or with recordings.
 
     Parameters
     ----------
     units
         Source and monitor of every unit of the plant.
     origin
-        Origin of the data in its database and in its answers.
+        Origin of the data in the database and in the API responses.
     ends
         Whether the service stops when all sources have ended.
     is_demo
-        Whether local clients may do everything without a login.
+        Whether local clients have the admin role without a login.
     """
 
     plant: PlantFile
@@ -57,7 +57,7 @@ async def run_service(
     announce: Callable[[str], None],
     manager: ServiceManager = NO_MANAGER,
 ) -> None:
-    """Run until SIGINT or SIGTERM, or until all sources have ended if the run ends with them.
+    """Run the service until SIGINT or SIGTERM, or with `ends` until all sources have ended.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Audit entries of the service itself: start, stop, configuration and clock steps."""
+"""Audit entries of the service: start, stop, changed configuration and clock steps."""
 
 import asyncio
 import json
@@ -25,16 +25,16 @@ STEPPED = "clock.stepped"
 
 
 Release = Mapping[str, str]
-"""Version of padwatch, version of its configuration, and origin of its data."""
+"""Version of padwatch, version of the configuration, and origin of the data, by key."""
 
 
 def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) -> list[AuditAction]:
-    """Return the entries of a start; a changed configuration has its own entry before it.
+    """Return the audit entries of a start, preceded by one for a changed configuration.
 
     Parameters
     ----------
     last_start
-        Newest entry of a start; None if there is none.
+        Audit entry of the previous start; None for the first start.
     """
     before, now = _configuration_of(last_start), release[CONFIGURATION]
     started = AuditAction(now_ns, PADWATCH, STARTED, SERVICE, after=release)
@@ -45,12 +45,12 @@ def start_deeds(release: Release, last_start: AuditEntry | None, now_ns: int) ->
 
 
 def stop_deed(release: Release, refusals: int, now_ns: int) -> AuditAction:
-    """Return the entry of a stop.
+    """Return the audit entry of a stop.
 
     Parameters
     ----------
     refusals
-        Refused requests without an entry of their own since the last one with an entry.
+        Number of refused requests without an audit entry since the last refusal with one.
     """
     after = {"n_refused_more": refusals} if refusals else None
     return AuditAction(now_ns, PADWATCH, STOPPED, SERVICE, before=release, after=after)
@@ -67,7 +67,7 @@ LOOK_S = 1.0
 
 
 class ServiceTrail:
-    """Records starts, stops and clock steps; a failure to record does not stop the service."""
+    """Recorder of the service's audit entries; a failed write does not stop the service."""
 
     def __init__(self, plant: PlantFile, origin: Origin, audit: AuditStore, clock: Clock) -> None:
         configuration = built_configuration(plant).version
@@ -80,7 +80,7 @@ class ServiceTrail:
         self.refusals = Refusals(audit, clock)
 
     async def begin(self) -> None:
-        """Record the start, and a changed configuration."""
+        """Record the start, and the configuration if it has changed."""
         await self._attempt(self._record_start)
 
     async def end(self) -> None:
@@ -89,7 +89,7 @@ class ServiceTrail:
         await self._attempt(self._audit.record, [deed])
 
     async def watch_clock(self, pulse: Pulse = UNHEARD) -> None:
-        """Record steps of the host's clock until cancelled; times before and after differ."""
+        """Record steps of the host's UTC clock until cancelled."""
         seen = Arrival.now(self._clock)
         while True:
             pulse.beat(LOOK_S)

@@ -1,4 +1,4 @@
-"""Health of the service, as its alarms and its recorders read it."""
+"""Health of the service for its alarms, and pauses of recording under load."""
 
 from collections.abc import Callable, Iterable
 
@@ -27,7 +27,7 @@ def health_of(
     soundness: IntegrityMonitor,
     stream: StreamStatus | None = None,
 ) -> HealthProbe:
-    """Return a function that reads the health of the running service."""
+    """Return a function that returns the current health of the service."""
     names = list(units)
 
     def look() -> ServiceHealth:
@@ -58,29 +58,29 @@ def health_of(
 
 
 def recording_error(tape: ContinuousRecorder, recordings: RecordingIndexer) -> str | None:
-    """Return why samples are not recorded or recordings not maintained; None if neither."""
+    """Return the error of the continuous recorder or the recording indexer; None without one."""
     return tape.trouble or recordings.lasting_trouble
 
 
 BEHIND_S = 3.0
-"""Wait of a block for the analysis above which recording pauses; results come first."""
+"""Waiting time of a block, s, above which recording pauses; the analysis has priority."""
 
 BEHIND_SHARE = 0.25
-"""Filled share of the queue above which recording pauses."""
+"""Filled share of the block queue above which recording pauses."""
 
 CAUGHT_UP = 1.0 / 3.0
-"""Share of these limits below which recording resumes."""
+"""Share of `BEHIND_S` and `BEHIND_SHARE` below which recording resumes."""
 
 
 class Pressure:
-    """Decides from the queue to the analysis and from the disk whether recording pauses.
+    """Backpressure on recording by the queue of the analysis and the free disk space.
 
     Parameters
     ----------
     is_full
         Returns whether the disk is nearly full.
     has_shed
-        Returns whether requests are refused already; they are shed before waveforms.
+        Returns whether API requests are being shed; recording pauses only after that.
     """
 
     def __init__(self, bus: Bus, is_full: Callable[[], bool], has_shed: Callable[[], bool]) -> None:
@@ -88,7 +88,7 @@ class Pressure:
         self._is_behind = False
 
     def look(self) -> DropReason | None:
-        """Return why recording pauses now, or None."""
+        """Return the reason for which recording pauses now; None if it does not pause."""
         share = CAUGHT_UP if self._is_behind else 1.0
         is_behind = (
             self._bus.oldest_wait_s > share * BEHIND_S

@@ -1,4 +1,4 @@
-"""The serving part of a process, and `padwatch serve`, which reads all from the database."""
+"""API server of a process, and `padwatch serve`, an API process that reads the database."""
 
 import asyncio
 import gc
@@ -45,7 +45,7 @@ from service.settings.storage import Origin
 from service.store.store import Store
 
 GC_THRESHOLDS = (20_000, 20, 20)
-"""Rare collections: requests and blocks leave few reference cycles."""
+"""Garbage-collection thresholds: high, since requests and blocks leave few cycles."""
 
 
 def serving_of(
@@ -56,13 +56,13 @@ def serving_of(
     announce: Callable[[str], None],
     evidence: EvidenceService | None = None,
 ) -> ProcessServer:
-    """Build the server of a context; the OpenAPI document is rendered once, after the start.
+    """Return the API server of a context; the OpenAPI document is rendered after the start.
 
     Parameters
     ----------
     announce
-        Called with the URL once the server answers, then with the set-up token if there is no
-        account.
+        Called with the URL when the server accepts requests, then with the set-up token if no
+        account exists.
     """
     app = application(context, evidence)
 
@@ -71,7 +71,7 @@ def serving_of(
             announce(f"to make the first account, within one hour and once: {token}")
         await asyncio.to_thread(app.rendered)
         gc.collect()
-        gc.freeze()  # objects of the start stay; a collection of them takes 0.1 s
+        gc.freeze()  # objects of the start are permanent; scanning them takes 0.1 s
         gc.set_threshold(*GC_THRESHOLDS)
 
     limited = app if context.load is None else LoadShedder(app, context.load)
@@ -86,7 +86,7 @@ def context_of(
     bus: Bus,
     sources: Mapping[str, TimedSource],
 ) -> Context:
-    """Return the context of the API in a process that also analyses."""
+    """Return the API context of a process that also analyses."""
     process = analysis.process
     plant = process.plant
     return Context(
@@ -121,7 +121,7 @@ def context_of(
 
 
 class Replica:
-    """State of a plant as other processes wrote it to the database."""
+    """Replica of a plant's state, read from the database that other processes write."""
 
     def __init__(self, plant: PlantFile, store: Store, clock: Clock) -> None:
         self._plant, self._store, self._clock = plant, store, clock
@@ -136,7 +136,7 @@ class Replica:
         self.deliveries = ReplicaDeliveries(receivers, store.outbox)
 
     async def start(self) -> None:
-        """Read the current state before the first request.
+        """Read the current state; to be called before the first request.
 
         Raises
         ------
@@ -147,7 +147,7 @@ class Replica:
         await self.references.look()
 
     def checks(self) -> dict[str, str]:
-        """Return the status of the analysis of each unit, in words."""
+        """Return the status of each unit's analysis in words, by name of the check."""
         return {f"analysis of {unit.id}": self._signs_of(unit.id) for unit in self._plant.unit}
 
     def _signs_of(self, unit: str) -> str:
@@ -160,7 +160,7 @@ class Replica:
     def context(
         self, desk: Authenticator | None, refusals: Refusals | None, beats: Heartbeats
     ) -> Context:
-        """Return the context of the API in a process that only serves."""
+        """Return the API context of a process that does not analyse."""
         plant, store = self._plant, self._store
         bearings = {unit.id: [bearing.id for bearing in unit.bearing] for unit in plant.unit}
         seen = (self.live, self.alarms, self.films, self.deliveries, self._clock)
@@ -193,7 +193,7 @@ async def run_serve(
     announce: Callable[[str], None],
     manager: ServiceManager = NO_MANAGER,
 ) -> None:
-    """Serve until SIGINT or SIGTERM.
+    """Serve the API from the database until SIGINT or SIGTERM.
 
     Parameters
     ----------

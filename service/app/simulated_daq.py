@@ -1,4 +1,4 @@
-"""The simulated DAQ: devices of the units of a plant file, and the program that runs them."""
+"""Simulated DAQ: devices and servers for the units of a plant file."""
 
 import asyncio
 import json
@@ -40,13 +40,13 @@ from service.settings.units import UnitSettings
 Print = Callable[[str], None]
 
 MAX_COUNT = 1_000_000
-"""Largest count of one command; each fault is queued."""
+"""Largest number of faults of one command; each fault is queued."""
 
 _STANDARD_INPUT = 0
 
 
 async def run_daq(servers: Mapping[str, DaqServer], print_line: Print, *, controlled: bool) -> None:
-    """Serve until SIGINT or SIGTERM, or until standard input ends.
+    """Run the device servers until SIGINT or SIGTERM, or until standard input ends.
 
     Prints lines of JSON: first the endpoint of each unit, later ``{"ended": unit}`` when the
     recording of a unit ends, and the answer to each command.
@@ -54,7 +54,7 @@ async def run_daq(servers: Mapping[str, DaqServer], print_line: Print, *, contro
     Parameters
     ----------
     controlled
-        Whether commands are read from standard input, whose end then ends the DAQ.
+        Whether commands are read from standard input; the end of the input then stops the DAQ.
 
     Raises
     ------
@@ -100,7 +100,7 @@ async def _execute_commands(
 
 
 def _read_lines(loop: asyncio.AbstractEventLoop, put: Callable[[str], None]) -> None:
-    """Pass on lines of standard input, then an empty line; event loops cannot read files.
+    """Read standard input in a thread; put its lines on the queue, then an empty line.
 
     Lines are dropped once the event loop is closed.
     """
@@ -112,12 +112,12 @@ def _read_lines(loop: asyncio.AbstractEventLoop, put: Callable[[str], None]) -> 
 
 
 def execute_command(servers: Mapping[str, DaqServer], line: str) -> dict[str, str]:
-    """Execute one command: ``UNIT FAULT [COUNT]``.
+    """Inject faults into the device of a unit by a command ``UNIT FAULT [COUNT]``.
 
     Returns
     -------
     dict
-        The command under "done", or the reason of its refusal under "refused".
+        Key "done" with the command, or key "refused" with the reason.
     """
     words = line.split()
     if len(words) not in (2, 3) or (len(words) == 3 and not words[2].isdecimal()):
@@ -135,7 +135,7 @@ def execute_command(servers: Mapping[str, DaqServer], line: str) -> dict[str, st
 
 
 VECTOR_WINDOW_S = 10.0
-"""Analysis window of a simulated rack: fifteen turns of a slow machine."""
+"""Analysis window of a simulated rack, s: fifteen revolutions of a slow machine."""
 
 
 def polled_device(
@@ -146,7 +146,7 @@ def polled_device(
     *,
     on_demand: bool,
 ) -> MapDevice:
-    """Build a device whose registers hold the newest sample of a feed."""
+    """Return a device whose registers contain the newest sample of a feed."""
     rows = [channel.id for channel in unit.channels]
     device = MapDevice(feed, source.registers, rows, calibration, unit.id)
     device.on_demand = on_demand
@@ -161,7 +161,7 @@ def vector_device(
     *,
     on_demand: bool,
 ) -> VectorDevice:
-    """Build a rack that computes vectors from a feed at each poll.
+    """Return a rack that computes vectors from the samples of a feed at each poll.
 
     Raises
     ------
@@ -190,7 +190,7 @@ def vector_device(
 def fifo_device(
     source: ModbusFifoSettings, unit: Unit, feed: SampleFeed, *, on_demand: bool
 ) -> FifoDevice:
-    """Build a device that queues the samples of a feed."""
+    """Return a device with the samples of a feed in a FIFO queue."""
     device = FifoDevice(feed, source.fifo_layout(len(unit.channels)), unit.id)
     device.on_demand = on_demand
     return device
@@ -199,14 +199,14 @@ def fifo_device(
 def modbus_server(
     device: ModbusDevice, source: ModbusLinkSettings, clock: Clock | None, *, patient: bool
 ) -> ModbusServer:
-    """Build the server of a device at the address of a source, on TCP or a serial line.
+    """Return the Modbus server of a device at the address of a source, TCP or serial line.
 
     Parameters
     ----------
     clock
         As in `daq_of`.
     patient
-        Whether time starts with the reader's first request.
+        Whether the clock of the device starts with the first request.
     """
     if source.host is not None:
         return ModbusTcpServer(device, clock, source.host, source.port, patient=patient)
@@ -217,21 +217,21 @@ def modbus_server(
 def daq_of(
     unit: UnitSettings, feed: SampleFeed, clock: Clock | None, *, recorded: bool
 ) -> DaqServer:
-    """Build a DAQ of the kind that a unit's source reads.
+    """Return a simulated DAQ of the kind of a unit's source.
 
     Parameters
     ----------
     clock
-        Paces the device; without one it produces as fast as its reader reads.
+        Clock that paces the device; None to produce samples as fast as they are read.
     recorded
-        Whether the feed is a recording: the device waits for its reader and loses nothing.
+        Whether the feed is a recording: the device waits for its reader, without loss.
 
     Raises
     ------
     ConfigError
-        If the unit does not fit into such a device.
+        If the unit exceeds the limits of such a device.
     LookupError
-        If the unit's source reads no device.
+        If the source of the unit has no device.
     """
     source, machine = unit.source, machine_of(unit)
     on_demand = clock is None
@@ -258,7 +258,7 @@ def daq_of(
 
 
 def _ring_shape(unit: UnitSettings, source: ModbusRingSettings) -> RingDeviceSettings:
-    """Return the ring of the unit's simulation, otherwise slots as long as its blocks."""
+    """Return the ring settings of the unit's simulation; default: one block per slot."""
     if unit.simulation is None:
         return RingDeviceSettings(
             base_address=source.base_address, samples_per_slot=unit.block_samples
@@ -274,7 +274,7 @@ _LOOPBACK = "127.0.0.1"
 
 
 STALE_AFTER_S = 5.0
-"""SilenceWatch that ends a finished run; longer than a start."""
+"""Silence of a device, s, after which a finished run ends; longer than a start."""
 
 
 class Wire(StrEnum):
@@ -287,9 +287,9 @@ class Wire(StrEnum):
 
 
 def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
-    """Return the plant with all units behind DAQs on a wire; their addresses are set later."""
+    """Return the plant with a source of kind `wire` for each unit; addresses are set later."""
     units = tuple(
-        # a source with one sample per poll is recorded at the rate of its polls
+        # the recording of a polled source has the rate of its polls
         unit.model_copy(update={"source": _source(wire), "rate_hz": unit.sampling_hz})
         for unit in plant.unit
     )
@@ -297,7 +297,7 @@ def over_wire(plant: PlantFile, wire: Wire) -> PlantFile:
 
 
 def _source(wire: Wire) -> SourceSettings:
-    """Return the source; it polls fast, so that the speed of a replay limits its duration."""
+    """Return source settings for a wire; fast polls do not limit the speed of a replay."""
     if wire in (Wire.CAN, Wire.CAN_FD):
         return CanSettings(
             kind="can",

@@ -51,12 +51,12 @@ DATABASE = "padwatch.sqlite3"
 
 
 def database_path(plant: PlantFile) -> Path:
-    """Return the path of the plant's database file, whether it exists or not."""
+    """Return the path of the plant's database file; the file need not exist."""
     return Path(plant.service.data_folder) / DATABASE
 
 
 def has_store(plant: PlantFile) -> bool:
-    """Return whether the database exists; a database on a server must exist."""
+    """Whether the database exists; always true for PostgreSQL."""
     return plant.store.postgresql is not None or database_path(plant).exists()
 
 
@@ -68,7 +68,7 @@ def store_name(plant: PlantFile) -> str:
 
 
 def head_file(plant: PlantFile) -> Path:
-    """Return the file on this host that names the newest entry of the audit trail."""
+    """Return the path of the local file that identifies the newest audit entry."""
     if plant.store.postgresql is not None:
         return head_path(Path(plant.service.data_folder) / "postgresql")
     return head_path(database_path(plant))
@@ -77,7 +77,7 @@ def head_file(plant: PlantFile) -> Path:
 def open_store(
     plant: PlantFile, origin: Origin = Origin.LIVE, address: Address = no_recipients
 ) -> Store:
-    """Open the plant's database: a file, created if missing, or a PostgreSQL database.
+    """Open the plant's database: a SQLite file, created if missing, or PostgreSQL.
 
     Parameters
     ----------
@@ -87,12 +87,12 @@ def open_store(
     Raises
     ------
     StoreError
-        If the database cannot be used, or holds results of the other origin.
+        If the database cannot be used, or contains results of the other origin.
     """
     spectra = spectra_limits(plant.spectra)
     if plant.store.postgresql is None:
         return SqliteStore(database_path(plant), origin, address, spectra)
-    from service.store.postgres import PostgresStore  # imported late: slow to load
+    from service.store.postgres import PostgresStore  # slow import
 
     where = _postgres_address(plant, plant.store.postgresql)
     return PostgresStore(where, head_file(plant), origin, address, spectra)
@@ -114,7 +114,7 @@ def _postgres_address(plant: PlantFile, conninfo: str) -> "PostgresAddress":
 
 
 def spectra_limits(settings: SpectraSettings) -> SpectraLimits:
-    """Return the limits of stored spectra."""
+    """Return the limits of stored spectra by the settings."""
     return SpectraLimits(
         TierLimits(settings.dense_every_s, settings.n_dense),
         TierLimits(settings.sparse_every_s, settings.n_sparse),
@@ -128,7 +128,7 @@ BYTES_PER_GB = 1e9
 
 
 def captures_of(plant: PlantFile, origin: Origin, clock: Clock) -> Captures:
-    """Build the captures of all units of a live plant; a replay plays recordings already."""
+    """Return the capture recorder of the units of a live plant; a replay makes no captures."""
     found = plant.capture
     kept = origin is Origin.LIVE and found.samples == "kept"
     # a vector rack has no samples
@@ -169,12 +169,12 @@ def recordings_folder(plant: PlantFile) -> Path:
 def tape_of(
     plant: PlantFile, origin: Origin, clock: Clock, press: Callable[[], DropReason | None]
 ) -> ContinuousRecorder:
-    """Build the continuous recorder of the units of a live plant that are to be recorded."""
+    """Return the continuous recorder of the units of a live plant that are recorded."""
     found = plant.recording
     units = {
         unit.id: recorded_unit(unit)
         for unit in plant.unit
-        # a vector rack has no samples; a replay plays recordings already
+        # a vector rack has no samples; a replay is not recorded again
         if found.keeps(unit.id)
         and origin is Origin.LIVE
         and not isinstance(unit.source, ModbusVectorSettings)
@@ -188,7 +188,7 @@ EVIDENCE, CONFIGURATIONS = "evidence", "configurations"
 
 
 def evidence_folders(plant: PlantFile) -> EvidenceFolders:
-    """Return the folders of evidence of a plant."""
+    """Return the folders of evidence, captures and configurations of a plant."""
     root = Path(plant.service.data_folder)
     return EvidenceFolders(root / EVIDENCE, root / CAPTURES, root / CONFIGURATIONS)
 
@@ -196,7 +196,7 @@ def evidence_folders(plant: PlantFile) -> EvidenceFolders:
 def evidence_desk(
     plant: PlantFile, store: Store, keeper: EvidenceCollector, clock: Clock, downloads: Downloads
 ) -> EvidenceService:
-    """Build the service that hands out evidence."""
+    """Return the service for downloads of alarm evidence."""
     archive = EvidenceArchive(evidence_folders(plant), store)
     return EvidenceService(archive, keeper, plant.evidence.trend_days, clock, downloads)
 
@@ -210,7 +210,7 @@ def evidence_of(
     captures: Captures,
     clock: Clock,
 ) -> EvidenceCollector:
-    """Build the collector of evidence; `watch` connects it to the alarms."""
+    """Return the collector of alarm evidence; `watch` connects it to the alarms."""
     limits, folders = limits_of(plant), evidence_folders(plant)
     configuration = built_configuration(plant)
     maker = Maker(plant, configuration, f"padwatch {version('padwatch')}", origin)
@@ -230,7 +230,7 @@ def watch(
 
 
 def built_configuration(plant: PlantFile) -> Configuration:
-    """Return the plant file as this build reads it, without secrets."""
+    """Return the effective configuration of the plant in this build, without secrets."""
     return configuration_of(plant, version("padwatch"), built_from())
 
 
@@ -247,7 +247,7 @@ def limits_of(plant: PlantFile) -> EvidenceLimits:
 
 
 def space_watch(plant: PlantFile, clock: Clock) -> SpaceWatch:
-    """Build the watch of all disks with data of the plant; captures may have their own."""
+    """Return the free-space monitor of all data folders; they may be on different disks."""
     data = Path(plant.service.data_folder)
     folders = {"data": data, CAPTURES: data / CAPTURES, EVIDENCE: data / EVIDENCE}
     if plant.recording.samples == "kept":
@@ -266,7 +266,7 @@ def space_limits(settings: SpaceSettings) -> SpaceLimits:
 
 
 def waveform_keeper(plant: PlantFile, store: Store, clock: Clock) -> RecordingIndexer:
-    """Build the keeper of the recordings of a live plant."""
+    """Return the indexer of the recordings of a live plant, with their retention."""
     data, rules = Path(plant.service.data_folder), retention_rules(plant)
 
     def open_retention() -> RecordingRetention:

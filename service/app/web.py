@@ -1,4 +1,4 @@
-"""The HTTP server of a plant file: application, access and socket."""
+"""HTTP server of a plant file: application, access control and socket."""
 
 import socket
 from collections.abc import Iterator
@@ -29,11 +29,11 @@ from service.store.access.identities import Role, SessionLimits
 from service.store.access.tables import AccessStore
 
 HSTS = ("Strict-Transport-Security", "max-age=31536000")
-"""Browsers that received this header use HTTPS only."""
+"""HTTP Strict Transport Security header: browsers then use HTTPS only."""
 
 
 def server_of(app: ASGIApp, plant: PlantFile, clock: Clock) -> GuardedServer:
-    """Build the server of an application, with the limits and host names of the plant file."""
+    """Return the server of an application with the limits and host names of the plant file."""
     service, tls = plant.service, _tls(plant)
     if service.socket is not None:
         app = TrustedProxy(app)
@@ -44,12 +44,12 @@ def server_of(app: ASGIApp, plant: PlantFile, clock: Clock) -> GuardedServer:
 
 @contextmanager
 def listener_of(plant: PlantFile, port: int) -> Iterator[socket.socket]:
-    """Open the server's socket, before anything else is started.
+    """Open the listening socket of the server; to be called before other parts start.
 
     Parameters
     ----------
     port
-        Replaces the plant file's port; ignored with a Unix socket.
+        TCP port, instead of the port in the plant file; ignored with a Unix socket.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def _tls(plant: PlantFile) -> SSLContext | None:
 
 
 def _names(plant: PlantFile) -> list[str]:
-    """Return the host names of the service and of the dashboard URL in messages."""
+    """Return the accepted host names: those of the service and of the dashboard URL."""
     names = [plant.service.host, *plant.service.hosts]
     if plant.delivery.dashboard_url is not None:
         names.append(urlsplit(plant.delivery.dashboard_url).hostname or "")
@@ -79,18 +79,18 @@ def _names(plant: PlantFile) -> list[str]:
 
 
 class ClosedError(Exception):
-    """The service must not start at this address, for the reason in the message."""
+    """The service would be reachable from other hosts without TLS or accounts."""
 
 
 def access_desk(
     plant: PlantFile, store: AccessStore, clock: Clock, is_demo: bool = False
 ) -> Authenticator:
-    """Build the access service, which authenticates requests.
+    """Return the authenticator of requests.
 
     Parameters
     ----------
     is_demo
-        Whether local clients may do everything without a login.
+        Whether local clients have the admin role without a login.
 
     Raises
     ------
@@ -117,12 +117,12 @@ def access_desk(
 
 
 def application(context: Context, evidence: EvidenceService | None = None) -> GuardedApi:
-    """Build the application.
+    """Return the ASGI application of API, evidence downloads and dashboard.
 
     Parameters
     ----------
     evidence
-        Service that hands out evidence of alarms; None if none is stored.
+        Service for downloads of alarm evidence; None if no evidence is stored.
     """
     app = create_app(context)
     app.add_middleware(AddedHeaders, headers=[(EDITION_HEADER, edition())])
