@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Asker:
-    """Connection state of a client; read from other threads."""
+    """Connection state of the client of a request; read from other threads."""
 
     has_gone: bool = False
 
