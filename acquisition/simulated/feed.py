@@ -13,7 +13,7 @@ from core.samples.calibration import UnitCalibration
 
 
 class FeedEndedError(Exception):
-    """A sample feed has ended, as at the end of a recording."""
+    """A sample feed has ended, for example at the end of a recording."""
 
 
 class SampleFeed(Protocol):

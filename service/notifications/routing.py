@@ -114,7 +114,7 @@ def _wanted(receiver: ReceiverSettings, event: AlarmEvent, notice: Notice) -> No
 
 
 def _shown(event: AlarmEvent) -> Notice | None:
-    if event.state_after in HIDDEN:  # hidden for another reason
+    if event.state_after in HIDDEN:  # still hidden for another reason
         return None
     if event.state_after in ACTIVE:
         return Notice(AlarmChange.RAISED, is_active=True, ends=False)

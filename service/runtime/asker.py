@@ -1,4 +1,4 @@
-"""Request scope: whether the client of the current request is still connected."""
+"""Connection state of the client of the current request, as a context variable."""
 
 from contextvars import ContextVar
 from dataclasses import dataclass

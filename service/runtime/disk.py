@@ -76,7 +76,7 @@ class Growth:
         self._seen: deque[tuple[float, int]] = deque()
 
     def note(self, space: DiskSpace, now_s: float) -> None:
-        """Add a measurement; ``now_s`` is monotonic."""
+        """Add a measurement at the monotonic time ``now_s``; discard old measurements."""
         if not self._seen or now_s - self._seen[-1][0] >= EVERY_S:
             self._seen.append((now_s, space.free_bytes))
         while len(self._seen) > 2 and now_s - self._seen[1][0] >= OVER_S:
@@ -100,7 +100,7 @@ MAX_ALERT, MAX_DANGER = 0.25, 0.125
 """Upper limits of `SpaceLimits` in bytes, as shares of the capacity, for small disks."""
 
 DEADBAND_SHARE = 0.2
-"""Deadband as a share of the danger limit."""
+"""Deadband of the limits as a share of the danger limit."""
 
 
 @dataclass(frozen=True)

@@ -62,7 +62,7 @@ class Durations:
         self._lock = Lock()
 
     def observe(self, duration_s: float) -> None:
-        """Add a duration."""
+        """Add a duration to the histogram."""
         place = bisect_left(self._bounds_s, duration_s)
         with self._lock:
             self._n_in[place] += 1

@@ -10,7 +10,7 @@ from service.runtime.heartbeats import Pulse
 log = structlog.get_logger()
 
 LOOK_S = 20.0
-"""Interval of heartbeats during a long pause."""
+"""Maximum interval of heartbeats during a sleep of `rest`."""
 
 MAX_REST_S = 120.0
 """Maximum pause of `rest_after`."""

@@ -26,7 +26,7 @@ segment take about 8 MiB; page faults of returned memory took half the time of a
 
 
 def return_large_pieces() -> None:
-    """Return the memory of large arrays to the operating system as soon as they are freed.
+    """Configure the C library to return the memory of large arrays immediately when freed.
 
     By default the GNU C library raises its mmap threshold to the size of the largest freed block,
     up to 32 MiB (mallopt(3)). Arrays of later results then lie on the heap between long-lived

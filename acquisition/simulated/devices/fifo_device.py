@@ -144,7 +144,7 @@ class FifoDevice(ModbusDevice):
         return run
 
     def _look(self) -> None:
-        """Record a read without new samples; produce samples if on demand."""
+        """Record a read without new samples; produce samples if the device is on demand."""
         self._n_looks += self.ended
         if self.on_demand:
             self.produce(_ON_DEMAND_STEPS if self._layout.removes else 1)

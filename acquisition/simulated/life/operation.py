@@ -24,7 +24,7 @@ class Operation:
     Parameters
     ----------
     time_ns
-        Times of the readings.
+        Times of the rows.
     """
 
     time_ns: TimeArray
@@ -105,7 +105,7 @@ def wander(
     random: np.random.Generator, n: int, step_s: float, time_s: float, rms: float
 ) -> FloatArray:
     """Return a first-order Gauss-Markov process with zero mean, stationary from row 0, (n,)."""
-    import scipy.signal  # slow to load, and not needed to begin
+    import scipy.signal  # slow import, not needed at start-up
 
     memory = math.exp(-step_s / time_s)
     fresh = random.standard_normal(n)
@@ -141,7 +141,7 @@ def lagged(target: FloatArray, time_s: FloatArray, step_s: float, initial: float
     initial
         Value before the first row.
     """
-    import scipy.signal  # slow to load, and not needed to begin
+    import scipy.signal  # slow import, not needed at start-up
 
     followed = np.empty_like(target)
     edges = np.flatnonzero(np.diff(time_s)) + 1

@@ -26,7 +26,7 @@ class ConditionChange:
     eccentricity_ratio
         Mean eccentricity ratio in all bearings, with the usual variation; None leaves it unchanged.
     oil_offset_c
-        Additional oil temperature while running: a failed cooler, or negative for more cooling.
+        Additional oil temperature while running; positive for a failed cooler.
     """
 
     start_ns: int

@@ -107,14 +107,14 @@ class AccelerometerNoise:
 
     def advance(self, n_samples: int) -> FloatArray:
         """Return the next noise samples, (n_channels, n_samples)."""
-        import scipy.signal  # slow to load, and not needed to begin
+        import scipy.signal  # slow import, not needed at start-up
 
         white, pink = self._white * self._random.standard_normal((2, self._n_channels, n_samples))
         pink, self._pink_state = scipy.signal.sosfilt(self._pink, pink, zi=self._pink_state)
         return np.array(list(self._floored(white + pink))).reshape(white.shape)
 
     def _floored(self, noise: FloatArray) -> Iterator[FloatArray]:
-        import scipy.signal  # slow to load, and not needed to begin
+        import scipy.signal  # slow import, not needed at start-up
 
         for channel, floor in enumerate(self._floors):
             row, self._floor_states[channel] = scipy.signal.sosfilt(
@@ -125,7 +125,7 @@ class AccelerometerNoise:
 
 def _floor(integrates: bool, rate_hz: float) -> FloatArray:
     """Return a high-pass of order 2 for m/s²; with `integrates`, its output is in mm/s."""
-    import scipy.signal  # slow to load, and not needed to begin
+    import scipy.signal  # slow import, not needed at start-up
 
     floor_rad_s = 2.0 * math.pi * FLOOR_HZ
     numerator = [1e3, 0.0] if integrates else [1.0, 0.0, 0.0]
@@ -135,7 +135,7 @@ def _floor(integrates: bool, rate_hz: float) -> FloatArray:
 
 def _pink(corner_hz: float, rate_hz: float) -> FloatArray:
     """Return a filter with power gain corner / f, poles and zeros alternating (Oustaloup, 1991)."""
-    import scipy.signal  # slow to load, and not needed to begin
+    import scipy.signal  # slow import, not needed at start-up
 
     low_hz, high_hz = PINK_BAND_HZ
     high_hz = min(high_hz, 0.3 * rate_hz)

@@ -11,7 +11,7 @@ from core.arrays import FloatArray
 from core.units import hz_from_rpm
 
 PARTS = ((0.5, 1.0), (0.3, 0.57), (0.2, 0.31))
-"""Share of the amplitude, and period in wander times, of each sine of the speed variation."""
+"""Sines of the speed variation: share of the total amplitude, and period in wander times."""
 
 CUTOFF_FILTER_ORDER = 4
 IMPULSE_SAMPLES_PER_CUTOFF_PERIOD = 20
@@ -162,7 +162,7 @@ class HydraulicForce:
 
     def advance(self, n_samples: int) -> FloatArray:
         """Return the force (x, y) at the next samples in newtons, (2, n_samples)."""
-        import scipy.signal  # slow to load, and not needed to begin
+        import scipy.signal  # slow import, not needed at start-up
 
         force_n = self._rms_n * self._random.standard_normal((n_samples, 2)).T
         if self._sections is not None:
@@ -173,7 +173,7 @@ class HydraulicForce:
 
 
 Excitation: TypeAlias = UnbalanceForce | RopeForce | HydraulicForce
-"""Radial force on the rotor."""
+"""Generator of a radial force on the rotor."""
 
 
 def _rotating(force_n: float, angle_rad: FloatArray) -> FloatArray:
@@ -182,7 +182,7 @@ def _rotating(force_n: float, angle_rad: FloatArray) -> FloatArray:
 
 def _low_pass(cutoff_hz: float, rate_hz: float) -> FloatArray:
     """Return second-order sections of a low-pass that preserves the rms of white noise."""
-    import scipy.signal  # slow to load, and not needed to begin
+    import scipy.signal  # slow import, not needed at start-up
 
     sections: FloatArray = scipy.signal.butter(
         CUTOFF_FILTER_ORDER, cutoff_hz, fs=rate_hz, output="sos"
@@ -258,7 +258,7 @@ class Forces:
 
 
 def straight(start: float, stop: float, n_samples: int) -> FloatArray | float:
-    """Return linear interpolation over a chunk without end point; a number if constant."""
+    """Return a linear ramp over a chunk, without its end point; one number if it is constant."""
     if start == stop:
         return start
     return np.linspace(start, stop, n_samples, endpoint=False)

@@ -29,7 +29,7 @@ class Probe:
     row
         Row of the channel.
     slow_channel
-        Slow channel of the mean gap; None without.
+        Slow channel of the mean gap; None if the unit has no such channel.
     bearing, axis
         Index of the bearing, and axis of the probe: 0 is x, 1 is y.
     opposite
@@ -146,7 +146,7 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
     rows = []
     for channel in machine.channels:
         if channel.measurand is Measurand.KEY_PHASE_V:
-            rows.append(np.zeros(maps[SHAFT, Measurand.GAP_UM].shape[1]))  # angle only
+            rows.append(np.zeros(maps[SHAFT, Measurand.GAP_UM].shape[1]))  # no vibration
             continue
         if channel.id not in places:
             raise ConfigError(f"channel {channel.id!r} belongs to no bearing of {machine.id!r}")

@@ -67,7 +67,7 @@ class _Stage:
     state: FloatArray | None = None
 
     def advance(self, samples: FloatArray) -> FloatArray:
-        import scipy.signal  # slow to load, and not needed to begin
+        import scipy.signal  # slow import, not needed at start-up
 
         if self.state is None:
             self.state = scipy.signal.lfilter_zi(self.numerator, self.denominator) * samples[0]
@@ -120,7 +120,7 @@ def _fitted(
     if not poles:  # a recursive filter: rounding of a convolution depends on the piece length
         denominator = np.array([1.0, 0.0])
     if order == 0:
-        taps *= denominator.sum() / taps.sum()  # exact for a constant gap
+        taps *= denominator.sum() / taps.sum()  # exact gain at 0 Hz, for a constant gap
     return np.convolve(zeros, taps), denominator
 
 
@@ -141,6 +141,6 @@ def _taps(columns: ComplexArray, wanted: FloatArray) -> FloatArray:
 def _response(
     numerator: FloatArray, denominator: FloatArray, frequency_hz: FloatArray, rate_hz: float
 ) -> ComplexArray:
-    import scipy.signal  # slow to load, and not needed to begin
+    import scipy.signal  # slow import, not needed at start-up
 
     return np.asarray(scipy.signal.freqz(numerator, denominator, frequency_hz, fs=rate_hz)[1])
