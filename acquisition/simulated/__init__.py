@@ -1,1 +1,1 @@
-"""Simulated plant for tests and demonstrations: machine, devices and years of readings."""
+"""Simulated plant for tests and demonstrations: machine, devices, years of readings."""

@@ -1,4 +1,4 @@
-"""Samples without a wire: feeds, a feed as a source, a feed cut into slots, and the ledger."""
+"""Sample feeds of simulated devices: protocol, sample ledger, slots, simulated source."""
 
 import math
 from collections import Counter
@@ -13,17 +13,17 @@ from core.samples.calibration import UnitCalibration
 
 
 class FeedEndedError(Exception):
-    """A sample feed has ended, as at the end of a recording."""
+    """A sample feed has ended, for example at the end of a recording."""
 
 
 class SampleFeed(Protocol):
-    """Source of samples of a simulated device, as its converter delivers them."""
+    """Protocol of a sample source of a simulated device: raw blocks of converter counts."""
 
     def advance(self, n_samples: int) -> RawBlock:
-        """Return the next samples.
+        """Return the next samples, at most `n_samples`.
 
-        A simulated unit returns as many as requested, directly after the previous ones. A recording
-        returns fewer before a gap or a restart of the device, and continues behind it.
+        A simulated unit returns exactly `n_samples` consecutive samples. A recording returns fewer
+        before a gap or a restart of the device, and continues after it.
 
         Raises
         ------
@@ -34,25 +34,25 @@ class SampleFeed(Protocol):
 
 
 class Ledger:
-    """Samples per channel offered by each unit in each epoch, including lost ones."""
+    """Number of samples per channel produced by each unit in each epoch, including lost samples."""
 
     def __init__(self) -> None:
         self._offered: Counter[tuple[str, int]] = Counter()
 
     def offer(self, unit: str, epoch: int, n_samples: int) -> None:
-        """Count samples that a device has produced."""
+        """Add produced samples to the count of a unit and an epoch."""
         self._offered[unit, epoch] += n_samples
 
     def n_samples(self, unit: str, epoch: int | None = None) -> int:
-        """Number of samples offered by a unit, in one epoch or in all."""
+        """Return the number of samples produced by a unit, in one epoch or in all epochs."""
         return sum(n for (u, e), n in self._offered.items() if u == unit and epoch in (None, e))
 
 
 class SlotFeed:
-    """Feed cut into slots, one slot ahead, so that a device knows the length of a gap.
+    """Sample feed divided into slots of equal length, with look-ahead by one slot.
 
-    A slot begins at a multiple of its length. Samples that fill no slot before a gap, a restart or
-    the end of the feed are left out.
+    The look-ahead shows the length of a gap. Each slot begins at a multiple of its length.
+    Incomplete slots before a gap, a restart or the end of the feed are discarded.
     """
 
     def __init__(self, feed: SampleFeed, samples_per_slot: int) -> None:
@@ -61,7 +61,7 @@ class SlotFeed:
         self._ahead: RawBlock | None = None
 
     def peek(self) -> RawBlock | None:
-        """Return the next slot and keep it; None if the feed has ended."""
+        """Return the next slot without removing it; None if the feed has ended."""
         if self._ahead is None:
             try:
                 self._ahead = self._next()
@@ -70,17 +70,17 @@ class SlotFeed:
         return self._ahead
 
     def take(self) -> RawBlock | None:
-        """Return the next slot; None if the feed has ended."""
+        """Remove and return the next slot; None if the feed has ended."""
         slot = self.peek()
         self._ahead = None
         return slot
 
     def number(self, slot: RawBlock) -> int:
-        """Number of a slot on the grid."""
+        """Return the number of a slot: its first sample index divided by the slot length."""
         return slot.first_index // self._samples_per_slot
 
     def _next(self) -> RawBlock:
-        """Return the next whole slot; a feed ends its pieces at multiples of their length."""
+        """Return the next complete slot; incomplete slots of the feed are discarded."""
         while True:
             piece = self._feed.advance(self._samples_per_slot)
             if piece.n_samples == self._samples_per_slot:
@@ -88,15 +88,15 @@ class SlotFeed:
 
 
 SKIP_SAMPLES = 65536
-"""Samples that are produced and discarded before the event loop continues."""
+"""Maximum number of samples that are discarded before the event loop runs other tasks."""
 
 
 class SimulatedSource:
-    """Calibrated blocks of a sample feed, in real time or as fast as the reader takes them.
+    """Sample source that yields calibrated blocks of a sample feed, in real time or unpaced.
 
-    In real time the feed runs from the first connection on: samples that pass between connections
-    are lost, and the sample index jumps. Unpaced, a new connection continues at the end of the
-    previous one.
+    In real time the feed starts at the first connection. Samples between two connections are lost,
+    and the sample index jumps. Unpaced, blocks are yielded as fast as they are read, and a new
+    connection continues where the previous connection ended.
     """
 
     def __init__(

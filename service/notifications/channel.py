@@ -1,4 +1,4 @@
-"""Shared parts of channels: outcomes of an attempt, secrets, TLS and connections."""
+"""Notification channels: protocol, outcomes of an attempt, secrets, TLS and connections."""
 
 import asyncio
 import os
@@ -15,21 +15,21 @@ from service.settings.notifications import SecretSettings
 
 @dataclass(frozen=True)
 class Delivered:
-    """The receiver accepted the message."""
+    """Outcome: the receiver accepted the message."""
 
     answer: str
 
 
 @dataclass(frozen=True)
 class Refused:
-    """The receiver rejected the message permanently."""
+    """Outcome: the receiver rejected the message permanently."""
 
     answer: str
 
 
 @dataclass(frozen=True)
 class Failed:
-    """The attempt failed and is repeated, after a delay if the receiver requested one."""
+    """Outcome: the attempt failed and is repeated, not before the delay `retry_after_s`."""
 
     answer: str
     retry_after_s: float | None = None
@@ -39,7 +39,7 @@ Outcome = Delivered | Refused | Failed
 
 
 class Channel(Protocol):
-    """Sends messages to one receiver."""
+    """Protocol of a notification channel to one receiver."""
 
     @property
     def address(self) -> str:
@@ -47,7 +47,7 @@ class Channel(Protocol):
         ...
 
     async def send(self, message: Message, body: str) -> Outcome:
-        """Make one attempt within the time-outs; ``body`` is the serialized message."""
+        """Make one delivery attempt within the time-outs; ``body`` is the serialized message."""
         ...
 
 
@@ -55,11 +55,11 @@ MAX_SECRET_BYTES = 8192
 
 
 class SecretError(Exception):
-    """A secret cannot be read; the message names its place and never its content."""
+    """A secret cannot be read; the message contains its location and never its content."""
 
 
 def read_secret(settings: SecretSettings) -> str:
-    """Read a secret, without the line end that editors add.
+    """Read a secret from a file or an environment variable, without surrounding white space.
 
     Raises `SecretError` if the secret is missing or not a single printable line.
     """
@@ -83,16 +83,16 @@ def _start_of(path: Path) -> str:
 
 
 class TrustedAuthorities:
-    """Certificate authorities of the system, or those of one file."""
+    """Trusted certificate authorities: those of the system, or those of one file."""
 
     def __init__(self, ca_file: str | None) -> None:
         self._ca_file = ca_file
         self._context: ssl.SSLContext | None = None
 
     async def context(self) -> ssl.SSLContext:
-        """Return the TLS context; certificate and host name are always checked.
+        """Return the TLS context, which always verifies certificate and host name.
 
-        Raises `OSError` if the file cannot be used; the message names it.
+        Raises `OSError` if the file cannot be used; the message contains its path.
         """
         if self._context is None:
             self._context = await asyncio.to_thread(_context, self._ca_file)
@@ -107,9 +107,9 @@ def _context(ca_file: str | None) -> ssl.SSLContext:
 
 
 async def connected_socket(look_up: NameLookUp, port: int, timeout_s: float) -> socket.socket:
-    """Connect to the first address of a name that accepts a connection.
+    """Return a socket connected to the first address of a host that accepts a connection.
 
-    Raises `OSError` if no address does; the reason is that of the last one.
+    Raises the `OSError` of the last address if no address accepts a connection.
     """
     failure: OSError = OSError("has no address")
     async with asyncio.timeout(timeout_s):
@@ -144,6 +144,6 @@ def error_text(error: BaseException) -> str:
 
 
 def printable(text: str, max_chars: int = 200) -> str:
-    """Return foreign text as one line without control characters."""
+    """Return received text as one line without control characters, truncated to `max_chars`."""
     one_line = " ".join(text.split())
     return "".join(c if c.isprintable() else "�" for c in one_line)[:max_chars]

@@ -1,4 +1,4 @@
-"""Mail over SMTP: one recipient and one connection per attempt."""
+"""Mail channel over SMTP: one recipient, one connection per attempt."""
 
 import asyncio
 import contextlib
@@ -36,7 +36,7 @@ DISCLAIMER = "padwatch monitors conditions and is not a protection system; this 
 
 
 def subject(message: Message) -> str:
-    """Return the subject: one line without control characters."""
+    """Return the subject of the mail: one line without control characters."""
     if message["type"] == "test":
         return printable(f"[padwatch] {message['plant']}: test message")
     priority = (message["priority"] or "").upper() if message["is_active"] else "over"
@@ -51,13 +51,13 @@ def text(message: Message) -> str:
 
 
 def change_words(message: Message) -> str:
-    """Return the change of the alarm in words."""
+    """Return the change of the alarm as text."""
     change: str = message["change"]
     return CHANGES.get(change, change.replace("_", " "))
 
 
 def value_words(message: Message) -> str | None:
-    """Return the value with its uncertainty and the limit; None without a value."""
+    """Return the alarm value with its uncertainty and limit as text; None without a value."""
     value, limit, std = message["value"], message["limit"], message["uncertainty"]
     if value is None:
         return None
@@ -70,7 +70,7 @@ def value_words(message: Message) -> str | None:
 
 
 def _change(value: float, limit: float | None, std: float | None) -> str:
-    """Return a change of stiffness, given as a logarithm, in percent of the baseline."""
+    """Return a logarithmic change of stiffness as text, in percent of the baseline."""
     percent = 100.0 * math.expm1(value)
     spread = "" if std is None else f" ± {2 * 100.0 * std * math.exp(value):.1f} (95 %)"
     edge = None if limit is None else 100.0 * math.expm1(math.copysign(limit, value))
@@ -124,16 +124,16 @@ def _unit_name(message: Message) -> str:
 
 
 QUIT_S = 2.0
-"""Longest wait for the answer to QUIT."""
+"""Maximum wait for the reply to QUIT."""
 
 LOGIN_CODES = (503, 530, 534, 535, 538)
-"""Replies of class 5xx that concern the login and not the mail (RFC 4954, section 6)."""
+"""Reply codes of class 5xx that reject the login, not the mail (RFC 4954, section 6)."""
 
 POLICY = SMTP_POLICY.clone(cte_type="7bit", max_line_length=76)
 
 
 class Mail:
-    """Sends messages to one recipient."""
+    """Mail channel to one recipient."""
 
     def __init__(self, settings: SmtpSettings, recipient: str, trusted: TrustedAuthorities) -> None:
         self.address = recipient
@@ -141,7 +141,7 @@ class Mail:
         self._look_up = NameLookUp(settings.host, settings.port)
 
     async def send(self, message: Message, body: str) -> Outcome:  # noqa: ARG002
-        """Make one attempt."""
+        """Make one delivery attempt over a new SMTP connection."""
         mail = mail_of(message, self._settings.sender, self.address).as_bytes()
         try:
             async with asyncio.timeout(self._settings.total_timeout_s):
@@ -153,7 +153,7 @@ class Mail:
         except aiosmtplib.SMTPResponseException as error:
             return Failed(_reply(error))
         except (aiosmtplib.SMTPException, OSError, ValueError, SecretError) as error:
-            # the cause states the reason without the text that the library adds
+            # the message of the cause does not have the prefix of the library
             cause = error.__cause__ if isinstance(error.__cause__, OSError) else error
             return Failed(printable(error_text(cause)))
 
@@ -166,7 +166,7 @@ class Mail:
                 await self._log_in(server)
                 _, reply = await server.sendmail(settings.sender, [self.address], mail)
                 with contextlib.suppress(aiosmtplib.SMTPException, OSError):
-                    async with asyncio.timeout(QUIT_S):  # the mail is accepted whatever follows
+                    async with asyncio.timeout(QUIT_S):  # the mail has been accepted
                         await server.quit()
             finally:
                 server.close()
@@ -187,9 +187,9 @@ class Mail:
         )
 
     async def _log_in(self, server: aiosmtplib.SMTP) -> None:
-        """Connect, encrypt and log in.
+        """Connect to the server, start TLS and log in.
 
-        Raises `SecretError` if the password cannot be read; then no connection is made.
+        Raises `SecretError` before the connection if the password cannot be read.
         """
         settings = self._settings
         password = read_secret(settings.password) if settings.password else None
@@ -201,7 +201,7 @@ class Mail:
 
 
 def mail_of(message: Message, sender: str, recipient: str) -> EmailMessage:
-    """Return a mail that is identical for every attempt and marked as generated (RFC 3834)."""
+    """Return the mail, identical for every attempt and marked as auto-generated (RFC 3834)."""
     mail = EmailMessage(policy=POLICY)
     mail["From"] = sender
     mail["To"] = recipient
@@ -215,7 +215,7 @@ def mail_of(message: Message, sender: str, recipient: str) -> EmailMessage:
 
 
 def _outcome(error: aiosmtplib.SMTPResponseException) -> Outcome:
-    """Return the outcome of a reply that rejects the mail now or permanently."""
+    """Return the outcome for an SMTP error reply: `Refused` if permanent, otherwise `Failed`."""
     is_permanent = 500 <= error.code < 600 and error.code not in LOGIN_CODES
     return Refused(_reply(error)) if is_permanent else Failed(_reply(error))
 

@@ -17,22 +17,22 @@ from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
 
 Message = dict[str, Any]
-"""A message as JSON values."""
+"""Notification message as a JSON object."""
 
 FORMAT = 1
-"""Version of the format; raised when a key is removed or changes its meaning, not for new keys."""
+"""Version of the message format, incremented if a key is removed or changes its meaning."""
 
 ALARMS_PAGE = "#/alarms"
 
 CONDITION = ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
-"""Quantities of the operating condition."""
+"""Names of the quantities in the `condition` of a message."""
 
 QUANTITIES = {quantity.name: quantity for quantity in CATALOGUE}
 
 
 @dataclass(frozen=True)
 class AlarmContext:
-    """Context of an alarm beside its own value.
+    """Operating data of the alarm's bearing that a message contains in addition to the alarm.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class AlarmContext:
     state
         Name of the operating state; None if unknown.
     condition
-        Operating condition by quantity, as in the message.
+        Values of the quantities of `CONDITION` by name, in the format of the message.
     """
 
     uncertainty: float | None = None
@@ -52,22 +52,22 @@ class AlarmContext:
 FindContext = Callable[[AlarmIdentity], AlarmContext]
 
 NewestFilm = Callable[[str, str], FilmNews | None]
-"""Returns the newest film verdict of a bearing by unit and bearing."""
+"""Function that returns the newest film verdict for a unit id and a bearing id."""
 
 
 class LiveContext:
-    """Reads the context of an alarm from the newest results of its bearing."""
+    """Function object that returns the context of an alarm from the live results."""
 
     def __init__(self, live: LiveView) -> None:
         self._live = live
         self._newest_film: NewestFilm = lambda unit, bearing: None  # noqa: ARG005
 
     def watch_films(self, newest: NewestFilm) -> None:
-        """Set the source of film verdicts, once films are monitored."""
+        """Set the source of the film verdicts when film monitoring starts."""
         self._newest_film = newest
 
     def __call__(self, identity: AlarmIdentity) -> AlarmContext:
-        """Return the context of an alarm; empty if the alarm is not about a bearing."""
+        """Return the context of an alarm; empty without an assessment of the alarm's subject."""
         assessment = self._live.assessment(identity.unit, identity.subject)
         if assessment is None:
             return AlarmContext()
@@ -92,7 +92,15 @@ class LiveContext:
 
 
 class Composer:
-    """Composes messages about a plant; ``url`` is the dashboard, ``new_id`` returns unique ids."""
+    """Factory of the messages of one plant.
+
+    Parameters
+    ----------
+    url
+        URL of the dashboard; None omits links.
+    new_id
+        Function that returns a unique message id.
+    """
 
     def __init__(
         self,
@@ -151,12 +159,12 @@ class Composer:
 
 
 def dumps(message: Message) -> str:
-    """Serialize a message to the text that is signed and sent."""
+    """Serialize a message to JSON text, which is signed and sent."""
     return json.dumps(message, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
 def loads(body: str) -> Message:
-    """Parse a serialized message."""
+    """Return the message that `dumps` serialized."""
     message: Message = json.loads(body)
     return message
 
@@ -172,5 +180,5 @@ def _fact(name: str, value: float | None, uncertainty: float | None) -> Message:
 
 
 def _finite(number: float | None) -> float | None:
-    """Return a number that JSON can represent, otherwise None."""
+    """Return a finite number; None if it is infinite or NaN, which JSON cannot represent."""
     return number if number is not None and math.isfinite(number) else None

@@ -1,4 +1,4 @@
-"""Metrics of deliveries by receiver of the plant file."""
+"""Delivery metrics by receiver of the plant file."""
 
 from collections.abc import Callable, Iterator, Sequence
 
@@ -10,10 +10,12 @@ from service.runtime.metrics import gauge
 
 
 def delivery_metrics(views: Sequence[ReceiverView] | None, now_ns: int) -> Iterator[Metric]:
-    """Yield the metrics of all receivers; ``views`` is None if the outbox cannot be read."""
+    """Yield the delivery metrics; ``views`` is None if the outbox cannot be read."""
     by_name: dict[str, list[ReceiverView]] = {}
     for view in views or ():
-        if view.receiver is not None:  # the recipients of a mail together: no address is a label
+        if (
+            view.receiver is not None
+        ):  # one label for all recipients of a mail; labels contain no address
             by_name.setdefault(view.name.partition(":")[0], []).append(view)
 
     def family(name: str, meaning: str, value: Callable[[list[ReceiverView]], float]) -> Metric:

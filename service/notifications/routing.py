@@ -1,4 +1,4 @@
-"""Routing: outbox letters about an alarm event, for the receivers that request it."""
+"""Routing of alarm events: outbox messages for the receivers that subscribe to the event."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -21,16 +21,16 @@ LEVELS = {"alert": AlarmLevel.ALERT, "danger": AlarmLevel.DANGER}
 
 @dataclass(frozen=True)
 class Notice:
-    """Meaning of an event for a receiver.
+    """Alarm event as a receiver is notified of it.
 
     Parameters
     ----------
     change
-        Change as the receiver sees it: an alarm that is unshelved while active is raised anew.
+        Change in the view of the receiver: unshelving an active alarm is `RAISED`.
     is_active
         Whether the alarm is active after the event.
     ends
-        Whether the alarm is over, which concerns only receivers that were notified of its start.
+        Whether the alarm is over; only receivers that were notified of the alarm need this.
     """
 
     change: AlarmChange
@@ -39,8 +39,8 @@ class Notice:
 
 
 def notice_of(alarm: Alarm, event: AlarmEvent) -> Notice | None:
-    """Return the meaning of an event; None if the alarm is hidden before and after."""
-    if event.change in ENDING:  # also of a hidden alarm, whose receivers wait for its end
+    """Return the notice of an event; None if the alarm is hidden before and after the event."""
+    if event.change in ENDING:  # also for a hidden alarm: receivers must be notified of its end
         return Notice(AlarmChange.RETURNED, is_active=False, ends=True)
     if event.change in SHOWING:
         return _shown(event)
@@ -55,7 +55,7 @@ def notice_of(alarm: Alarm, event: AlarmEvent) -> Notice | None:
 
 
 class Router:
-    """Makes letters of events while these are being stored."""
+    """Function object that creates the outbox messages of an event when the event is stored."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class Router:
         self._receivers, self._composer, self._now_ns = receivers, composer, now_ns
 
     def __call__(self, alarm: Alarm, event: AlarmEvent) -> Iterable[OutboxMessage]:
-        """Return one letter for each receiver that requests the event."""
+        """Return one outbox message for each receiver that subscribes to the event."""
         notice = notice_of(alarm, event)
         if notice is None:
             return []
@@ -96,7 +96,7 @@ class Router:
 
 
 def _wanted(receiver: ReceiverSettings, event: AlarmEvent, notice: Notice) -> Notice | None:
-    """Return the meaning of an event for one receiver; None if the receiver excludes it."""
+    """Return the notice for one receiver; None if its settings exclude the event."""
     identity = event.identity
     if receiver.units is not None and identity.unit not in receiver.units:
         return None
@@ -106,13 +106,15 @@ def _wanted(receiver: ReceiverSettings, event: AlarmEvent, notice: Notice) -> No
         return None
     if notice.ends or (event.level or AlarmLevel.ALERT) >= LEVELS[receiver.lowest_priority]:
         return notice
-    if event.change is AlarmChange.EASED:  # below the receiver's priority: over for this receiver
+    if (
+        event.change is AlarmChange.EASED
+    ):  # below the priority of the receiver, for which the alarm is over
         return Notice(AlarmChange.EASED, is_active=False, ends=True)
     return None
 
 
 def _shown(event: AlarmEvent) -> Notice | None:
-    if event.state_after in HIDDEN:  # hidden for another reason
+    if event.state_after in HIDDEN:  # still hidden for another reason
         return None
     if event.state_after in ACTIVE:
         return Notice(AlarmChange.RAISED, is_active=True, ends=False)

@@ -1,4 +1,4 @@
-"""Senders: deliver the letters of each receiver in order, one at a time."""
+"""Senders: delivery of the outbox messages of each receiver, in order and one at a time."""
 
 import asyncio
 import random
@@ -28,16 +28,16 @@ def wait_s(
     max_s: float,
     share: Callable[[], float] = random.random,
 ) -> float:
-    """Return the wait after a failure: exponential back-off with random jitter of up to half.
+    """Return the delay before the next attempt: exponential back-off, reduced by random jitter.
 
     Parameters
     ----------
     n_failures
-        Consecutive failures, 1 or more.
+        Number of consecutive failures, at least 1.
     retry_after_s
-        Delay requested by the receiver, without jitter; up to the limit.
+        Minimum delay requested by the receiver, limited to `max_s`; None if not requested.
     share
-        Returns a random number from 0 to 1.
+        Function that returns a random number from 0 to 1; the jitter is up to half the delay.
     """
     doubled_s = FIRST_WAIT_S * 2.0 ** min(n_failures - 1, 30)
     drawn_s = min(doubled_s, max_s) * (1.0 - 0.5 * share())
@@ -47,16 +47,16 @@ def wait_s(
 log = structlog.get_logger()
 
 BATCH = 50
-"""Maximum number of letters in memory."""
+"""Maximum number of outbox messages that a sender loads at once."""
 
 LOOK_S = 30.0
-"""Interval of checks without a wake-up: another process may have revived letters, or quiet hours
-may have ended."""
+"""Interval of outbox checks without a wake-up: another process may have requeued messages, or the
+quiet hours may have ended."""
 
 STORE_RETRY_S = 1.0
 
 MAX_SEND_S = 600.0
-"""Longest time-out of one attempt that the settings allow."""
+"""Maximum time-out of one attempt in the settings."""
 
 T = TypeVar("T")
 
@@ -66,7 +66,7 @@ S_PER_H = 3600.0
 
 @dataclass(frozen=True)
 class Receiver:
-    """A receiver of notifications."""
+    """Receiver of notifications, with its settings and its channel."""
 
     name: str
     settings: AnyReceiver
@@ -74,7 +74,7 @@ class Receiver:
 
 
 class SenderState(StrEnum):
-    """State of a sender."""
+    """Activity of a sender."""
 
     IDLE = "idle"
     SENDING = "sending"
@@ -85,18 +85,18 @@ class SenderState(StrEnum):
 
 @dataclass(frozen=True)
 class SenderStatus:
-    """Status of a sender.
+    """Status of a sender: its state and its failed attempts.
 
     Parameters
     ----------
     n_failures
-        Failed attempts since the last one that succeeded.
+        Number of failed attempts since the last delivery.
     failing_since_ns
-        Time of the first of them; None without failures.
+        Time of the first of these failures; None without failures.
     reason
         Reason of the newest failure.
     next_attempt_ns
-        Time of the next attempt; None unless the sender waits for it.
+        Time of the next attempt; None if the sender is not in a retry delay.
     """
 
     state: SenderState = SenderState.IDLE
@@ -107,7 +107,7 @@ class SenderStatus:
 
 
 class Sender:
-    """Delivers the waiting letters of one receiver."""
+    """Loop that delivers the waiting outbox messages of one receiver."""
 
     def __init__(self, receiver: Receiver, outbox: Outbox, clock: Clock) -> None:
         self.receiver, self.status = receiver, SenderStatus()
@@ -117,11 +117,11 @@ class Sender:
         self._pulse: Pulse = UNHEARD
 
     def wake(self) -> None:
-        """Check the outbox now."""
+        """Wake the loop, which checks the outbox immediately."""
         self._news.set()
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Deliver until cancelled."""
+        """Deliver messages until the task is cancelled."""
         self._pulse = pulse
         while True:
             self._news.clear()
@@ -130,7 +130,7 @@ class Sender:
                 await self._wake_up_or(LOOK_S)
 
     async def _deliver_batch(self) -> bool:
-        """Deliver some letters; return whether more may be waiting."""
+        """Deliver up to `BATCH` messages; return whether more messages may be waiting."""
         name = self.receiver.name
         letters = await self._stored(lambda: self._outbox.waiting(name, BATCH))
         for letter in letters:
@@ -150,7 +150,7 @@ class Sender:
         return not await self._stored(lambda: self._outbox.urgent(self.receiver.name))
 
     async def _deliver(self, letter: StoredMessage) -> bool:
-        """Make one attempt; return whether the letter is settled."""
+        """Make one attempt; return whether the message is delivered or permanently rejected."""
         self._note(SenderState.SENDING)
         self._pulse.beat(MAX_SEND_S)
         outcome = await self.receiver.channel.send(loads(letter.body), letter.body)
@@ -161,7 +161,7 @@ class Sender:
         return True
 
     async def _finish(self, letter: StoredMessage, outcome: Outcome) -> None:
-        """Store the outcome, even if the service stops meanwhile."""
+        """Store the outcome of a message; a cancellation does not interrupt the operation."""
         is_delivered = isinstance(outcome, Delivered)
         state = MessageState.DELIVERED if is_delivered else MessageState.REFUSED
         now_ns = self._clock.now_ns()
@@ -193,9 +193,9 @@ class Sender:
         await self._clock.sleep(pause_s)
 
     async def _expire(self, answer: str) -> None:
-        """Expire all letters above the maximum age, after a failed attempt.
+        """Expire all messages above the maximum age, after a failed attempt.
 
-        A step of the host's clock since the start does not count as age.
+        A forward step of the host clock since the start of the sender does not count as age.
         """
         now = Arrival.now(self._clock)
         set_forward_s = max(0.0, now.step_s_since(self._begun))
@@ -211,7 +211,7 @@ class Sender:
             log.error("letters expired", receiver=name, n_messages=n_given_up, reason=answer)
 
     async def _stored(self, work: Callable[[], T], to_the_end: bool = False) -> T:
-        """Run an operation of the store in a thread until it succeeds.
+        """Run a store operation in a thread; repeat it until it succeeds, and return its result.
 
         Parameters
         ----------
@@ -254,7 +254,7 @@ async def _finished(work: Callable[[], T]) -> T:
     except asyncio.CancelledError:
         await asyncio.wait([working])
         if not working.cancelled():
-            working.exception()  # the letter is sent again after the restart
+            working.exception()  # the message is sent again after the restart
         raise
 
 
@@ -265,9 +265,9 @@ class ReceiverView:
     Parameters
     ----------
     receiver, status
-        None for a receiver that is no longer in the plant file; its letters keep waiting.
+        None for a receiver that was removed from the plant file; its messages remain queued.
     backlog
-        None for a receiver without letters.
+        Counts of its outbox messages; None for a receiver without messages.
     """
 
     name: str
@@ -279,7 +279,7 @@ class ReceiverView:
 def receiver_views(
     receivers: Mapping[str, Receiver], outbox: Outbox, status: Callable[[str], SenderStatus]
 ) -> list[ReceiverView]:
-    """Return the state of all receivers: those of the plant file, then others with letters.
+    """Return the state of all receivers of the plant file, then of removed ones with messages.
 
     Raises
     ------
@@ -297,14 +297,14 @@ def receiver_views(
 
 
 class Deliveries:
-    """Runs an independent sender for each receiver."""
+    """Senders of all receivers, which run independently of each other."""
 
     def __init__(self, receivers: Sequence[Receiver], outbox: Outbox, clock: Clock) -> None:
         self._senders = {each.name: Sender(each, outbox, clock) for each in receivers}
         self._outbox, self._clock = outbox, clock
 
     async def run(self, beats: Heartbeats | None = None) -> None:
-        """Deliver until cancelled."""
+        """Run all senders until the task is cancelled."""
         beats = beats or Heartbeats(self._clock)
         loops = {f"deliver {name}": sender.run for name, sender in self._senders.items()}
         try:
@@ -312,11 +312,11 @@ class Deliveries:
                 for name, loop in loops.items():
                     tasks.create_task(beats.tend(name, loop), name=name)
         except asyncio.CancelledError:
-            beats.release(*loops)  # another process of the plant delivers from now on
+            beats.release(*loops)  # another process takes over the delivery
             raise
 
     def wake(self) -> None:
-        """Check the outbox for new letters now."""
+        """Wake all senders, which check the outbox immediately."""
         for sender in self._senders.values():
             sender.wake()
 

@@ -1,4 +1,4 @@
-"""Webhook: signed POST requests, with a limit on the size of the response."""
+"""Webhook channel: signed POST requests, with a limit on the size of the response."""
 
 import asyncio
 import contextlib
@@ -32,10 +32,10 @@ from service.notifications.message import Message
 from service.settings.notifications import WebhookSettings
 
 PIECE_BYTES = 1024
-"""Bytes that are parsed before the event loop runs other tasks."""
+"""Maximum number of bytes per read; the event loop runs other tasks after each read."""
 
 MAX_BYTES = 32_768
-"""Bytes that are read of one response, including its headers."""
+"""Maximum size of a response, including its headers."""
 
 SocketOption = (
     tuple[int, int, int] | tuple[int, int, bytes | bytearray] | tuple[int, int, None, int]
@@ -43,22 +43,22 @@ SocketOption = (
 
 
 class BoundedStream(httpcore2.AsyncNetworkStream):
-    """A connection with a limit on the bytes that are read."""
+    """Network stream with a limit on the total number of bytes that are read."""
 
     def __init__(self, stream: httpcore2.AsyncNetworkStream, n_left: int = MAX_BYTES) -> None:
         self._stream, self._n_left = stream, n_left
 
     async def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
-        """Read some bytes. Raises `httpcore2.ReadError` if the limit is exceeded."""
+        """Read up to `max_bytes`. Raises `httpcore2.ReadError` if the total limit is reached."""
         if self._n_left <= 0:
             raise httpcore2.ReadError(f"the response is longer than {MAX_BYTES} bytes")
         found = await self._stream.read(min(max_bytes, PIECE_BYTES), timeout)
         self._n_left -= len(found)
-        await asyncio.sleep(0)  # received bytes are returned without waiting
+        await asyncio.sleep(0)  # a read of received bytes does not yield to other tasks
         return found
 
     async def write(self, buffer: bytes, timeout: float | None = None) -> None:
-        """Write some bytes."""
+        """Write bytes to the connection."""
         await self._stream.write(buffer, timeout)
 
     async def aclose(self) -> None:
@@ -71,7 +71,7 @@ class BoundedStream(httpcore2.AsyncNetworkStream):
         server_hostname: str | None = None,
         timeout: float | None = None,
     ) -> httpcore2.AsyncNetworkStream:
-        """Encrypt the connection."""
+        """Return the connection encrypted with TLS, with the remaining limit."""
         encrypted = await self._stream.start_tls(ssl_context, server_hostname, timeout)
         return BoundedStream(encrypted, self._n_left)
 
@@ -94,7 +94,7 @@ class BoundedNetwork(httpcore2.AsyncNetworkBackend):
         local_address: str | None = None,
         socket_options: Iterable[SocketOption] | None = None,
     ) -> httpcore2.AsyncNetworkStream:
-        """Connect to the first address that accepts a connection.
+        """Return a connection to the first address of the host that accepts a connection.
 
         Raises `OSError` if the name cannot be resolved. Raises `httpcore2.ConnectError` or
         `httpcore2.ConnectTimeout` if no address accepts a connection.
@@ -116,29 +116,29 @@ class BoundedNetwork(httpcore2.AsyncNetworkBackend):
 
 EXCERPT_BYTES = 1024
 EXCERPT_S = 2.0
-"""Limits of the part of an error response that is read in order to be shown."""
+"""Maximum size and read time of the excerpt of an error response."""
 
 FAULTS = (httpcore2.NetworkError, httpcore2.ProtocolError, httpcore2.UnsupportedProtocol)
-"""Network errors of the library, without time-outs."""
+"""Network errors of `httpcore2` other than time-outs."""
 
 RETRY_STATUSES = (408, 425, 429)
-"""Statuses of class 4xx that do not reject the message."""
+"""Status codes of class 4xx after which the attempt is repeated."""
 
 
 class Webhook:
-    """Posts messages to a web server, each over a new connection."""
+    """Webhook channel: posts each message to a web server over a new connection."""
 
     def __init__(self, settings: WebhookSettings, clock: Clock) -> None:
         self._settings, self._trusted = settings, TrustedAuthorities(settings.ca_file)
         self._clock = clock
         url = urlsplit(settings.url)
         self.address = f"{url.scheme}://{url.netloc}"
-        """URL without its path, which may contain a token."""
+        """Scheme and host of the URL; its path may contain a token."""
         port = url.port or (443 if url.scheme == "https" else 80)
         self._look_up = NameLookUp(url.hostname or "", port)
 
     async def send(self, message: Message, body: str) -> Outcome:
-        """Make one attempt."""
+        """Make one delivery attempt with a POST request."""
         try:
             async with asyncio.timeout(self._settings.total_timeout_s):
                 return await self._post(message["id"], body.encode())
@@ -150,7 +150,7 @@ class Webhook:
     async def _post(self, id_: str, body: bytes) -> Outcome:
         headers, settings = self._headers(id_, body), self._settings
         limits = dict.fromkeys(("read", "write", "pool"), settings.answer_timeout_s)
-        # without redirects, cookies, proxies and netrc, whatever the response contains
+        # the connection pool ignores redirects, cookies, proxies and netrc files
         async with (
             httpcore2.AsyncConnectionPool(
                 ssl_context=await self._trusted.context(),
@@ -180,9 +180,9 @@ class Webhook:
         return Failed(answer, retry_after_s(headers.get(b"retry-after"), self._clock))
 
     def _headers(self, id_: str, body: bytes) -> dict[str, str]:
-        """Return the headers of a request.
+        """Return the headers of the request.
 
-        Raises `SecretError` if a secret cannot be read; then nothing is sent.
+        Raises `SecretError` if a secret cannot be read.
         """
         time_s = str(self._clock.now_ns() // NS_PER_S)
         headers = {
@@ -203,13 +203,13 @@ class Webhook:
 
 
 def signature(secret: str, time_s: str, body: bytes) -> str:
-    """Return the HMAC-SHA-256 of time stamp, dot and body, which prevents replay."""
+    """Return the HMAC-SHA-256 of time stamp, dot and body; the time stamp prevents replay."""
     signed = time_s.encode() + b"." + body
     return "v1=" + hmac.new(secret.encode(), signed, hashlib.sha256).hexdigest()
 
 
 def retry_after_s(text: str | None, clock: Clock) -> float | None:
-    """Return the delay in a Retry-After header, seconds or a date (RFC 9110, 10.2.3), or None."""
+    """Return the delay of a Retry-After header, seconds or date (RFC 9110, 10.2.3), or None."""
     if text is None:
         return None
     if text.isascii() and text.isdigit():
@@ -224,7 +224,7 @@ def retry_after_s(text: str | None, clock: Clock) -> float | None:
 
 
 async def _excerpt(response: httpcore2.Response) -> str:
-    """Read the start of an error response, which may be endless or incomplete."""
+    """Return the start of an error response, which may be endless or incomplete."""
     found = b""
     with contextlib.suppress(*FAULTS, httpcore2.TimeoutException, TimeoutError):
         async with asyncio.timeout(EXCERPT_S):

@@ -1,1 +1,1 @@
-"""A process and its machine: loops, heartbeats, files, disks, times, tables."""
+"""Process services: loops, heartbeats, metrics, files, disk space, time formats, sd_notify."""

@@ -1,4 +1,4 @@
-"""Request scope: whether the client of the current request is still connected."""
+"""Connection state of the client of the current request, as a context variable."""
 
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Asker:
-    """Connection state of a client; read from other threads."""
+    """Connection state of the client of a request; read from other threads."""
 
     has_gone: bool = False
 

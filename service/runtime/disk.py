@@ -1,4 +1,4 @@
-"""Free space of the disks that padwatch writes to: measurement, growth, limits and watch."""
+"""Free space of the disks that padwatch writes to: measurement, trend, limits, monitoring."""
 
 import asyncio
 import os
@@ -60,30 +60,33 @@ def measure_disk(folder: Path) -> DiskSpace:
 
 EVERY_S = 600.0
 OVER_S = 86_400.0
-"""Interval of the stored measurements, and length of the history: the mean of a day includes
-captures and nightly backups."""
+"""Interval and time span of the stored measurements. The span is one day, so that the mean growth
+includes captures and nightly backups."""
 
 MIN_HISTORY_S = 3600.0
-"""Shortest history that a pace is estimated from."""
+"""Minimum time span of the measurements for an estimate of the growth."""
 
 S_PER_DAY = 86_400.0
 
 
 class Growth:
-    """Pace at which a disk fills, from measurements of the last day."""
+    """Growth rate of the used space of a disk, from the measurements of the last day."""
 
     def __init__(self) -> None:
         self._seen: deque[tuple[float, int]] = deque()
 
     def note(self, space: DiskSpace, now_s: float) -> None:
-        """Add a measurement; ``now_s`` is monotonic."""
+        """Add a measurement at the monotonic time ``now_s``; discard old measurements."""
         if not self._seen or now_s - self._seen[-1][0] >= EVERY_S:
             self._seen.append((now_s, space.free_bytes))
         while len(self._seen) > 2 and now_s - self._seen[1][0] >= OVER_S:
             self._seen.popleft()
 
     def days_until_full(self, space: DiskSpace, now_s: float) -> float | None:
-        """Return the days until the disk is full at the pace of the last day; None if unknown."""
+        """Return the days until the disk is full at the growth rate of the last day.
+
+        Return None if the growth rate is unknown or not positive.
+        """
         if not self._seen:
             return None
         since_s, free_then = self._seen[0]
@@ -94,15 +97,15 @@ class Growth:
 
 
 MAX_ALERT, MAX_DANGER = 0.25, 0.125
-"""Shares at which limits in bytes are capped, so that a small disk can be within limits."""
+"""Upper limits of `SpaceLimits` in bytes, as shares of the capacity, for small disks."""
 
 DEADBAND_SHARE = 0.2
-"""Deadband as a share of the danger limit."""
+"""Deadband of the limits as a share of the danger limit."""
 
 
 @dataclass(frozen=True)
 class SpaceLimits:
-    """Limits of free space in shares and in bytes; the limit that is reached first applies."""
+    """Alert and danger limits of free space as a share and in bytes; the higher limit applies."""
 
     alert_share: float = 0.1
     danger_share: float = 0.05
@@ -110,7 +113,7 @@ class SpaceLimits:
     danger_bytes: int = 1_000_000_000
 
     def of(self, total_bytes: int) -> Limits:
-        """Return the limits of the free share of a disk of this size."""
+        """Return the limits of the free share of a disk with the capacity `total_bytes`."""
         whole = max(total_bytes, 1)
         alert = max(self.alert_share, min(self.alert_bytes / whole, MAX_ALERT))
         danger = max(self.danger_share, min(self.danger_bytes / whole, MAX_DANGER))
@@ -128,9 +131,10 @@ class DiskView:
     Parameters
     ----------
     name
-        Name of the first folder on the disk.
+        Name of the first monitored folder on the disk.
     days_until_full
-        At the pace of the last day; None if unknown or not filling.
+        Days until the disk is full at the growth rate of the last day; None if the rate is unknown
+        or not positive.
     """
 
     name: str
@@ -144,7 +148,7 @@ class DiskView:
 
 
 class SpaceWatch:
-    """Measures the disks of some folders periodically, in a thread, since a disk may not answer."""
+    """Periodic measurement of the disks of some folders, in a thread, because a disk may hang."""
 
     def __init__(
         self,
@@ -157,14 +161,14 @@ class SpaceWatch:
         self._growth: dict[int, Growth] = {}
         self._trouble: str | None = None
         self.disks: tuple[DiskView, ...] = ()
-        """Newest measurements; empty before the first."""
+        """Newest measurement of each disk; empty before the first measurement."""
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Measure until cancelled."""
+        """Measure all disks periodically until the task is cancelled."""
         await periodic(self.look, PERIOD_S, self._clock, pulse)
 
     async def look(self) -> None:
-        """Measure all disks once."""
+        """Measure all disks once and update `disks`."""
         try:
             found = await asyncio.to_thread(self._measured)
         except OSError as error:
@@ -178,7 +182,7 @@ class SpaceWatch:
         self.disks = tuple(first.values())
 
     def condition(self, held: AlarmLevel | None) -> Judgement:
-        """Judge the fullest disk."""
+        """Return the most severe judgement of all disks; unknown if the measurement failed."""
         if self._trouble is not None:
             return unknown(self._trouble)
         found = [(self._judged(disk, held), disk) for disk in self.disks]

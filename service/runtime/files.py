@@ -1,4 +1,4 @@
-"""Files that are written whole and synced to the disk, and ZIP files made while they are sent."""
+"""Atomic file writes with sync to the disk, and streamed ZIP archives."""
 
 import os
 import tempfile
@@ -10,15 +10,15 @@ from pathlib import Path
 from typing import BinaryIO
 
 CHUNK = 1 << 20
-"""Bytes that are read at a time."""
+"""Maximum number of bytes per read from a file."""
 
 ASIDE = ".part"
-"""Suffix of a file that is still being written."""
+"""Suffix of the temporary name of a file that is being written."""
 
 PRIVATE = 0o600
 
 STORED = (".parquet",)
-"""Suffixes of files that are compressed already."""
+"""Suffixes of file formats with compression, which a ZIP archive stores uncompressed."""
 
 
 def write_synced(path: Path, content: bytes) -> None:
@@ -30,7 +30,7 @@ def write_synced(path: Path, content: bytes) -> None:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a file under a temporary name, sync it and rename it: it exists whole or not at all."""
+    """Write a file atomically: under a temporary name, with a sync before and after the rename."""
     aside = path.with_name(path.name + ASIDE)
     try:
         write_synced(aside, content)
@@ -41,7 +41,10 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def write_private(path: Path, content: bytes) -> None:
-    """Write a file like `write_whole`, readable by its owner only; several processes may do so."""
+    """Write a file atomically, readable by its owner only.
+
+    Several processes may write the same file at the same time.
+    """
     descriptor, name = tempfile.mkstemp(prefix=f".{path.name}-", dir=path.parent)
     aside = Path(name)
     try:
@@ -54,26 +57,26 @@ def write_private(path: Path, content: bytes) -> None:
 
 
 def create_private(path: Path) -> None:
-    """Create an empty file that only its owner can read."""
+    """Create an empty file that only its owner can read. Raises `FileExistsError` if it exists."""
     os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, PRIVATE))
 
 
 def put_in_place(aside: Path, path: Path) -> None:
-    """Sync a finished file, rename it in one step and sync the rename."""
+    """Sync a complete temporary file, rename it to `path` atomically and sync the folder."""
     _sync(aside)
     aside.replace(path)
     sync_folder(path.parent)
 
 
 def sync_folder(folder: Path) -> None:
-    """Sync the names in a folder to the disk."""
+    """Sync the directory entries of a folder to the disk."""
     _sync(folder)
 
 
 def zipped(files: Mapping[str, Path | bytes]) -> Generator[bytes, None, None]:
-    """Yield a ZIP file in pieces, none of them empty.
+    """Yield a ZIP archive in non-empty pieces.
 
-    All files are opened first, so a file that is removed meanwhile is still sent whole.
+    All files are opened first, so a file that is removed during the iteration is still complete.
 
     Raises `OSError` if a file cannot be read.
     """
@@ -94,7 +97,7 @@ def zipped(files: Mapping[str, Path | bytes]) -> Generator[bytes, None, None]:
 
 
 class Sink(RawIOBase):
-    """Write-only stream that hands out what was written since the last call of `taken`."""
+    """Write-only buffer; `taken` returns and removes its content."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -105,13 +108,13 @@ class Sink(RawIOBase):
         return True
 
     def write(self, piece: object) -> int:
-        """Append a piece."""
+        """Append bytes; return their number."""
         content = bytes(piece)  # type: ignore[call-overload]
         self._pieces.append(content)
         return len(content)
 
     def taken(self) -> Iterator[bytes]:
-        """Yield the bytes written since the last call, if there are any."""
+        """Yield the bytes written since the last call as one piece; nothing if there are none."""
         content = b"".join(self._pieces)
         self._pieces.clear()
         if content:

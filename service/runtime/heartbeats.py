@@ -1,4 +1,4 @@
-"""Heartbeats: liveness of every loop of the program; each announces its next beat."""
+"""Heartbeats: detection of dead and stuck loops; each heartbeat announces the next one."""
 
 import math
 from collections.abc import Awaitable, Callable
@@ -6,28 +6,28 @@ from collections.abc import Awaitable, Callable
 from acquisition.clock import Clock
 
 PATIENCE_S = 60.0
-"""Tolerance for a late beat: a slow disk does not make a loop stuck."""
+"""Tolerance for a late heartbeat, so that a slow disk is not reported as a stuck loop."""
 
 
 class Pulse:
     """Receiver of the heartbeats of one loop; this base class ignores them."""
 
     def beat(self, after_s: float = 0.0) -> None:
-        """Report that the loop is alive, and the longest time until its next beat."""
+        """Record a heartbeat, with the maximum time until the next one."""
 
     def rest(self) -> None:
-        """Report that the loop is alive and waits without limit."""
+        """Record a heartbeat of a loop that waits without a time limit."""
 
 
 UNHEARD = Pulse()
 """Receiver that ignores all heartbeats."""
 
 Loop = Callable[[Pulse], Awaitable[None]]
-"""A coroutine function that runs until it is cancelled and sends heartbeats."""
+"""Coroutine function of a loop: runs until cancelled and sends heartbeats to its argument."""
 
 
 class LoopPulse(Pulse):
-    """Last beat of one loop, and the time when the next is due."""
+    """Time of the last heartbeat of one loop, and due time of the next heartbeat."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -36,12 +36,12 @@ class LoopPulse(Pulse):
         self._has_ended = False
 
     def beat(self, after_s: float = 0.0) -> None:
-        """Record a beat; the next is due after ``after_s`` and `PATIENCE_S`."""
+        """Record a heartbeat; the next one is due after ``after_s`` plus `PATIENCE_S`."""
         self._last_s = self._clock.monotonic_s()
         self._due_s = self._last_s + after_s + PATIENCE_S
 
     def rest(self) -> None:
-        """Record a beat after which none is due."""
+        """Record a heartbeat; the next one has no due time."""
         self._last_s, self._due_s = self._clock.monotonic_s(), math.inf
 
     def end(self) -> None:
@@ -50,7 +50,7 @@ class LoopPulse(Pulse):
 
     @property
     def trouble(self) -> str | None:
-        """Why the loop is not alive; None if it is."""
+        """Reason why the loop is dead or stuck; None if it is alive."""
         if self._has_ended:
             return "has ended"
         now_s = self._clock.monotonic_s()
@@ -60,14 +60,14 @@ class LoopPulse(Pulse):
 
 
 class Heartbeats:
-    """Liveness of the loops that must run as long as the program."""
+    """Heartbeats of all loops that must run as long as the program."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._pulses: dict[str, LoopPulse] = {}
 
     async def tend(self, name: str, run: Loop) -> None:
-        """Run a loop and record its heartbeats; a loop that returns counts as dead."""
+        """Run a loop and record its heartbeats; a loop that returns or raises counts as dead."""
         pulse = self._pulses[name] = LoopPulse(self._clock)
         try:
             await run(pulse)
@@ -80,7 +80,7 @@ class Heartbeats:
             self._pulses.pop(name, None)
 
     def look(self) -> dict[str, str | None]:
-        """Return the fault of each loop by name, None where a loop is alive."""
+        """Return the fault of each loop by name; None for a loop that is alive."""
         return {name: pulse.trouble for name, pulse in self._pulses.items()}
 
     @property

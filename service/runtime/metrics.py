@@ -22,7 +22,15 @@ from acquisition.clock import Clock
 
 @dataclass(frozen=True)
 class HistogramState:
-    """State of a histogram: upper bounds, cumulative counts (the last counts all), sum, newest."""
+    """State of a histogram of durations.
+
+    Parameters
+    ----------
+    n_up_to
+        Cumulative count of each bucket; the last element counts all durations.
+    newest_s
+        Last duration; None before the first.
+    """
 
     bounds_s: tuple[float, ...]
     n_up_to: tuple[int, ...]
@@ -54,7 +62,7 @@ class Durations:
         self._lock = Lock()
 
     def observe(self, duration_s: float) -> None:
-        """Add a duration."""
+        """Add a duration to the histogram."""
         place = bisect_left(self._bounds_s, duration_s)
         with self._lock:
             self._n_in[place] += 1
@@ -63,20 +71,20 @@ class Durations:
 
     @contextmanager
     def timed(self) -> Iterator[None]:
-        """Add the duration of the body, unless it raises."""
+        """Measure and add the duration of a `with` block, unless the block raises."""
         began_s = self._clock.monotonic_s()
         yield
         self.observe(self._clock.monotonic_s() - began_s)
 
     def state(self) -> HistogramState:
-        """Return the current state."""
+        """Return a snapshot of the histogram."""
         with self._lock:
             n_up_to = tuple(accumulate(self._n_in))
             return HistogramState(self._bounds_s, n_up_to, self._sum_s, self._newest_s)
 
 
 Rows = Iterable[tuple[tuple[str, ...], float]]
-"""Label values, in the order of the labels, with the sample value."""
+"""Samples of a metric family: label values, in the order of the labels, and the value."""
 
 
 def gauge(name: str, meaning: str, labels: tuple[str, ...], rows: Rows) -> Metric:
@@ -109,7 +117,7 @@ def plain_histogram(name: str, meaning: str, durations: Durations) -> Metric:
 
 
 def _buckets(state: HistogramState) -> tuple[list[tuple[str, float]], float]:
-    """Return the bounds as text, each with its cumulative count, and the sum."""
+    """Return the buckets (upper bound as text, cumulative count) and the sum of a histogram."""
     bounds = [*map(repr, state.bounds_s), "+Inf"]
     return list(zip(bounds, map(float, state.n_up_to), strict=True)), state.sum_s
 
@@ -119,13 +127,13 @@ OPEN_METRICS = "application/openmetrics-text; version=1.0.0; charset=utf-8"
 
 
 def rendered(metrics: Collector, accept: str) -> tuple[bytes, str]:
-    """Return metrics as text, with its media type.
+    """Return metrics in a text exposition format, with the media type of the text.
 
     Parameters
     ----------
     accept
-        The request's ``Accept`` header. The library's own negotiation is not used: its media type
-        repeats parts of the header.
+        ``Accept`` header of the request. The content negotiation of `prometheus_client` is not
+        used, because the media type that it returns repeats parts of the header.
     """
     if "application/openmetrics-text" in accept.lower():
         text: bytes = open_exposition.generate_latest(metrics)  # type: ignore[no-untyped-call]

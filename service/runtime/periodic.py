@@ -1,4 +1,4 @@
-"""Shared parts of background loops: repetition, logging of failures, pauses with heartbeats."""
+"""Functions of background loops: repetition, logging of failures, pauses with heartbeats."""
 
 from collections.abc import Awaitable, Callable
 
@@ -10,19 +10,19 @@ from service.runtime.heartbeats import Pulse
 log = structlog.get_logger()
 
 LOOK_S = 20.0
-"""Interval of heartbeats during a long pause."""
+"""Maximum interval of heartbeats during a sleep of `rest`."""
 
 MAX_REST_S = 120.0
-"""Longest pause after one piece of work."""
+"""Maximum pause of `rest_after`."""
 
 
 class TroubleLog:
-    """Logs the first failure of a task and its recovery, but not the failures between.
+    """Log of the first failure of a task and of its recovery; repeated failures are not logged.
 
     Parameters
     ----------
     failing, again
-        Messages of the first failure and of the recovery.
+        Log messages of the first failure and of the recovery.
     trouble
         Reason of the newest failure; None after a success.
     """
@@ -33,7 +33,7 @@ class TroubleLog:
         self.trouble = trouble
 
     def note(self, trouble: str | None) -> None:
-        """Record the outcome of one run: the reason of its failure, or None."""
+        """Record the outcome of one run: the reason of its failure, or None for success."""
         if trouble is not None and not self._is_failing:
             log.error(self._failing, reason=trouble)
         if trouble is None and self.trouble is not None:
@@ -44,7 +44,7 @@ class TroubleLog:
 async def periodic(
     work: Callable[[], Awaitable[None]], every_s: float, clock: Clock, pulse: Pulse
 ) -> None:
-    """Do a piece of work repeatedly, with a heartbeat before each and a pause after it."""
+    """Run `work` repeatedly, with a heartbeat before and a pause after each run."""
     while True:
         pulse.beat(every_s)
         await work()
@@ -52,7 +52,7 @@ async def periodic(
 
 
 async def rest(duration_s: float, clock: Clock, pulse: Pulse) -> None:
-    """Pause and send heartbeats meanwhile."""
+    """Sleep and send heartbeats during the sleep."""
     until_s = clock.monotonic_s() + duration_s
     while (left_s := until_s - clock.monotonic_s()) > 0.0:
         pulse.beat(LOOK_S)
@@ -60,8 +60,8 @@ async def rest(duration_s: float, clock: Clock, pulse: Pulse) -> None:
 
 
 async def rest_after(taken_s: float, share: float, clock: Clock, pulse: Pulse) -> None:
-    """Pause for a multiple of the time that the work took, and send heartbeats meanwhile.
+    """Sleep for `share` times the duration `taken_s` of the last work, and send heartbeats.
 
-    The pause is capped so that one slow disk access does not stall the loop.
+    The sleep is limited to `MAX_REST_S`, so that one slow disk access does not stall the loop.
     """
     await rest(min(share * taken_s, MAX_REST_S), clock, pulse)

@@ -1,4 +1,4 @@
-"""Poll durations: the time in which a source works between two waits."""
+"""Poll durations: time between two sleeps of a source, in which it reads its device."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -13,11 +13,11 @@ from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.metrics import Durations
 
 POLL_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0)
-"""From a reply within milliseconds on a plant's network up to a time-out."""
+"""Histogram bounds, from a reply within milliseconds on the plant network up to a time-out."""
 
 
 class PollClock:
-    """Clock of a source that measures the time between the source's waits, separately per task.
+    """Clock of a source that measures poll durations, separately for each task of the source.
 
     The task that reads the source calls the clock repeatedly; each call is also a heartbeat.
     """
@@ -34,12 +34,12 @@ class PollClock:
         return self._clock.now_ns()
 
     def monotonic_s(self) -> float:
-        """Return monotonic seconds."""
+        """Return the monotonic time in seconds; send a heartbeat."""
         self._beat()
         return self._clock.monotonic_s()
 
     async def sleep(self, duration_s: float) -> None:
-        """Wait; the time since the task's previous wait was a poll."""
+        """Sleep, after recording the time since the task's previous sleep as a poll duration."""
         task = asyncio.current_task()
         self._beat(duration_s)
         if task is None:
@@ -51,16 +51,16 @@ class PollClock:
         self._woken_s[task] = self._clock.monotonic_s()
 
     def set_pulse(self, pulse: Pulse) -> None:
-        """Send a heartbeat whenever the calling task reads the clock."""
+        """Send a heartbeat to ``pulse`` at each clock call of the calling task."""
         self._pulse, self._reader = pulse, asyncio.current_task()
 
     def _beat(self, after_s: float = 0.0) -> None:
-        # tasks that poll another device, or a thread that reads a bus, are not the reader
+        # a task that polls another device or a thread that reads a bus sends no heartbeats
         if self._reader is not None and _current_task() is self._reader:
             self._pulse.beat(after_s)
 
     def forget(self) -> None:
-        """Start anew: the time between two connections is not a poll."""
+        """Discard the time of the last sleep: the time between two connections is not a poll."""
         task = asyncio.current_task()
         if task is not None:
             self._woken_s.pop(task, None)
@@ -75,7 +75,7 @@ def _current_task() -> asyncio.Task[Any] | None:
 
 
 class TimedSource:
-    """A source whose polls are measured."""
+    """Sample source with measurement of its poll durations."""
 
     def __init__(self, make: Callable[[Clock], SampleSource], clock: Clock) -> None:
         self._clock = PollClock(clock)
@@ -87,7 +87,7 @@ class TimedSource:
 
     @property
     def polls(self) -> Durations:
-        """Durations of the polls so far."""
+        """Histogram of the poll durations."""
         return self._clock.polls
 
     @property
@@ -97,7 +97,7 @@ class TimedSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link of the source; errors are the source's."""
+        """Open the link of the source; yield its blocks and raise its errors."""
         self._clock.forget()
         async with self._source.connect() as blocks:
             yield blocks

@@ -1,4 +1,4 @@
-"""The process: event loop, signals, exit, memory allocation, logging, and its name in files."""
+"""Process set-up: event loop, signals, exit, memory allocation, logging, author of files."""
 
 import asyncio
 import ctypes
@@ -21,12 +21,12 @@ TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
 
 LARGE_BYTES = 1 << 20
 KEPT_BYTES = 1 << 24
-"""Free memory at the end of the heap that is kept: the arrays of a segment take about 8 MiB. The
-system hands out returned memory again page by page, which took half the time of a segment."""
+"""Free memory at the end of the heap that is not returned to the operating system. The arrays of a
+segment take about 8 MiB; page faults of returned memory took half the time of a segment."""
 
 
 def return_large_pieces() -> None:
-    """Return the memory of large arrays to the operating system as soon as they are freed.
+    """Configure the C library to return the memory of large arrays immediately when freed.
 
     By default the GNU C library raises its mmap threshold to the size of the largest freed block,
     up to 32 MiB (mallopt(3)). Arrays of later results then lie on the heap between long-lived
@@ -40,20 +40,20 @@ def return_large_pieces() -> None:
 
 
 LEAVE_S = 0.5
-"""Time that threads have to finish after the program has ended."""
+"""Maximum wait for running threads after the end of the program."""
 
 SWITCH_S = 0.001
-"""Switch interval of the interpreter: the event loop waits at most this long for a thread that
-computes. The default is five times as long, and every answer waits for it several times."""
+"""Thread switch interval of the interpreter: maximum wait of the event loop for a computing thread.
+The default is five times as long, and each response includes several such waits."""
 
 log = structlog.get_logger()
 
 
 def run_to_its_end(program: Coroutine[Any, Any, None]) -> None:
-    """Run a program that has written all its data when it returns.
+    """Run the main coroutine of a program, which writes all data before it returns.
 
-    The event loop would wait without limit for threads that still read or compute for cancelled
-    requests. A thread cannot be stopped, so the process exits after `LEAVE_S`.
+    At its end, the event loop waits for threads of cancelled requests without a time limit. A
+    thread cannot be stopped, so the process exits after `LEAVE_S`.
     """
     sys.setswitchinterval(SWITCH_S)
     return_large_pieces()
@@ -66,10 +66,10 @@ def run_to_its_end(program: Coroutine[Any, Any, None]) -> None:
 
 
 def leave(code: int = 0) -> NoReturn:
-    """End the process now, without the finalizers of libraries and threads.
+    """Exit the process immediately, without the finalizers of libraries and threads.
 
-    Finalizing takes longer than a stop may, and sometimes aborts: Arrow's threads may still run
-    when its parts are destroyed (apache/arrow#34314).
+    The finalizers may exceed the time limit of a stop, and sometimes abort the process: threads of
+    Arrow may run while its objects are destroyed (apache/arrow#34314).
     """
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # the reader has closed the pipe
@@ -83,7 +83,7 @@ def _leave_threads() -> None:
 
 
 def set_up_logging() -> None:
-    """Log to standard error: coloured lines on a terminal, JSON lines for a supervisor."""
+    """Configure logging to standard error: coloured lines on a terminal, otherwise JSON lines."""
     on_terminal = sys.stderr.isatty()
     structlog.configure(
         processors=[
@@ -96,12 +96,12 @@ def set_up_logging() -> None:
 
 
 def made_by() -> str:
-    """Return program, person and host, for the metadata of a file."""
+    """Return program version, user and host as text, for the metadata of a file."""
     return f"padwatch {version('padwatch')}, {person()}"[:200]
 
 
 def person() -> str:
-    """Return person and host."""
+    """Return the names of the user and the host as text."""
     try:
         name = getpass.getuser()
     except (KeyError, OSError):  # a user of a container may have no name
@@ -110,7 +110,7 @@ def person() -> str:
 
 
 def stop_on_signals() -> asyncio.Event:
-    """Return an event that SIGINT and SIGTERM set."""
+    """Return an event that is set by the signals SIGINT and SIGTERM."""
     stopped = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):

@@ -1,4 +1,4 @@
-"""Notification of the service manager by systemd's protocol, sd_notify(3)."""
+"""Notification of the service manager by the systemd protocol, sd_notify(3)."""
 
 import os
 import socket
@@ -12,12 +12,12 @@ US_PER_S = 1e6
 
 
 class ServiceManager:
-    """Sends notifications to the service manager, if it asked for them.
+    """Client of the service manager; without ``NOTIFY_SOCKET`` it sends nothing.
 
     Parameters
     ----------
     environment
-        Source of ``NOTIFY_SOCKET``, ``WATCHDOG_USEC`` and ``WATCHDOG_PID``.
+        Environment variables ``NOTIFY_SOCKET``, ``WATCHDOG_USEC`` and ``WATCHDOG_PID``.
     """
 
     def __init__(self, environment: Mapping[str, str]) -> None:
@@ -31,12 +31,12 @@ class ServiceManager:
         return self._address is not None
 
     def notify(self, **assignments: str) -> None:
-        """Send one datagram without waiting; log the first that is not accepted.
+        """Send one datagram without blocking; log the first failure.
 
         Parameters
         ----------
         assignments
-            As in sd_notify(3): ``READY``, ``STATUS``, ``WATCHDOG``, ``STOPPING``.
+            Variables of sd_notify(3): ``READY``, ``STATUS``, ``WATCHDOG``, ``STOPPING``.
         """
         if self._address is None:
             return
@@ -54,7 +54,7 @@ class ServiceManager:
 
 
 def _address(named: str) -> str | None:
-    """Return the socket's address: a path, or an abstract name that begins with @."""
+    """Return the address of the socket from its path or its abstract name, which begins with @."""
     if named.startswith("@"):
         return "\0" + named[1:]
     if named.startswith("/"):
@@ -65,7 +65,7 @@ def _address(named: str) -> str | None:
 
 
 def _watchdog_s(environment: Mapping[str, str]) -> float | None:
-    """Return the watchdog's interval, None if it does not watch this process."""
+    """Return the watchdog interval; None if the watchdog does not supervise this process."""
     if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
         return None
     given = environment.get("WATCHDOG_USEC", "")
@@ -73,7 +73,7 @@ def _watchdog_s(environment: Mapping[str, str]) -> float | None:
 
 
 def _one_line(value: str) -> str:
-    """Join lines: a line break would begin another assignment."""
+    """Return text as one line, because a line break separates assignments."""
     return " ".join(value.split())
 
 

@@ -1,4 +1,4 @@
-"""Times as text, in UTC: RFC 3339 for machines, to the second for people."""
+"""Text formats of times in UTC: RFC 3339, compact for file names, and readable."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -8,17 +8,17 @@ EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def rfc3339(time_ns: int) -> str:
-    """Format a time to the millisecond, without rounding error in any year."""
+    """Return a time in RFC 3339 format, truncated to the millisecond without rounding error."""
     moment = EPOCH + timedelta(microseconds=time_ns // 1_000_000 * 1000)
     return moment.isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def compact(time_ns: int) -> str:
-    """Format a time to the millisecond for a file's name; names sort as times do."""
+    """Return a time to the millisecond for a file name; names sort in order of time."""
     seconds, ns = divmod(time_ns, NS_PER_S)
     return f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{ns // 1_000_000:03d}Z"
 
 
 def day_and_time(time_ns: int) -> str:
-    """Format a time to the second, for people."""
+    """Return a time to the second in readable form, ``2026-01-31 12:00:00 UTC``."""
     return f"{datetime.fromtimestamp(time_ns // NS_PER_S, UTC):%Y-%m-%d %H:%M:%S} UTC"

@@ -1,1 +1,1 @@
-"""Simulated measuring devices: sample feeds served over real protocols."""
+"""Simulated measuring devices: sample feeds over real Modbus and CAN protocols."""

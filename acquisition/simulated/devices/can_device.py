@@ -1,4 +1,4 @@
-"""`CanDevice`: converter of a unit behind CAN frames; faults of its frames and of the bus."""
+"""Simulated CAN DAQ: frames of the sample blocks of a unit; faults of frames and of the bus."""
 
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -15,21 +15,21 @@ from acquisition.simulated.feed import FeedEndedError, Ledger, SampleFeed
 from core.units import NS_PER_S
 
 Item: TypeAlias = WireFrame | bytes
-"""A frame, or a line of a text protocol."""
+"""Item to be sent: a CAN frame, or a line of the slcan text protocol."""
 
 _LONG_LINE = b"t100" + b"8" * 5000 + b"\r"
 _FOREIGN_ID = 0x7F0
 _FLOOD = 10
-"""Foreign frames before each spoilt one."""
+"""Number of foreign frames that the fault ``flood`` sends before a frame."""
 
 
 class FrameFaults:
-    """Applies faults to waveform frames, one fault to each, in the order of injection.
+    """Fault injection into waveform frames, one fault per frame, in the order of injection.
 
     Parameters
     ----------
     as_line
-        Writes a frame as text; None without a text protocol.
+        Function that encodes a frame as a text line; None without a text protocol.
     """
 
     def __init__(self, as_line: Callable[[WireFrame], bytes] | None = None) -> None:
@@ -59,7 +59,7 @@ class FrameFaults:
         self._waiting.extend([self.known[fault]] * count)
 
     def applied(self, frames: Iterable[WireFrame]) -> list[Item]:
-        """Return what is sent instead of these frames."""
+        """Return the items that are sent instead of `frames`, with waiting faults applied."""
         items: list[Item] = []
         for frame in frames:
             if not frame.wave or not (self._waiting or self._held):
@@ -74,7 +74,7 @@ class FrameFaults:
         return items
 
     def _hold_back(self, frame: WireFrame) -> list[Item]:
-        """Let the next frame of the same message overtake this one."""
+        """Hold a frame, which is sent after the next frame with the same id."""
         self._held = frame
         return []
 
@@ -100,7 +100,7 @@ _U32 = 1 << 32
 
 
 class CanDevice:
-    """Converter and CAN controller of one unit; the first block is there from the start.
+    """Converter and CAN controller of one unit; the first block is available from the start.
 
     Parameters
     ----------
@@ -109,21 +109,21 @@ class CanDevice:
     unit
         Name of the unit in the ledger.
     block_samples
-        Samples of a block, which begins with health, time and slow values.
+        Samples per channel of a block; a block begins with health, time and slow values.
     buffer_blocks
-        Blocks kept while no reader listens; more push out the oldest.
+        Maximum number of buffered blocks; a new block then replaces the oldest block.
 
     Attributes
     ----------
     ended
         Whether the feed has ended.
     elapsed_ns
-        Time of the blocks so far, including gaps of the feed.
+        Total duration of the produced blocks and of the gaps between them.
 
     Raises
     ------
     ConfigError
-        If feed and shape have different channels.
+        If feed and shape differ in the number of channels or in the sample type.
     """
 
     def __init__(
@@ -154,26 +154,26 @@ class CanDevice:
 
     @property
     def has_frames(self) -> bool:
-        """Whether a block waits to be sent."""
+        """Whether the buffer contains a block."""
         return bool(self._waiting)
 
     @property
     def is_full(self) -> bool:
-        """Whether the next block pushes the oldest one out."""
+        """Whether the buffer is full, so that the next block replaces the oldest block."""
         return len(self._waiting) == self._waiting.maxlen
 
     def next_frames(self) -> list[WireFrame]:
-        """Take the oldest waiting block.
+        """Remove and return the frames of the oldest buffered block.
 
         Raises
         ------
         LookupError
-            If no block waits.
+            If the buffer is empty.
         """
         return self._waiting.popleft()
 
     def produce(self, n_blocks: int = 1) -> None:
-        """Let the converter run for some blocks, or to the end of the feed."""
+        """Produce `n_blocks` blocks, or fewer at the end of the feed."""
         for _ in range(n_blocks):
             try:
                 self._take(self._feed.advance(self.block_samples))
@@ -182,11 +182,11 @@ class CanDevice:
                 return
 
     def freeze(self, n_blocks: int) -> None:
-        """Send the last block again instead of the next ones."""
+        """Repeat the last block in place of the next `n_blocks` blocks."""
         self._n_frozen += n_blocks
 
     def restart(self) -> None:
-        """Power off and on: the index begins at zero, in the next epoch."""
+        """Restart the device: the next block has sample index 0 in the next epoch."""
         self._n_restarts += 1
         self._index_offset = None
 
@@ -207,7 +207,7 @@ class CanDevice:
         self._waiting.append(self._last)
 
     def _pass_time(self, raw: RawBlock) -> None:
-        """Count the time of a block and of a gap before it; a restart takes no time."""
+        """Add the duration of a block, and of a gap before the block, to `elapsed_ns`."""
         epoch, stop = self._stop
         n_passed = raw.stop_index - stop
         if raw.epoch != epoch or n_passed < raw.n_samples:

@@ -1,4 +1,4 @@
-"""CAN frames of a block of samples."""
+"""CAN frames of the simulated CAN DAQ, and their encoder."""
 
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -15,7 +15,7 @@ _U16, _U32 = 1 << 16, 1 << 32
 
 
 class FrameKind(Enum):
-    """Kind of a frame on the bus."""
+    """Kind of a CAN frame."""
 
     DATA = "data"
     REMOTE = "remote"
@@ -25,12 +25,12 @@ class FrameKind(Enum):
 
 @dataclass(frozen=True, slots=True)
 class WireFrame:
-    """A frame on the bus.
+    """CAN frame of the simulated DAQ.
 
     Parameters
     ----------
     wave
-        Whether it carries samples.
+        Whether the frame carries samples.
     """
 
     frame_id: int
@@ -42,7 +42,7 @@ class WireFrame:
 
 
 class FrameEncoder:
-    """Encodes raw blocks."""
+    """Encoder of raw blocks as CAN frames."""
 
     def __init__(self, shape: CanShape) -> None:
         self._heads = [m for m in shape.messages if m.first_channel is None]
@@ -50,7 +50,7 @@ class FrameEncoder:
         self._shape = shape
 
     def frames(self, raw: RawBlock) -> list[WireFrame]:
-        """All frames of a block, in the order in which they are sent."""
+        """Return all frames of a block in transmission order."""
         values = self._head_values(raw)
         frames = [self._head(message, values) for message in self._heads]
         columns = [self._wave(message, raw) for message in self._waves]
@@ -103,6 +103,6 @@ class FrameEncoder:
 
 
 def shortened(frame: WireFrame) -> WireFrame:
-    """The frame cut to the next shorter length."""
+    """Return the frame truncated to the next shorter valid CAN FD data length."""
     length = max(n for n in CAN_FD_DLC if n < len(frame.data))
     return replace(frame, data=frame.data[:length])

@@ -1,4 +1,4 @@
-"""Servers of the simulated CAN DAQ: pace, faults and end; any bus that python-can can send to."""
+"""Servers of the simulated CAN DAQ: pacing, faults and end; server for python-can buses."""
 
 import asyncio
 from abc import abstractmethod
@@ -20,20 +20,20 @@ _ERROR_ID = 0x88
 
 
 class CanDaqServer(DaqServer):
-    """Serves one CAN device.
+    """Server of one simulated CAN device.
 
     Parameters
     ----------
     clock
-        Paces the device, which catches up after any delay; without one the device produces only
-        when ``produce`` is called.
+        Clock that paces the device, which catches up after a delay; None produces blocks only when
+        ``produce`` is called, or `on_demand`.
     on_demand
-        Without a clock: produce as fast as the reader takes, without loss while it listens.
+        Without a clock: produce blocks as fast as the client reads them, without loss.
     patient
-        With a clock: wait while no reader listens or the reader is behind, so that no block is
-        lost; otherwise the oldest blocks are.
+        With a clock: wait while no client is connected or the buffer is full, so that no block is
+        lost; otherwise the oldest blocks are lost.
     as_line
-        Writes a frame as text, on a text protocol.
+        Function that encodes a frame as a text line, for a text protocol.
     """
 
     def __init__(
@@ -56,24 +56,24 @@ class CanDaqServer(DaqServer):
 
     @abstractmethod
     async def _send(self, items: Sequence[Item]) -> None:
-        """Put frames onto the bus, waiting as long as the reader does not take them."""
+        """Send frames; wait while the client does not read them."""
 
     async def _listened_to(self) -> None:
-        """Wait until a reader listens."""
+        """Wait until a client listens; a bus that does not report clients does not wait."""
 
     async def run(self) -> None:
-        """Serve until cancelled; return when the feed has ended and all of it is sent."""
+        """Serve until cancelled, or until the feed has ended and all blocks are sent."""
         await asyncio.gather(*(asyncio.shield(task) for task in self._tasks))
 
     def produce(self, n_blocks: int = 1) -> None:
-        """Let the device run for some blocks; needed only without a clock."""
+        """Produce `n_blocks` blocks; needed only without a clock."""
         self.device.produce(n_blocks)
         self._awake.set()
 
     def _faults_by_name(self) -> Mapping[str, Callable[[int], None]]:
-        """Faults of the next waveform frames, of the next blocks, and of the device.
+        """Return the faults of waveform frames, of blocks and of the device by name.
 
-        ``freeze`` repeats blocks; ``reset_epoch`` restarts the device, whatever the count.
+        ``freeze`` repeats blocks; ``reset_epoch`` restarts the device once, with any count.
         """
         of_frames = {
             name: partial(self._frame_faults.inject, name) for name in self._frame_faults.known
@@ -97,7 +97,7 @@ class CanDaqServer(DaqServer):
                 continue
             await self._send(self._frame_faults.applied(self.device.next_frames()))
             self._taken.set()
-            await asyncio.sleep(0)  # a socket that never blocks would starve other tasks
+            await asyncio.sleep(0)  # other tasks must run even if the socket never blocks
 
     async def _pace(self, clock: Clock) -> None:
         if self._origin_s is None:
@@ -112,7 +112,7 @@ class CanDaqServer(DaqServer):
             self.produce()
 
     async def _wait_for_reader(self) -> None:
-        """Wait until a reader listens and has room, if the server is patient."""
+        """If the server is patient, wait until a client is connected and the buffer is not full."""
         if not self._patient:
             return
         await self._listened_to()
@@ -122,15 +122,15 @@ class CanDaqServer(DaqServer):
 
 
 class CanBusServer(CanDaqServer):
-    """Serves one device on a bus of python-can.
+    """Server of one simulated CAN device on a python-can bus.
 
-    "virtual" stays within one process. "udp_multicast" reaches other processes and hosts: it uses
-    the route to its group, usually the default route, and slow readers lose frames.
+    The interface "virtual" is limited to one process. "udp_multicast" reaches other processes and
+    hosts over the route to its group, usually the default route; slow readers lose frames.
 
     Parameters
     ----------
     interface, channel, options
-        Those of python-can.
+        Arguments of `can.Bus` of python-can.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class CanBusServer(CanDaqServer):
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
-        """Interface and channel."""
+        """Interface and channel of the python-can bus."""
         return {"interface": self._interface, "channel": self._channel}
 
     async def _plug_in(self) -> None:
@@ -178,7 +178,7 @@ class CanBusServer(CanDaqServer):
 
 
 def can_message(frame: WireFrame) -> can.Message:
-    """A frame as a message of python-can."""
+    """Return a frame as a python-can message."""
     if frame.kind in (FrameKind.BUS_OFF, FrameKind.ERROR):
         bits = _BUS_OFF_ID if frame.kind is FrameKind.BUS_OFF else _ERROR_ID
         return can.Message(

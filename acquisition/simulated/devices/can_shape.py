@@ -1,7 +1,7 @@
-"""`CanShape`: messages of the simulated CAN DAQ; its DBC, and the settings that read it.
+"""Messages of the simulated CAN DAQ, their DBC file, and the settings of a source for them.
 
-A block of samples begins with messages of its index, epoch, health, time and slow values, each with
-a counter that assigns it to the first sample of the block. The samples follow.
+A block begins with messages of its sample index, epoch, health, time and slow values, each with a
+counter that refers to the first sample of the block. The waveform messages follow.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _MAX_SLOW = 50
 
 
 class Kind(Enum):
-    """Type of a signal, by its numpy code."""
+    """Data type of a signal; the value is the NumPy type code."""
 
     U8 = "u1"
     U16 = "u2"
@@ -33,13 +33,13 @@ class Kind(Enum):
 
     @property
     def n_bytes(self) -> int:
-        """Size on the wire."""
+        """Size of the signal in bytes."""
         return int(self.value[1])
 
 
 @dataclass(frozen=True)
 class Field:
-    """A signal of a message; `offset` counts bytes."""
+    """Signal of a CAN message; `offset` is in bytes."""
 
     name: str
     offset: int
@@ -50,12 +50,12 @@ class Field:
 
 @dataclass(frozen=True)
 class MessageShape:
-    """A message of the simulated DAQ.
+    """CAN message of the simulated DAQ.
 
     Parameters
     ----------
     first_channel
-        First channel whose samples it carries; None if it carries none.
+        Index of the first channel of a waveform message; None for other messages.
     """
 
     name: str
@@ -68,7 +68,7 @@ class MessageShape:
 
     @property
     def dtype(self) -> np.dtype[np.void]:
-        """Numpy record of the message: little-endian if classic, big-endian if FD."""
+        """NumPy record type of the message: little-endian in classic CAN, big-endian in CAN FD."""
         order = ">" if self.fd else "<"
         return np.dtype(
             {
@@ -80,18 +80,18 @@ class MessageShape:
         )
 
     def records(self, n_frames: int) -> npt.NDArray[np.void]:
-        """Frames of zeros."""
+        """Return records of `n_frames` frames, filled with zeros."""
         return np.zeros(n_frames, dtype=self.dtype)
 
 
 @dataclass(frozen=True)
 class DaqSignal:
-    """A channel in the DBC.
+    """Channel of the simulated DAQ in the DBC file.
 
     Parameters
     ----------
     unit, factor
-        Unit of its values, and value of one count; float32 samples have factor 1.
+        Unit of the values, and value of one count in this unit; 1 for float32 samples.
     """
 
     id: str
@@ -101,19 +101,19 @@ class DaqSignal:
 
 @dataclass(frozen=True, kw_only=True)
 class CanShape:
-    """Messages of the simulated DAQ.
+    """Channels and message format of the simulated CAN DAQ.
 
     Parameters
     ----------
     floats
-        Whether samples are float32 engineering units rather than int16 counts.
+        Whether samples are float32 in engineering units rather than int16 counts.
     base_id
-        Id of the first message; the others have the following ids.
+        Id of the first message; further messages have consecutive ids.
 
     Raises
     ------
     ConfigError
-        If the ids or channels do not fit.
+        If the number of channels or the ids are out of range.
     """
 
     channels: tuple[DaqSignal, ...]
@@ -138,12 +138,12 @@ class CanShape:
 
     @property
     def samples_per_frame(self) -> int:
-        """Samples of each channel in a waveform frame."""
+        """Number of samples per channel in a waveform frame."""
         return _FD_SAMPLES if self.fd else 1
 
     @property
     def messages(self) -> tuple[MessageShape, ...]:
-        """All messages in the order in which a block sends them."""
+        """All messages in transmission order of a block."""
         shapes = [*(self._fd_heads() if self.fd else self._classic_heads()), *self._waves()]
         return tuple(
             MessageShape(
@@ -160,7 +160,7 @@ class CanShape:
 
     @property
     def waves(self) -> tuple[MessageShape, ...]:
-        """Messages that carry samples."""
+        """Waveform messages, which carry samples."""
         return tuple(m for m in self.messages if m.first_channel is not None)
 
     def _classic_heads(self) -> "list[_Shape]":
@@ -205,7 +205,7 @@ class CanShape:
         return waves
 
     def sample_names(self, channel_id: str) -> tuple[str, ...]:
-        """Names of a channel's signals, one for each sample in a frame."""
+        """Return the signal names of a channel, one for each sample in a frame."""
         name = dbc_name(channel_id)
         if self.samples_per_frame == 1:
             return (name,)
@@ -217,7 +217,7 @@ _COUNTER = Field("counter", 0, Kind.U16)
 
 
 def dbc_name(channel_id: str) -> str:
-    """Id of a channel as a DBC name: letters, digits and underscores, no digit first."""
+    """Return a channel id as a valid DBC name: letters, digits and underscores, no digit first."""
     name = "".join(c if c.isalnum() and c.isascii() else "_" for c in channel_id)
     return f"_{name}" if name[0].isdigit() else name
 
@@ -251,7 +251,7 @@ BA_DEF_DEF_ "VFrameFormat" "StandardCAN";
 
 
 def daq_dbc(shape: CanShape) -> str:
-    """Text of the DBC file that describes the simulated DAQ's messages."""
+    """Return the text of the DBC file of the simulated DAQ."""
     parts = [_HEADER]
     parts += [_message(message) for message in shape.messages]
     parts.append(_ATTRIBUTES)
@@ -268,14 +268,14 @@ def daq_dbc(shape: CanShape) -> str:
 def daq_settings(
     shape: CanShape, link: CanLinkSettings, units: tuple[str, ...], **others: Any
 ) -> CanSettings:
-    """Settings of a source that reads the simulated DAQ, with its DBC as text.
+    """Return the settings of a CAN source for the simulated DAQ, with the DBC file as text.
 
     Parameters
     ----------
     units
         Engineering unit of each waveform channel.
     others
-        Further settings of the source.
+        Additional fields of `CanSettings`.
     """
     where = {field.name: m.name for m in shape.messages for field in m.fields}
     return CanSettings(
@@ -296,7 +296,7 @@ def daq_settings(
 
 
 def _beside(shape: CanShape) -> dict[str, Any]:
-    """Settings of counters and of all signals that are not channels."""
+    """Return the fields of `CanSettings` for counters and other signals that are not channels."""
     where = {field.name: m.name for m in shape.messages for field in m.fields}
     counters = [
         f"{message.name}.{field.name}"

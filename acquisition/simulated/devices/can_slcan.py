@@ -1,4 +1,4 @@
-"""slcan servers of the simulated CAN DAQ: a serial adapter on a TCP port or a pseudo-terminal.
+"""slcan servers of the simulated CAN DAQ: serial adapter on a TCP port or a pseudo-terminal.
 
 The protocol is the text protocol of Lawicel adapters, with the FD lines ``d D b B`` of newer ones
 and the state lines ``s`` and ``e`` of the slcan driver of Linux.
@@ -27,7 +27,7 @@ _BUS_OFF_LINE, _ERROR_LINE = b"sb256256\r", b"e1B\r"
 
 
 def slcan_line(frame: WireFrame) -> bytes:
-    """A frame as text."""
+    """Return a frame as an slcan line."""
     if frame.kind is FrameKind.BUS_OFF:
         return _BUS_OFF_LINE
     if frame.kind is FrameKind.ERROR:
@@ -41,12 +41,12 @@ def slcan_line(frame: WireFrame) -> bytes:
 
 
 class _SlcanServer(CanDaqServer):
-    """Commands to an adapter, and the state of its channel.
+    """Base class of the slcan servers: commands of the client, and state of the CAN channel.
 
     Attributes
     ----------
     commands
-        Number of commands by letter; frames to be sent have ``t``, ``T``, ``r``, ….
+        Number of received commands by letter; ``t``, ``T``, ``r``, … are frames from the client.
     """
 
     def __init__(
@@ -72,17 +72,17 @@ class _SlcanServer(CanDaqServer):
 
     @abstractmethod
     def cut(self) -> None:
-        """Cut the connection, as a cable does that is unplugged for a moment."""
+        """Close the connection abruptly, like a brief interruption of the cable."""
 
     @abstractmethod
     async def _write(self, data: bytes) -> None:
-        """Send bytes, waiting as long as the reader does not take them."""
+        """Send bytes; wait while the client does not read them."""
 
     def _faults_by_name(self) -> Mapping[str, Callable[[int], None]]:
         return {**super()._faults_by_name(), "cut": lambda _: self.cut()}
 
     def _answer(self, data: bytes) -> bytes:
-        """Execute received commands; return the answers."""
+        """Execute received commands; return the replies."""
         *commands, self._command = (self._command + data).split(b"\r")
         self._command = self._command[:_MAX_COMMAND]
         return b"".join(self._carried_out(command) for command in commands)
@@ -102,12 +102,12 @@ class _SlcanServer(CanDaqServer):
 
 
 class SlcanTcpServer(_SlcanServer):
-    """An slcan adapter on a TCP port; a new reader replaces the one before.
+    """slcan adapter on a TCP port; a new client replaces the previous client.
 
     Parameters
     ----------
     port
-        0 takes a free port, and keeps it.
+        TCP port; 0 selects a free port, which is kept when the server is entered again.
     """
 
     def __init__(
@@ -128,7 +128,7 @@ class SlcanTcpServer(_SlcanServer):
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
-        """Interface and URL of the socket."""
+        """python-can interface and URL of the socket."""
         return {"interface": "slcan", "channel": f"socket://{self._host}:{self._port}"}
 
     async def _plug_in(self) -> None:
@@ -147,7 +147,7 @@ class SlcanTcpServer(_SlcanServer):
         await self._server.wait_closed()
 
     def cut(self) -> None:
-        """Close the connection."""
+        """Close the connection of the client abruptly."""
         self._open.clear()
         if self._writer is not None:
             self._writer.transport.abort()
@@ -176,12 +176,12 @@ class SlcanTcpServer(_SlcanServer):
 
 
 class SlcanPtyServer(_SlcanServer):
-    """An slcan adapter on a pseudo-terminal.
+    """slcan adapter on a pseudo-terminal.
 
     Parameters
     ----------
     link
-        See `PseudoTerminal`.
+        Symbolic link to the terminal; see `PseudoTerminal`.
     """
 
     def __init__(
@@ -198,7 +198,7 @@ class SlcanPtyServer(_SlcanServer):
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
-        """Interface and path of the terminal."""
+        """python-can interface and path of the terminal."""
         return {"interface": "slcan", "channel": self._line.name}
 
     async def _plug_in(self) -> None:
@@ -209,7 +209,7 @@ class SlcanPtyServer(_SlcanServer):
         self._line.close()
 
     def cut(self) -> None:
-        """Unplug the adapter and plug it in again."""
+        """Close the pseudo-terminal and open a new one."""
         self._open.clear()
         self._line.close()
         self._line.open()

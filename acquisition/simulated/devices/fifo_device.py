@@ -1,4 +1,4 @@
-"""`FifoDevice`: simulated device with sample queues that function 0x18 reads."""
+"""Simulated Modbus device with sample queues, read with function 0x18 (Read FIFO Queue)."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -15,14 +15,14 @@ from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import CountArray
 
 _Record: TypeAlias = tuple[int, CountArray]
-"""Counter, and one sample of each channel."""
+"""Counter of a sample, and its counts, (n_channels,)."""
 
 _COUNTER_MODULUS = 65536
 _ON_DEMAND_STEPS = 16
 
 
 class FifoDevice(ModbusDevice):
-    """Converter of one unit with queues of counts; full queues lose their oldest samples.
+    """Converter of one unit with sample queues; a full queue loses its oldest samples.
 
     Parameters
     ----------
@@ -31,21 +31,21 @@ class FifoDevice(ModbusDevice):
     unit
         Name of the unit in the ledger.
     depth_samples
-        Samples per channel that the queues hold.
+        Maximum number of samples in a queue.
     step_samples
-        Samples that are produced together.
+        Number of samples that are produced together.
     first_counter
-        Counter of the first sample of all; near 65535 it wraps soon.
+        Counter of the first sample; the counter wraps after 65535.
 
     Attributes
     ----------
     n_lost
-        Samples that a full queue has lost.
+        Number of lost samples of all queues.
 
     Raises
     ------
     ConfigError
-        If the feed is empty, or has no counts.
+        If the feed is empty, or its samples are not int16 counts.
     """
 
     def __init__(
@@ -75,12 +75,12 @@ class FifoDevice(ModbusDevice):
 
     @property
     def step_s(self) -> float:
-        """Duration of one step."""
+        """Duration of one step of samples."""
         return self._step_samples / self._rate_hz
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Lost samples, an overflow of the queues, a standstill, a restart."""
+        """Faults by name: lost steps, an overflow of the queues, frozen data, a restart."""
         return {
             **super().faults,
             "drop": self._drop,
@@ -89,7 +89,7 @@ class FifoDevice(ModbusDevice):
         }
 
     def restart(self) -> None:
-        """Power off and on: queues empty, counter at zero."""
+        """Restart the device: clear the queues and set the counter to zero."""
         for queue in self._queues:
             queue.clear()
         ahead = self._feed.peek()
@@ -97,13 +97,13 @@ class FifoDevice(ModbusDevice):
             self._offset = -ahead.first_index
 
     def read_fifo(self, address: int) -> bytes | None:
-        """Answer function 0x18; None if the queue does not exist."""
+        """Return the registers of a queue for function 0x18; None if the queue does not exist."""
         if address not in self._layout.addresses:
             return None
         queue = self._queues[self._layout.addresses.index(address)]
         all_were_read = not any(self._queues) or not self._layout.removes
         data = self._encode(self._reading(queue))
-        if all_were_read:  # the answer is empty, or as before, so that time may pass
+        if all_were_read:  # a reply without new samples lets time pass
             self._look()
         return data
 
@@ -144,7 +144,7 @@ class FifoDevice(ModbusDevice):
         return run
 
     def _look(self) -> None:
-        """Note that a reader has found no new samples."""
+        """Record a read without new samples; produce samples if the device is on demand."""
         self._n_looks += self.ended
         if self.on_demand:
             self.produce(_ON_DEMAND_STEPS if self._layout.removes else 1)
@@ -161,7 +161,7 @@ class FifoDevice(ModbusDevice):
 
 
 def _jumps(records: list[_Record], kind: FifoKind) -> list[int]:
-    """Cuts of a queue of one channel, in which only the first sample of an answer has a counter."""
+    """Return the positions of counter jumps, at which a reply with one counter must end."""
     if kind is FifoKind.INTERLEAVED:
         return []
     pairs = enumerate(pairwise(records), start=1)

@@ -1,4 +1,4 @@
-"""Simulated devices whose registers show the newest sample of a feed, or vectors of the newest."""
+"""Simulated Modbus devices with the newest sample, or with vectors of the newest samples."""
 
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
@@ -24,28 +24,28 @@ _SENTINEL, _FLAG = "sentinel", "flag"
 
 
 class MapDevice(ModbusDevice):
-    """Device of one unit that shows the newest sample in registers.
+    """Simulated Modbus device of one unit with the newest sample of each channel in registers.
 
     Parameters
     ----------
     feed
         Source of the samples.
     registers
-        Register map, whose values are written by the ids of `rows` and of the slow channels of the
-        calibration; other values of the map stay zero.
+        Register map. Values with an id of `rows` or of a slow channel of the calibration are
+        written; other values remain zero.
     rows
-        Id of the value of each channel of the feed.
+        Id of the map value of each channel of the feed.
     calibration
-        Converts the counts of the feed to units.
+        Calibration that converts the counts of the feed to engineering units.
     step_samples
-        Samples between two changes of the registers, which show the last one.
+        Number of samples between two updates of the registers, which contain the last sample.
 
     Attributes
     ----------
     image
-        The registers.
+        Contents of the registers.
     newest
-        Samples that were shown last.
+        Samples of the last update.
     """
 
     def __init__(
@@ -72,22 +72,22 @@ class MapDevice(ModbusDevice):
 
     @property
     def step_s(self) -> float:
-        """Time from one change of the registers to the next."""
+        """Time between two updates of the registers."""
         return self._step_samples / self.newest.rate_hz
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """A standstill; the device's error number, or a bad status, in all values."""
+        """Faults by name: frozen data, and invalid numbers or bad status in all values."""
         spoils = {name: partial(self._spoil_values, name) for name in (_SENTINEL, _FLAG)}
         return {**super().faults, **spoils}
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:
-        """Answer functions 3 and 4."""
+        """Return registers as big-endian words; None if an address does not exist."""
         self._look(function, address)
         return self.image.read_registers(function, address, count)
 
     def read_bits(self, function: int, address: int, count: int) -> bytes | None:
-        """Answer functions 1 and 2."""
+        """Return bits packed in bytes; None if an address does not exist."""
         self._look(function, address)
         return self.image.read_bits(function, address, count)
 
@@ -116,7 +116,7 @@ class MapDevice(ModbusDevice):
         self.image.put_time(raw.start_ns)
 
     def _numbers(self, raw: RawBlock, units: FloatArray) -> dict[str, tuple[float, bool]]:
-        """Number of every shown value, and whether it is good."""
+        """Return the number of each value by id, and whether it is good."""
         channels = {
             row: (float(samples[-1]), ok)
             for row, samples, ok in zip(self._rows, units, raw.ok, strict=True)
@@ -133,7 +133,7 @@ class MapDevice(ModbusDevice):
 
 
 def in_units(raw: RawBlock, calibration: UnitCalibration) -> FloatArray:
-    """Samples of a raw block in engineering units, (n_channels, n_samples)."""
+    """Return the samples of a raw block in engineering units, (n_channels, n_samples)."""
     if raw.counts.dtype == np.float32:
         return raw.counts.astype(np.float64)
     gain = np.array([channel.unit_per_count for channel in calibration.channels])
@@ -142,22 +142,22 @@ def in_units(raw: RawBlock, calibration: UnitCalibration) -> FloatArray:
 
 
 class VectorDevice(MapDevice):
-    """Rack of one unit, which shows amplitudes and phases of a transform over the newest samples.
+    """Simulated monitoring rack of one unit: amplitudes and phases over a window of samples.
 
-    At constant speed phases count from a mark at sample number 0 of the feed.
+    At constant speed phases refer to a key-phase mark at sample index 0 of the feed.
 
     Parameters
     ----------
     channels
-        Ids of the feed's channels, in their order.
+        Ids of the channels of the feed, in order.
     rows
-        Quantities that the rack shows; must be in the map.
+        Quantities of the rack; their ids must be in the map.
     speed_channel
         Slow channel of the running speed in r/min, the frequency of the 1× line.
     window_samples
-        Samples that are transformed: a multiple of `step_samples`, some turns long.
+        Window length: a multiple of `step_samples`, several turns long.
     vortex_order
-        Frequency of the vortex line, in multiples of the speed.
+        Frequency of the vortex line as a multiple of the running speed.
     """
 
     def __init__(
@@ -202,7 +202,7 @@ class VectorDevice(MapDevice):
     def _parts(
         self, samples: FloatArray, first_index: int, speed_rpm: float
     ) -> dict[VectorPart, FloatArray]:
-        """All quantities of a rack, (n_channels,); lines are NaN at standstill."""
+        """Return all quantities of the rack, (n_channels,); lines are NaN at standstill."""
         rate_hz, turn_hz = self._calibration.rate_hz, hz_from_rpm(speed_rpm)
         turns = np.full((len(samples), 2), np.nan, dtype=np.complex128)
         if 0.0 < turn_hz < rate_hz / 2.0:

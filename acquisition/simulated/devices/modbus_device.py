@@ -1,4 +1,4 @@
-"""`ModbusDevice`: a sample feed behind registers; its replies to requests, right and faulty."""
+"""Simulated Modbus device with a sample feed; correct and faulty replies to requests."""
 
 import struct
 from abc import ABC, abstractmethod
@@ -18,32 +18,33 @@ _MEI_READ_IDENTIFICATION = 14
 _BASIC_CONFORMITY = 0x81
 
 _LAST_LOOKS = 2
-"""A reader that looks a second time has received the answer to the first, and all data before."""
+"""Number of reads without new data after which a device is drained: the second read shows that the
+client has received the first reply, and all data before."""
 
 
 class ModbusDevice(ABC):
-    """Simulated device whose registers, bits and queues can only be read.
+    """Simulated Modbus device with read-only registers, bits and queues.
 
-    The feed is cut into steps that begin at multiples of their length. In a gap of the feed time
-    passes without data; at its end the device stands still.
+    The feed is divided into steps, which begin at multiples of their length. In a gap of the feed
+    the device produces no data; at the end of the feed it keeps its last data.
 
     Parameters
     ----------
     feed
         Source of the samples.
     step_samples
-        Samples that are produced together.
+        Number of samples that are produced together.
     unit
         Name of the unit in the ledger.
 
     Attributes
     ----------
     identification
-        Objects of function 43/14 by number; without any the function is unknown.
+        Objects of function 43/14 by number; if empty, the function is not supported.
     frozen
-        While set, no data are produced; the device still answers.
+        Whether the production of data is stopped; the device still replies.
     on_demand
-        Whether the device produces when its reader has read all data and looks for more.
+        Whether the device produces data when a client that has read all data reads again.
     ended
         Whether the feed has ended.
     """
@@ -65,20 +66,20 @@ class ModbusDevice(ABC):
 
     @property
     def drained(self) -> bool:
-        """Whether the feed has ended and a reader has read everything and looked again."""
+        """Whether the feed has ended and a client has read all data and read again."""
         return self.ended and self._n_looks >= _LAST_LOOKS
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Faults of the data; each takes a count of steps."""
+        """Faults of the data by name; the argument of each function is a count."""
         return {"freeze": self._freeze}
 
     def spoil(self, fault: str, count: int) -> None:
-        """Cause a fault of the data, `count` times."""
+        """Inject a fault of the data, `count` times."""
         self.faults[fault](count)
 
     def produce(self, n_steps: int = 1) -> None:
-        """Let time pass, in steps."""
+        """Advance the time of the device by `n_steps` steps and produce their data."""
         for _ in range(0 if self.frozen else n_steps):
             if self._n_frozen:
                 self._n_frozen -= 1
@@ -94,30 +95,30 @@ class ModbusDevice(ABC):
                 self._take()
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:  # noqa: ARG002
-        """Big-endian words by function 3 or 4, or None if some do not exist."""
+        """Return registers as big-endian words; None if an address does not exist."""
         return None
 
     def read_bits(self, function: int, address: int, count: int) -> bytes | None:  # noqa: ARG002
-        """Eight bits a byte by function 1 or 2, or None if some do not exist."""
+        """Return bits packed in bytes, low bit first; None if an address does not exist."""
         return None
 
     def read_fifo(self, address: int) -> bytes | None:  # noqa: ARG002
-        """Registers of a queue, or None if there is no queue."""
+        """Return the registers of a queue (function 0x18); None if the queue does not exist."""
         return None
 
     @abstractmethod
     def _show(self, raw: RawBlock) -> None:
-        """Make a step readable."""
+        """Write the data of a step to the registers or queues."""
 
     def _take(self) -> None:
-        """Take the next step from the feed and show it."""
+        """Take the next step from the feed and write its data."""
         raw = self._feed.take()
         if raw is not None:
             self._show(raw)
             self._position, self._feed_epoch = self._feed.number(raw), raw.epoch
 
     def _must_wait(self, ahead: RawBlock) -> bool:  # noqa: ARG002
-        """Whether the next step must not come yet."""
+        """Whether the next step must be delayed until a client has read previous data."""
         return False
 
     def _freeze(self, count: int) -> None:
@@ -125,7 +126,7 @@ class ModbusDevice(ABC):
 
 
 def answer(request: bytes, device: ModbusDevice) -> bytes:
-    """Reply to a request, each from function code on; an exception to all but readable data."""
+    """Return the reply PDU to a request PDU; an exception reply if the data are not readable."""
     function, data = request[0], request[1:]
     match function:
         case 1 | 2 | 3 | 4 if len(data) == _ADDRESS_AND_COUNT.size:
@@ -138,7 +139,7 @@ def answer(request: bytes, device: ModbusDevice) -> bytes:
 
 
 def refusal(function: int, code: int) -> bytes:
-    """Exception reply."""
+    """Return an exception reply with an exception code."""
     return bytes((function | 0x80, code))
 
 
@@ -169,20 +170,20 @@ def _identification(data: bytes, objects: Mapping[int, bytes]) -> bytes:
 
 
 class RegisterMemory:
-    """A stretch of readable registers.
+    """Memory of a contiguous range of registers.
 
     Parameters
     ----------
     start
         Address of the first register.
     n_registers
-        Number of registers; all others do not exist.
+        Number of registers; other addresses do not exist.
 
     Attributes
     ----------
     before_read
-        Called with address and count before each read; lets a test change the device between two
-        requests.
+        Function that is called with address and count before each read, so that a test can change
+        the device between two requests.
     """
 
     def __init__(self, start: int, n_registers: int) -> None:
@@ -191,12 +192,12 @@ class RegisterMemory:
         self.before_read: Callable[[int, int], None] | None = None
 
     def write(self, address: int, data: bytes) -> None:
-        """Store big-endian words.
+        """Write big-endian words.
 
         Raises
         ------
         ValueError
-            If some registers do not exist; the message gives both ranges.
+            If a register does not exist; the message contains both ranges.
         """
         offset = 2 * (address - self._start)
         if offset < 0 or offset + len(data) > len(self._data):
@@ -207,11 +208,11 @@ class RegisterMemory:
         self._data[offset : offset + len(data)] = data
 
     def clear(self) -> None:
-        """Set all registers to zero, as after power-up."""
+        """Set all registers to zero, as at power-up."""
         self._data[:] = bytes(len(self._data))
 
     def read(self, address: int, count: int) -> bytes | None:
-        """Return big-endian words, or None if some of these registers do not exist."""
+        """Return registers as big-endian words; None if a register does not exist."""
         if self.before_read is not None:
             self.before_read(address, count)
         offset = 2 * (address - self._start)
@@ -222,7 +223,7 @@ class RegisterMemory:
 
 Answerer: TypeAlias = Callable[[bytes], bytes]
 ReplyFault: TypeAlias = Callable[[bytes, Answerer], bytes | None]
-"""Maps a request and the function that answers it to the reply; None for silence."""
+"""Function from a request and the correct reply function to the faulty reply; None for no reply."""
 
 _DEVICE_FAILURE, _BUSY = 4, 6
 _EXCEPTION_CODES = (1, 2, 3, 4, 5, 6, 8, 10, 11)
@@ -230,27 +231,27 @@ _REGISTER_FUNCTIONS = (3, 4)
 
 
 class HangUpError(Exception):
-    """The device closes the connection instead of answering."""
+    """The device closes the connection instead of a reply."""
 
 
 def hanging_up(request: bytes, answerer: Answerer) -> bytes:  # noqa: ARG001
-    """Close the connection."""
+    """Reply fault: close the connection."""
     raise HangUpError
 
 
 def refusing(code: int) -> ReplyFault:
-    """Answer with an exception."""
+    """Return a reply fault: an exception reply with a code."""
     return lambda request, _: refusal(request[0], code)
 
 
 def shifted_map(request: bytes, answerer: Answerer) -> bytes:
-    """Answer with the data one register further, as after a change of firmware."""
+    """Reply fault: data of the next address, as after a firmware change."""
     address = int.from_bytes(request[1:3], "big") + 1
     return answerer(request[:1] + (address & 0xFFFF).to_bytes(2, "big") + request[3:])
 
 
 def swapped_words(request: bytes, answerer: Answerer) -> bytes:
-    """Exchange the two words of each doubleword of a register reply."""
+    """Reply fault: exchanged words in each pair of registers."""
     reply = answerer(request)
     n_pairs = (len(reply) - 2) // 4
     if reply[0] not in _REGISTER_FUNCTIONS or not n_pairs:

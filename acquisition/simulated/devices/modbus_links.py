@@ -1,4 +1,4 @@
-"""Modbus TCP server and RTU line of a simulated device."""
+"""Modbus TCP and Modbus RTU servers of a simulated device."""
 
 import asyncio
 import struct
@@ -18,19 +18,19 @@ _MBAP = struct.Struct(">HHHB")
 _MIN_LENGTH, _MAX_LENGTH = 2, 254
 
 _FRAME_GAP_S = 0.05
-"""Far above the 3.5 characters of the specification, far below the time-out of any reader."""
+"""Minimum pause between two frames: longer than 3.5 characters, shorter than reader time-outs."""
 
 _REQUEST_BYTES = {0x18: 6, 43: 7}
 _MAX_REQUEST_BYTES = 8
 
 
 class ModbusTcpServer(ModbusServer):
-    """Serves a device to any number of readers.
+    """Modbus TCP server of a simulated device, for any number of clients.
 
     Parameters
     ----------
     port
-        0 takes a free port, which the attribute ``port`` then holds.
+        TCP port; 0 selects a free port, which the attribute ``port`` contains after entering.
 
     Raises
     ------
@@ -55,11 +55,11 @@ class ModbusTcpServer(ModbusServer):
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
-        """Host and port."""
+        """Host and port of the server."""
         return {"host": self._host, "port": self.port}
 
     def cut(self) -> None:
-        """Close every connection, as a cable does that is unplugged for a moment."""
+        """Close all connections abruptly, like a brief interruption of the cable."""
         for connection in list(self._connections):
             connection.cut()
 
@@ -86,7 +86,7 @@ class ModbusTcpServer(ModbusServer):
 
 
 class _Connection(asyncio.Protocol):
-    """Connection of one reader."""
+    """Connection of one client."""
 
     def __init__(self, server: ModbusTcpServer, connections: "set[_Connection]") -> None:
         self._server = server
@@ -104,7 +104,7 @@ class _Connection(asyncio.Protocol):
         self._server.finish_without_readers()
 
     def cut(self) -> None:
-        """Close without sending another byte."""
+        """Abort the connection without sending buffered bytes."""
         self._transport.abort()
 
     def data_received(self, data: bytes) -> None:
@@ -129,17 +129,17 @@ class _Connection(asyncio.Protocol):
 
 
 class ModbusRtuServer(ModbusServer):
-    """Serves a device to one reader, on a pseudo-terminal.
+    """Modbus RTU server of a simulated device, for one client on a pseudo-terminal.
 
     Parameters
     ----------
     link
-        See `PseudoTerminal`.
+        Symbolic link to the terminal; see `PseudoTerminal`.
 
     Raises
     ------
     LinkError, ConfigError
-        On entering, if the pseudo-terminal or its link cannot be made.
+        On entering, if the pseudo-terminal or its link cannot be created.
     """
 
     def __init__(
@@ -157,11 +157,11 @@ class ModbusRtuServer(ModbusServer):
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
-        """Path of the line, and that it has no parity."""
+        """Path of the serial line, and its parity, which is none."""
         return {"device": self._line.name, "parity": "none"}
 
     def cut(self) -> None:
-        """Replace the line by a new one."""
+        """Close the pseudo-terminal and open a new one."""
         self._line.close()
         self._received = b""
         self._line.open()
@@ -174,7 +174,7 @@ class ModbusRtuServer(ModbusServer):
         self._received = b""
 
     def _n_connections(self) -> int:
-        return 0  # a line does not show whether a reader is there
+        return 0  # a serial line does not report connected clients
 
     def _receive(self, data: bytes) -> None:
         now_s = asyncio.get_running_loop().time()
@@ -188,7 +188,7 @@ class ModbusRtuServer(ModbusServer):
             self._answer(frame, n_expected)
 
     def _answer(self, frame: bytes, n_expected: int) -> None:
-        """Answer a valid frame; other bytes get no answer."""
+        """Reply to a valid frame; ignore a frame with wrong length or checksum."""
         crc = int.from_bytes(frame[-2:], "big")
         if len(frame) != n_expected or not FramerRTU.check_CRC(frame[:-2], crc):
             return
@@ -203,5 +203,5 @@ class ModbusRtuServer(ModbusServer):
 
 
 def _request_bytes(frame: bytes) -> int:
-    """Length of the whole request, by its function code."""
+    """Return the length of the complete request frame, from its function code."""
     return _REQUEST_BYTES.get(frame[1] if len(frame) > 1 else 0, _MAX_REQUEST_BYTES)

@@ -1,4 +1,4 @@
-"""`ModbusServer`: paces and serves a simulated Modbus device, on any link."""
+"""Base class of the servers of a simulated Modbus device: pacing, reply faults and end."""
 
 import asyncio
 from abc import abstractmethod
@@ -17,21 +17,21 @@ from acquisition.simulated.devices.modbus_device import (
 from acquisition.simulated.devices.server import DaqServer
 
 _ROUNDING = 1e-6
-"""Tolerance in steps: a clock that wakes a rounding error early is not made to sleep for it."""
+"""Tolerance in steps for a sleep that ends too early by a rounding error."""
 
 
 class ModbusServer(DaqServer):
-    """Serves one device.
+    """Server of one simulated Modbus device.
 
     Parameters
     ----------
     device
-        Keeps its registers while it is not served.
+        Device, which keeps its registers when the server exits.
     clock
-        Paces the device, which catches up after any delay; without one the device produces only
-        when its ``produce`` is called.
+        Clock that paces the device, which catches up after a delay; None produces data only when
+        ``device.produce`` is called.
     patient
-        Whether the clock starts with the first request rather than on entering.
+        Whether pacing starts with the first request rather than on entering.
 
     Attributes
     ----------
@@ -49,14 +49,14 @@ class ModbusServer(DaqServer):
         self._device = device
         self._clock = clock
         self._origin_s: float | None = None
-        self._n_paced = 1  # the data of the start cover the first interval
+        self._n_paced = 1  # the initial data are those of the first interval
         self._finished = asyncio.Event()
         self._reply_faults: deque[ReplyFault] = deque()
 
     async def run(self) -> None:
-        """Serve until cancelled, or until the feed has ended and no reader waits for data.
+        """Serve until cancelled, or until the feed has ended and no client waits for data.
 
-        Raises what stops the device.
+        Raises the error of the device if one occurs.
         """
         for pacing in self._tasks:
             await pacing
@@ -65,19 +65,19 @@ class ModbusServer(DaqServer):
 
     @abstractmethod
     def cut(self) -> None:
-        """Close every connection, as a cable does that is unplugged for a moment."""
+        """Close all connections abruptly, like a brief interruption of the cable."""
 
     @abstractmethod
     def _n_connections(self) -> int:
-        """Number of connected readers."""
+        """Return the number of connected clients."""
 
     def reply(self, request: bytes) -> bytes | None:
-        """Answer a request; None for silence.
+        """Return the reply to a request, with the next fault applied; None for no reply.
 
         Raises
         ------
         HangUpError
-            If the device closes the connection instead.
+            If the device closes the connection instead of a reply.
         """
         self.function_codes[request[0]] += 1
         self._asked.set()
@@ -86,7 +86,7 @@ class ModbusServer(DaqServer):
         return self._right_reply(request)
 
     def finish_without_readers(self) -> None:
-        """Finish if the feed of a paced device has ended and no reader is connected."""
+        """End `run` if the feed of a paced device has ended and no client is connected."""
         if self._clock is not None and self._device.ended and not self._n_connections():
             self._finished.set()
 
@@ -99,7 +99,9 @@ class ModbusServer(DaqServer):
 
     def _spoil_replies(self, fault: str, count: int) -> None:
         self._reply_faults.extend([REPLY_FAULTS[fault]] * count)
-        if fault == "cut" and self._n_connections():  # one of them at once, on idle connections
+        if (
+            fault == "cut" and self._n_connections()
+        ):  # the first one immediately, also on idle connections
             self._reply_faults.pop()
             self.cut()
 

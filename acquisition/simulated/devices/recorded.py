@@ -1,4 +1,4 @@
-"""`RecordedFeed`: a recording as the feed of a simulated DAQ."""
+"""Sample feed of a simulated DAQ from a recording."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -11,17 +11,17 @@ from core.samples.blocks import SampleBlock
 
 
 class RecordedFeed:
-    """Recorded samples in pieces of the requested length.
+    """Sample feed that returns recorded samples in blocks of the requested length.
 
-    Pieces begin at multiples of their length and keep epoch, index and stamps of the recording. A
-    piece is shorter before a gap of the recording or a restart of the device. A piece of several
-    recorded blocks has the slow values of its first sample, and is OK where all blocks are. Samples
-    that were rejected during recording are a gap.
+    Blocks begin at multiples of their length and keep epoch, sample index and time of the
+    recording. A block before a gap of the recording or a restart of the device is shorter. A block
+    joined from several recorded blocks has the slow values of its first sample; a channel is OK if
+    it is OK in all of them. Samples that were rejected during recording are a gap.
 
     Parameters
     ----------
     selection
-        Channels and their order; all as recorded by default.
+        Channels and their order; by default all channels as recorded.
     """
 
     def __init__(self, recording: Recording, selection: Selection | None = None) -> None:
@@ -32,16 +32,16 @@ class RecordedFeed:
         self._ready: deque[RawBlock] = deque()
 
     def advance(self, n_samples: int) -> RawBlock:
-        """Return the next samples, at most this many.
+        """Return the next samples, at most `n_samples`.
 
         Raises
         ------
         FeedEndedError
             If the recording has ended.
         ConfigError
-            If a file of the recording has become unreadable.
+            If a file of the recording cannot be read.
         ValueError
-            If no samples are requested.
+            If `n_samples` is less than 1.
         """
         if n_samples < 1:
             raise ValueError(f"{n_samples} samples asked for; at least one is needed")
@@ -55,7 +55,7 @@ class RecordedFeed:
         return self._ready.popleft()
 
     def close(self) -> None:
-        """Close the recording's files."""
+        """Close the files of the recording."""
         self._runs.close()
 
     def _put(self, run: SampleBlock) -> list[SampleBlock]:

@@ -1,4 +1,4 @@
-"""Registers of simulated devices: `RegisterImage` of a register map, and those of a block ring."""
+"""Register contents of simulated devices: register maps, and block rings."""
 
 import math
 import struct
@@ -21,12 +21,12 @@ _OF_CENTURY = 100
 
 
 class RegisterImage:
-    """Registers and bits of one device; only those of its map exist.
+    """Contents of the registers and bits of a register map; other addresses do not exist.
 
     Parameters
     ----------
     ranges
-        Full scale of values whose map reads it from the device; default -1000 to 1000.
+        Full scale by value id, for values with full scale in registers; default -1000 to 1000.
     """
 
     def __init__(
@@ -47,19 +47,19 @@ class RegisterImage:
             self.put(cell, signature.expected)
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:
-        """Big-endian words, or None if some of them do not exist."""
+        """Return registers as big-endian words; None if an address does not exist."""
         words = [self._words.get((function, at)) for at in range(address, address + count)]
         found = [word for word in words if word is not None]
         return None if len(found) < count else struct.pack(f">{count}H", *found)
 
     def read_bits(self, function: int, address: int, count: int) -> bytes | None:
-        """Eight bits a byte, or None if some of them do not exist."""
+        """Return bits packed in bytes, low bit first; None if an address does not exist."""
         bits = [self._bits.get((function, at)) for at in range(address, address + count)]
         found = [bit for bit in bits if bit is not None]
         return None if len(found) < count else np.packbits(found, bitorder="little").tobytes()
 
     def put(self, cell: Cell, number: float) -> None:
-        """Write a raw number; one out of range becomes the limit of its type."""
+        """Write a raw number to a cell; an integer is clipped to the range of its type."""
         start = cell.start(self._base)
         if cell.function in BIT_FUNCTIONS:
             self._bits[cell.function, start] = bool(number)
@@ -72,7 +72,7 @@ class RegisterImage:
                 self._words[cell.function, start + n] = word
 
     def put_bits(self, cell: Cell, mask: int, are_set: bool) -> None:
-        """Set or clear bits of a register; the others are unchanged."""
+        """Set or clear the bits of `mask` in a register; other bits are unchanged."""
         place = (cell.function, cell.start(self._base))
         if cell.byte_order.low_byte_first:
             mask = (mask & 0xFF) << 8 | mask >> 8
@@ -80,7 +80,7 @@ class RegisterImage:
         self._words[place] = word | mask if are_set else word & ~mask
 
     def put_value(self, value: MapValue, number: float) -> None:
-        """Write a value in the unit of its channel; NaN becomes the error number of the device."""
+        """Write a value in the unit of its channel; NaN is written as the invalid value."""
         wanted = (number - value.offset) / value.scale
         if value.scale_register is not None:
             scale = max(1.0, math.ceil(abs(wanted))) if math.isfinite(wanted) else 1.0
@@ -100,7 +100,7 @@ class RegisterImage:
         self.put(value.cell, wanted if math.isfinite(wanted) else no_value(value))
 
     def put_flag(self, flag: FlagCheck, good: bool) -> None:
-        """Write to a status register whether a value is good."""
+        """Write the status of a value, good or bad, to its status register."""
         is_bit = flag.cell.type is NumberType.BIT
         if flag.set_means is not None:
             is_set = good is (flag.set_means is Meaning.OK)
@@ -119,7 +119,7 @@ class RegisterImage:
         self.put_bits(flag.cell, number * flag.lowest_bit & flag.mask, True)
 
     def put_time(self, time_ns: int) -> None:
-        """Write the time of the measurement, if it is in the map."""
+        """Write the measurement time to its registers, if the map has a time."""
         time = self._map.time
         if time is None:
             return
@@ -143,7 +143,7 @@ class RegisterImage:
 
 
 def encoded(number: float, cell: Cell) -> bytes:
-    """Bytes of a number in the registers of its cell."""
+    """Return the bytes of a number in the byte order of the registers of its cell."""
     dtype = np.dtype(DTYPES[cell.type])
     if cell.type not in FLOATS:
         limits = np.iinfo(dtype)
@@ -156,7 +156,7 @@ def encoded(number: float, cell: Cell) -> bytes:
 
 
 def no_value(value: MapValue) -> float:
-    """Raw number that the device shows without a value; zero if it has none."""
+    """Return the raw number that marks a missing value; zero if the map defines none."""
     if value.cell.type in FLOATS:
         return math.nan
     if value.invalid_values:
@@ -170,7 +170,7 @@ def no_value(value: MapValue) -> float:
 
 
 def encode_header(header: RingHeader) -> bytes:
-    """Header registers of a block ring, without the slow values."""
+    """Return the header registers of a block ring with checksum, without the slow values."""
     ring = header.layout
     data = HEADER.pack(
         *(MAGIC, VERSION, ring.n_channels, ring.samples_per_slot, ring.n_slots),
@@ -181,7 +181,7 @@ def encode_header(header: RingHeader) -> bytes:
 
 
 def encode_slot(slot: Slot) -> bytes:
-    """Registers of one slot of a block ring."""
+    """Return the registers of one slot of a block ring, with checksum."""
     head = struct.pack(
         ">6I",
         *(slot.sequence, slot.first_index, slot.seconds, slot.microseconds),
@@ -193,5 +193,5 @@ def encode_slot(slot: Slot) -> bytes:
 
 
 def encode_slow(values: Sequence[float]) -> bytes:
-    """Slow values of a block ring as registers, NaN where there is none."""
+    """Return the slow values of a block ring as float32 registers."""
     return np.asarray(values, dtype=">f4").tobytes()

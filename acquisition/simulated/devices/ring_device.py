@@ -1,4 +1,4 @@
-"""`RingDevice`: simulated device with a block ring; samples in, registers out, without network."""
+"""Simulated Modbus device with a block ring: writes the samples of a feed to registers."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -18,19 +18,19 @@ from acquisition.simulated.feed import Ledger, SampleFeed
 
 @dataclass(frozen=True, kw_only=True)
 class RingDeviceSettings:
-    """Shape of the ring.
+    """Layout and start values of a simulated block ring.
 
     Parameters
     ----------
     base_address
         Register address of the header.
     samples_per_slot, n_slots
-        Ring and header must fit into 65536 registers: 12 channels, 50 samples, 10 slow values and
-        64 slots take 40,612.
+        Size of the ring, which must fit into 65536 registers with its header: 12 channels, 50
+        samples, 10 slow values and 64 slots need 40,612 registers.
     first_sequence
-        Counter at power-up, 0 to 2**32 - 1; near the end it wraps soon.
+        Sequence number at power-up, 0 to 2**32 - 1, after which it wraps.
     first_index
-        Number of the first sample at power-up, 0 to 2**32 - 1; None for that of the feed.
+        Sample index at power-up, 0 to 2**32 - 1; None for the sample index of the feed.
     slot_padding
         Unused registers between slots.
     """
@@ -44,36 +44,36 @@ class RingDeviceSettings:
 
 
 class RingDevice(ModbusDevice):
-    """Converter and ring of one unit; the first slot is there from the start.
+    """Converter and block ring of one unit; the first slot is available from the start.
 
-    Slots lie on the feed's grid of sample numbers. In a gap of the feed slot times pass without a
-    slot; behind it sequence, index and time continue together. A new epoch of the feed restarts the
-    device.
+    Slots begin at multiples of their length in the sample index of the feed. In a gap of the feed
+    the device writes no slots; after the gap sequence number, sample index and time continue
+    consistently. A new epoch of the feed restarts the device.
 
     Parameters
     ----------
     feed
-        Source of the samples; sets number of channels and sampling rate.
+        Source of the samples; defines the number of channels and the sampling rate.
     unit
         Name of the unit in the ledger.
 
     Attributes
     ----------
     memory
-        The registers.
+        Registers of header and ring.
     layout
-        Layout of ring and header.
+        Register layout of header and ring.
     first_sequence
         Sequence number after a restart.
     epoch
-        Epoch in the header.
+        Current epoch, as in the header.
     patient
-        Whether the device waits for its reader before it overwrites an unread slot or restarts.
+        Whether the device waits for its client before it overwrites an unread slot or restarts.
 
     Raises
     ------
     ConfigError
-        If the ring does not fit, or the feed does not fill one slot with counts.
+        If the ring does not fit, or the feed has less than one slot of int16 counts.
     """
 
     def __init__(
@@ -112,7 +112,7 @@ class RingDevice(ModbusDevice):
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Faults of the next slots, a standstill, and restarts."""
+        """Faults by name: of the next slots, frozen data, and restarts."""
         slot_faults = {**SLOT_FAULTS, "repeat": self._repeated}
         return {
             **super().faults,
@@ -121,18 +121,18 @@ class RingDevice(ModbusDevice):
         }
 
     def produce(self, n_steps: int = 1, fault: SlotFault | None = None) -> None:
-        """Let slot times pass, in which `fault` applies to each slot."""
+        """Advance the time by `n_steps` slots and write them, with `fault` applied to each."""
         self._fault = fault
         super().produce(n_steps)
         self._fault = None
 
     def produce_unpaced(self, n_slots: int) -> None:
-        """Produce the next slots without waiting through gaps, and without overwriting any.
+        """Write the next slots without delay, also after a gap, and without overwriting a new slot.
 
         Parameters
         ----------
         n_slots
-            Largest number of places of the ring to use, unless the next slot alone needs more.
+            Maximum number of places of the ring, including gaps; at least one slot is written.
         """
         if self._n_frozen:
             self._n_frozen -= 1
@@ -151,7 +151,7 @@ class RingDevice(ModbusDevice):
                 limit = self._position + n_slots - 1
 
     def restart(self, next_epoch: bool = True) -> None:
-        """Power off and on: empty ring, counters at their start, next epoch unless suppressed."""
+        """Restart the device, by default in the next epoch: clear the ring, reset the counters."""
         first = self._feed.take()
         if first is None:
             self.ended = True
@@ -160,7 +160,7 @@ class RingDevice(ModbusDevice):
         self._power_up(first, self._settings.first_index or 0)
 
     def read_registers(self, function: int, address: int, count: int) -> bytes | None:  # noqa: ARG002
-        """Answer a read, equal by both functions; None if some registers do not exist."""
+        """Return registers, equal for functions 3 and 4; None if a register does not exist."""
         asked = range(address, address + count)
         if self._settings.base_address in asked:
             self._look()
@@ -169,7 +169,7 @@ class RingDevice(ModbusDevice):
         return data
 
     def _look(self) -> None:
-        """Note that a reader reads the header, which shows whether there are new slots."""
+        """Record a read of the header; produce slots if on demand and all slots are read."""
         self._watch.note_look()
         if not self._watch.waiting:
             return
@@ -178,7 +178,7 @@ class RingDevice(ModbusDevice):
         self._n_looks += self.ended
 
     def _must_wait(self, ahead: RawBlock) -> bool:
-        """Whether a patient device holds back a slot until its reader can take it."""
+        """Whether a patient device must wait until its client has read previous slots."""
         if not self.patient:
             return False
         if not self._watch.anything_read:
@@ -207,7 +207,7 @@ class RingDevice(ModbusDevice):
         self._write(first, 1, [])
 
     def _write(self, raw: RawBlock, n_slots: int, faults: list[SlotFault]) -> None:
-        """Write a slot that is `n_slots` places behind the one before."""
+        """Write a slot and the header; the slot is `n_slots` places after the previous slot."""
         self._number = self._position = self._feed.number(raw)
         self._watch.note_written(self._newest)
         self._n_looks = 0
@@ -238,7 +238,7 @@ class RingDevice(ModbusDevice):
         )
 
     def _repeated(self, slot: Slot) -> Slot:
-        """Repeat the samples of the slot before, under the next sequence number."""
+        """Slot fault: samples of the previous slot with the new sequence number."""
         before = self._before or slot
         return replace(before, sequence=slot.sequence, trailer=slot.trailer)
 
@@ -251,7 +251,10 @@ class RingDevice(ModbusDevice):
 
 
 def _layout(first: RawBlock, settings: RingDeviceSettings) -> RingLayout:
-    """Layout of a ring of slots like this one."""
+    """Return the layout of a ring for the channels of the first slot.
+
+    Raises `ConfigError` if the slot has no int16 counts or the ring does not fit.
+    """
     if first.counts.dtype != np.int16:
         raise ConfigError(
             f"a block ring carries 16-bit counts, and the feed gives {first.counts.dtype}"

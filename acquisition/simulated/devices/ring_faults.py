@@ -1,4 +1,4 @@
-"""Faulty slots of a simulated block ring; `ReadingWatch`: which of its slots have been read."""
+"""Slot faults of a simulated block ring, and tracking of the slots that a client has read."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -9,36 +9,36 @@ from acquisition.modbus.ring_profile import U32, RingLayout, Slot
 from acquisition.modbus.timeline import ahead
 
 SlotFault: TypeAlias = Callable[[Slot], Slot | None]
-"""Maps the right slot to the one that is written; None if none is."""
+"""Function from the correct slot to the slot that is written; None writes no slot."""
 
 
 def dropped(slot: Slot) -> None:
-    """Do not write the slot; the sequence continues."""
+    """Slot fault: the slot is not written; the sequence number continues."""
 
 
 def torn(slot: Slot) -> Slot:
-    """Leave the tail of another slot behind the samples."""
+    """Slot fault: a trailer that does not match the sequence number, as in a torn write."""
     return replace(slot, trailer=slot.trailer ^ 0x5A5A)
 
 
 def damaged(slot: Slot) -> Slot:
-    """Write a wrong checksum."""
+    """Slot fault: a wrong checksum."""
     return replace(slot, damage=slot.damage ^ 0x5A5A5A5A)
 
 
 def wrong_sequence(slot: Slot) -> Slot:
-    """Write the sequence number of another place."""
+    """Slot fault: the sequence number of the next slot."""
     sequence = (slot.sequence + 1) % U32
     return replace(slot, sequence=sequence, trailer=sequence & 0xFFFF)
 
 
 def wrong_index(slot: Slot) -> Slot:
-    """Count one sample too many."""
+    """Slot fault: the sample index is too high by one."""
     return replace(slot, first_index=(slot.first_index + 1) % U32)
 
 
 def wrong_time(slot: Slot) -> Slot:
-    """Stamp the slot with 2106."""
+    """Slot fault: a time stamp in the year 2106."""
     return replace(slot, seconds=U32 - 1)
 
 
@@ -53,19 +53,19 @@ SLOT_FAULTS: Mapping[str, SlotFault] = {
 
 
 class ReadingWatch:
-    """Tracks written slots and requested registers.
+    """Tracking of the slots that a client has read, from its register requests.
 
-    A slot is read when its last register has been read, and those of all slots before it. A reader
-    that reads the header, and then the newest slot shown there before it reads the header again,
-    has skipped the unread slots before it. Slots that came later are unknown to the reader, even
-    where it reads their places.
+    A slot counts as read when its last register and those of all previous slots have been read. If
+    a client reads the header, then the newest slot of this header, and then the header again, it
+    has skipped the unread slots before the newest slot. Slots written after the header was read are
+    unknown to the client and remain unread, even if their registers are read.
 
     Attributes
     ----------
     anything_read
         Whether any slot has ever been read.
     waiting
-        Whether a reader has read the header after it had read all slots.
+        Whether a client has read the header after it had read all slots.
     """
 
     def __init__(self, layout: RingLayout) -> None:
@@ -78,18 +78,18 @@ class ReadingWatch:
         self.waiting = False
 
     def clear(self) -> None:
-        """Forget all slots, as the ring is empty."""
+        """Remove all slots, after the ring is cleared."""
         self._unread.clear()
         self._shown, self._shown_was_read = None, False
 
     def note_written(self, sequence: int) -> None:
-        """Note a new newest slot."""
+        """Record the sequence number of a new slot."""
         self._unread.append(sequence)
         self._newest = sequence
         self.waiting = False
 
     def note_look(self) -> None:
-        """Note a read of the header."""
+        """Record a read of the header."""
         if self._shown is not None and self._shown_was_read:
             while self._unread and ahead(self._shown, self._unread[0]) >= 0:
                 self._unread.popleft()
@@ -97,7 +97,7 @@ class ReadingWatch:
         self.waiting = not self._unread
 
     def note_read(self, asked: range) -> None:
-        """Note a read of registers."""
+        """Record a read of the registers `asked`."""
         ring = self._layout
         end = ring.ring_address + ring.slot_registers - 1
         first = -((end - asked.start) // ring.slot_stride)
@@ -109,5 +109,5 @@ class ReadingWatch:
 
     @property
     def n_unread(self) -> int:
-        """Number of places of the ring from the oldest unread slot to the newest."""
+        """Number of places of the ring from the oldest unread slot to the newest slot."""
         return (self._newest - self._unread[0]) % U32 + 1 if self._unread else 0

@@ -1,4 +1,4 @@
-"""`DaqServer`: common part of all simulated DAQs; `PseudoTerminal`: serial line of some."""
+"""Base class of the servers of simulated DAQs, and pseudo-terminal for serial protocols."""
 
 import asyncio
 import os
@@ -17,12 +17,12 @@ _READ_BYTES = 4096
 
 
 class DaqServer(ABC):
-    """Simulated device on a real link; entering plugs it in, leaving pulls it out, repeatedly.
+    """Server of a simulated device; a reusable context manager that opens and closes the link.
 
     Raises
     ------
     LinkError, ConfigError
-        On entering, if the link cannot be made.
+        On entering, if the link cannot be opened.
     """
 
     def __init__(self) -> None:
@@ -31,19 +31,19 @@ class DaqServer(ABC):
     @property
     @abstractmethod
     def endpoint(self) -> Mapping[str, str | int]:
-        """Settings by which a source finds the device, by key; known once entered."""
+        """Link settings of a source for this device, by key; valid after entering."""
 
     @abstractmethod
     async def run(self) -> None:
-        """Serve until cancelled; return at the end of the device's feed."""
+        """Serve until cancelled, or until the end of the feed of the device."""
 
     def inject(self, fault: str, count: int = 1) -> None:
-        """Cause a fault of the device or its link, `count` times.
+        """Inject a fault of the device or of its link, `count` times.
 
         Raises
         ------
         LookupError
-            If the fault is unknown; the message lists the known ones.
+            If the fault is unknown; the message contains the known faults.
         """
         known = self._faults_by_name()
         if fault not in known:
@@ -69,15 +69,15 @@ class DaqServer(ABC):
 
     @abstractmethod
     def _faults_by_name(self) -> Mapping[str, Callable[[int], None]]:
-        """Faults that can be injected; each takes a count."""
+        """Return the available faults by name; the argument of each function is the count."""
 
     @abstractmethod
     def _jobs(self) -> list[Coroutine[Any, Any, None]]:
-        """Coroutines that run while the server is plugged in."""
+        """Return the coroutines to run while the link is open."""
 
     @abstractmethod
     async def _plug_in(self) -> None:
-        """Begin to serve the link."""
+        """Open the link."""
 
     @abstractmethod
     async def _pull_out(self) -> None:
@@ -85,15 +85,15 @@ class DaqServer(ABC):
 
 
 class PseudoTerminal:
-    """Serial line between this process and one reader. It has no bit rate and no parity.
+    """Pseudo-terminal as a serial line to one client, without bit rate and parity.
 
     Parameters
     ----------
     link
-        Symbolic link to the terminal while it is open. Without it the terminal has only the name
-        that the system gives it, which changes with each opening.
+        Path of a symbolic link to the open terminal. None for no link; the system then assigns a
+        new path each time the terminal is opened.
     received
-        Called with the bytes that the reader sends.
+        Function that is called with the bytes from the client.
     """
 
     def __init__(self, link: Path | None, received: Callable[[bytes], None]) -> None:
@@ -105,18 +105,18 @@ class PseudoTerminal:
 
     @property
     def name(self) -> str:
-        """Path that a reader opens."""
+        """Path that a client opens."""
         return str(self._link or self._path)
 
     def open(self) -> None:
-        """Open a terminal and set the link, in place of an older link to a terminal.
+        """Open a terminal and create the link; replace an existing link to a terminal.
 
         Raises
         ------
         ConfigError
-            If the path of the link is taken by anything else, such as the port of a real device.
+            If the path of the link is in use, for example by the port of a real device.
         LinkError
-            If terminal or link cannot be made.
+            If terminal or link cannot be created.
         """
         try:
             self._ends = ours, theirs = os.openpty()
@@ -134,7 +134,7 @@ class PseudoTerminal:
                 raise
 
     def close(self) -> None:
-        """Close the terminal and remove the link; a closed one stays closed."""
+        """Close the terminal and remove the link; no effect on a closed terminal."""
         if self._ends is None:
             return
         loop = asyncio.get_running_loop()
@@ -148,14 +148,14 @@ class PseudoTerminal:
             _remove_link(self._link)
 
     def write(self, data: bytes) -> bytes:
-        """Write as much as the line takes at once; return the rest."""
+        """Write bytes without blocking; return the bytes that were not written."""
         if self._ends is not None:
             with suppress(BlockingIOError):
                 return data[os.write(self._ends[0], data) :]
         return data
 
     async def writable(self) -> None:
-        """Wait until the line takes more, or is closed."""
+        """Wait until the terminal accepts more bytes, or is closed."""
         if self._ends is None:
             return
         loop, ends = asyncio.get_running_loop(), self._ends

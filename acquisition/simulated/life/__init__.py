@@ -1,1 +1,1 @@
-"""Simulated years of a unit's guide bearings: readings, and scenarios of single moments."""
+"""Simulated years of the guide bearings of a unit: readings, and scenarios at given times."""

@@ -1,4 +1,4 @@
-"""Guide bearings of the simulated machine, and their thermal course."""
+"""Guide bearings of the simulated machine, with their temperatures and thermal clearance."""
 
 import math
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from core.arrays import FloatArray
 from core.units import NS_PER_S
 
 DESIGN_VISCOSITY_PA_S = 0.0340
-"""Viscosity of the paper's oil at 47.5 °C, the middle of the range of its Table 1 (40 to 55 °C)."""
+"""Viscosity of the oil at 47.5 °C, the middle of 40 to 55 °C (Brito et al., Table 1)."""
 
 DESIGN_SPEED_RPM = 92.3
 
@@ -23,20 +23,22 @@ class LifeBearing:
     Parameters
     ----------
     ring
-        Pads, with the stiffness of Table 2 at the operating clearance of Table 1 (Brito et al.).
+        Pads with the stiffness of Table 2 at the operating clearance of Table 1 (Brito et al.).
     cold_clearance_um
         Radial clearance with shaft and housing at the same temperature.
     closing_um
-        Loss of clearance when the shaft has become warmer than the housing.
+        Final decrease of the clearance at a running machine, where the shaft is warmer than the
+        housing.
     opening_um
-        Outward motion of the pads along one diameter when the field of the generator at full load
-        has warmed the arms of the bracket (Figure 3); across it they move inward as much.
+        Final outward displacement of the pads along one diameter at full load, when the magnetic
+        field of the generator has warmed the bracket arms (Figure 3); inward across it.
     configured_clearance_um
-        Clearance in the plant file, that of the warm machine; the reference of eccentricity.
+        Clearance of the warm machine in the plant file; the reference of the eccentricity ratio.
     oil_rise_c, oil_rise_at_load_c
-        Oil over cooling water at speed without load, and the additional rise at full load.
+        Temperature rise of the oil above the cooling water at speed without load, and additional
+        rise at full load.
     oil_time_s, closing_time_s, opening_time_s
-        Time constants while running.
+        Time constants of a running machine.
     """
 
     id: str
@@ -54,7 +56,7 @@ class LifeBearing:
 
 
 def _ring(n_pads: int, stiffness_n_per_m: float, clearance_um: float) -> PadRing:
-    half_pitch_deg = 180.0 / n_pads  # probes sit between two pads (section 2.2.1)
+    half_pitch_deg = 180.0 / n_pads  # probes are between two pads (section 2.2.1)
     return PadRing(
         n_pads,
         stiffness_n_per_m,
@@ -65,9 +67,9 @@ def _ring(n_pads: int, stiffness_n_per_m: float, clearance_um: float) -> PadRing
     )
 
 
-# Only clearances are fitted: cold to k_eff at t1, closing to k_eff at t1 + 6.5 h of Table 8 (UJB)
-# and Table 9 (LJB, X), closing times to the gaps after 0.5 h and 1 h. The fitted closing, 165 and
-# 172 µm, compares with gaps that shrank by 127 to 153 µm and 251 to 274 µm.
+# Only clearances are fitted: cold clearance to k_eff at t1, closing to k_eff at t1 + 6.5 h of
+# Table 8 (UJB) and Table 9 (LJB, X), closing times to the gaps after 0.5 h and 1 h. The fitted
+# closing, 165 and 172 µm, compares with gaps that decreased by 127 to 153 µm and 251 to 274 µm.
 LIFE_UJB = LifeBearing(
     "UJB",
     _ring(16, 6.67e9, 200.0),
@@ -88,8 +90,9 @@ LIFE_LJB = LifeBearing(
     oil_rise_c=21.5,
     oil_rise_at_load_c=4.0,
 )
-# The paper has no measured stiffness of the TJB: it is assumed one order of magnitude below the
-# design value, as "usually" (section 4). It has no thrust block beside it and no arms in the field.
+# Brito et al. measured no stiffness of the TJB. It is assumed one order of magnitude below the
+# design value, as "usually" (section 4). It has no adjacent thrust block and no bracket arms in
+# the magnetic field.
 LIFE_TJB = LifeBearing(
     "TJB",
     _ring(12, 6.67e9, 200.0),
@@ -104,31 +107,31 @@ LIFE_BEARINGS = (LIFE_UJB, LIFE_LJB, LIFE_TJB)
 
 
 STANDING_TIME_FACTOR = 10.0
-"""Time constants at standstill, when the oil no longer flows, over those of running."""
+"""Ratio of the time constants at standstill, without oil flow, to those of running."""
 
 STANDING_OIL_C = 3.0
-"""Final temperature of the oil over the water at standstill: that of the hall."""
+"""Final temperature of the oil above the water at standstill: the hall temperature."""
 
 WATER_MEAN_C = 22.5
 WATER_SEASON_C = 4.5
-"""Mean and seasonal amplitude of the Paraná at Itaipu, warmest in February."""
+"""Mean and seasonal amplitude of the water of the Paraná at Itaipu, warmest in February."""
 
 WARMEST_DAY = 45.0
 
 CLOSING_RMS, CLOSING_TIME_S = 0.006, 6.0 * DAY_S
-"""1 µm of 165 µm: the effect of 0.1 K between shaft and housing."""
+"""Relative rms and time constant of the closing: 1 µm of 165 µm, the effect of 0.1 K."""
 
 
 @dataclass(frozen=True, eq=False)
 class ThermalCourse:
-    """Temperature of a bearing and its effect on the clearance; all (n,).
+    """Time series of the oil temperature and of the thermal clearance changes; all (n,).
 
     Parameters
     ----------
     closing_um
-        Loss of clearance from cold.
+        Decrease of the clearance from the cold clearance.
     opening_um
-        Outward motion of the pads along the diameter that the field of the generator stretches.
+        Outward displacement of the pads along one diameter by the magnetic field of the generator.
     """
 
     oil_temperature_c: FloatArray
@@ -137,7 +140,7 @@ class ThermalCourse:
 
 
 def draw_water_c(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Temperature of the cooling water: season and weather, (n,)."""
+    """Draw the temperature of the cooling water, with season and weather, (n,)."""
     n, step_s = len(operation), operation.step_s
     year = (operation.time_ns / NS_PER_S - WARMEST_DAY * DAY_S) / YEAR_S
     season = WATER_SEASON_C * np.cos(2.0 * math.pi * year)
@@ -146,7 +149,7 @@ def draw_water_c(random: np.random.Generator, operation: Operation) -> FloatArra
 
 
 def draw_closing_share(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Draw the share of the usual closing: air and water reach shaft and housing separately."""
+    """Draw the ratio of closing to `LifeBearing.closing_um`, which air and water change, (n,)."""
     n, step_s = len(operation), operation.step_s
     return 1.0 + wander(random, n, step_s, CLOSING_TIME_S, CLOSING_RMS)
 
@@ -159,18 +162,18 @@ def thermal_course(
     oil_offset_c: FloatArray | float = 0.0,
     initial_oil_c: float | None = None,
 ) -> ThermalCourse:
-    """Compute the thermal course of a bearing from cold.
+    """Return the thermal course of a bearing, from a cold start.
 
     Parameters
     ----------
     water_c : (n,)
         Temperature of the cooling water.
     closing_share : (n,) or one number
-        Share of the usual difference between shaft and housing.
+        Ratio of the closing to `LifeBearing.closing_um`.
     oil_offset_c : (n,) or one number
-        Additional oil temperature while running, from lack of cooling.
+        Additional oil temperature while running, caused by insufficient cooling.
     initial_oil_c
-        That of the hall by default.
+        Initial oil temperature; the hall temperature by default.
     """
     turns = operation.is_turning
     slower = np.where(turns, 1.0, STANDING_TIME_FACTOR)

@@ -1,4 +1,4 @@
-"""Course of a life from one moment on, as a running plant."""
+"""Simulated life as a course of scenarios for live samples, and its history until now."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -27,20 +27,20 @@ from core.machine.unit import Unit
 from core.units import NS_PER_S, ns_from_s
 
 MIN_FILM_SPEED = 0.2
-"""Share of rated speed below which films keep the stiffness of that speed. A shaft that hardly
-turns is not held by a film, but not excited either."""
+"""Minimum speed for the film stiffness, as a share of rated speed. A slow shaft has almost no film,
+but the excitation is negligible too."""
 
 
 class LifeCourse:
-    """Course of a life from one moment on, interpolated linearly between readings.
+    """Operating conditions of a simulated unit over time, interpolated between the grid times.
 
-    A unit at standstill is simulated too: forces fall with the square of speed, which leaves the
-    noise of transducers, and gaps and oil temperature continue.
+    Standstill is included: forces decrease with the square of the speed, so that only transducer
+    noise, gaps and oil temperatures remain.
 
     Parameters
     ----------
     damage
-        Begins at its onset, not with the next reading.
+        Damage, which begins at its exact onset, not at the next reading.
     machine
         Unit to be sampled; see `scenario_at`.
     start_ns
@@ -49,9 +49,9 @@ class LifeCourse:
     Raises
     ------
     ValueError
-        If damage names an unknown bearing, or the moment is not within the life.
+        If damage has an unknown bearing, or `start_ns` is outside the life.
     KeyError
-        If the life lacks a bearing of the machine.
+        If a bearing of the machine is missing in the life.
     """
 
     def __init__(
@@ -77,16 +77,16 @@ class LifeCourse:
 
     @property
     def rated_speed_rpm(self) -> float:
-        """Speed of the unit while it runs."""
+        """Rated speed of the unit."""
         return self._inputs.operation.rated_speed_rpm
 
     def at(self, elapsed_s: float) -> Scenario:
-        """Scenario at a time after the first sample.
+        """Return the scenario at a time after the first sample.
 
         Raises
         ------
         ValueError
-            If the life is over by then.
+            If the time is after the end of the life.
         """
         time_ns = self._start_ns + ns_from_s(elapsed_s)
         row, share = self._place(time_ns)
@@ -116,7 +116,7 @@ class LifeCourse:
         )
 
     def _place(self, time_ns: int) -> tuple[int, float]:
-        """Row before a moment, and the share of the way to the next row."""
+        """Return the row at or before a time, and the fraction of the interval to the next row."""
         grid_ns = self._inputs.operation.time_ns
         row = int(np.searchsorted(grid_ns, time_ns, side="right")) - 1
         if not 0 <= row < self._n_rows - 1:
@@ -152,7 +152,7 @@ class LifeCourse:
         )
 
     def _hydraulic(self, operation: Operation) -> HydraulicNoise:
-        """Broadband force, none at standstill without flow."""
+        """Return the broadband hydraulic force, zero at standstill."""
         share = min(float(operation.speed_rpm[0]) / self.rated_speed_rpm, 1.0)
         running = hydraulic_noise(float(operation.load[0]))
         return HydraulicNoise(share**2 * running.rms_n, running.cutoff_hz)
@@ -164,20 +164,20 @@ def _usual_clearance_um(inputs: BearingInputs, turns: npt.NDArray[np.bool_]) -> 
 
 
 YEARS = 3.0
-"""Duration of a life: last year, this year and the next."""
+"""Duration of a life in years: last year, this year and next year."""
 
 
 @dataclass(frozen=True)
 class LifePlan:
-    """Choice of the life of a unit.
+    """Parameters of the simulated life of a unit.
 
     Parameters
     ----------
     seed
-        Even for a unit of 92.3 r/min, odd for 90.9 r/min.
+        Random seed; even for a unit of 92.3 r/min, odd for 90.9 r/min.
     held_load
-        Share of rated power at which the unit runs without a stop since the beginning of yesterday
-        in UTC; None starts and stops it at random.
+        Constant load as a share of rated power, without a stop since the beginning of yesterday
+        (UTC); None for random starts and stops.
     """
 
     seed: int
@@ -186,17 +186,17 @@ class LifePlan:
 
 
 def history_until(plan: LifePlan, now_ns: int, years: float = 1.0) -> UnitLife:
-    """Readings of a life until now, with the truth.
+    """Return the readings and the true state of a life until `now_ns`.
 
     Parameters
     ----------
     years
-        Length; at least one year is available.
+        Length of the history; up to one year is always available.
 
     Raises
     ------
     ValueError
-        If the life does not reach so far back, or damage names an unknown bearing.
+        If the history begins before the life, or damage has an unknown bearing.
     """
     require_known_bearings(plan.damage, LIFE_BEARINGS)
     inputs = _inputs(plan, now_ns)
@@ -210,14 +210,14 @@ def history_until(plan: LifePlan, now_ns: int, years: float = 1.0) -> UnitLife:
 def course_from(
     plan: LifePlan, now_ns: int, machine: Unit, noise: TransducerNoise = TRANSDUCER_NOISE
 ) -> LifeCourse:
-    """Course of the same life from now on, until the end of next year.
+    """Return the course of the life of `history_until` from `now_ns` to the end of next year.
 
     Raises
     ------
     ValueError
-        If damage names an unknown bearing.
+        If damage has an unknown bearing.
     KeyError
-        If the life lacks a bearing of the machine.
+        If a bearing of the machine is missing in the life.
     """
     return LifeCourse(_inputs(plan, now_ns), plan.damage, machine, now_ns, noise)
 
@@ -230,6 +230,6 @@ def _inputs(plan: LifePlan, now_ns: int) -> LifeInputs:
 
 
 def _last_new_year_ns(now_ns: int) -> int:
-    """The first of January of last year."""
+    """Return the time of 1 January of last year, UTC."""
     year = datetime.fromtimestamp(now_ns // NS_PER_S, UTC).year - 1
     return int(datetime(year, 1, 1, tzinfo=UTC).timestamp()) * NS_PER_S

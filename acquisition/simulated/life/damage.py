@@ -1,4 +1,4 @@
-"""Damage of a bearing or its transducers, and its growth."""
+"""Damage of a bearing or of its transducers, and its growth over time."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -11,7 +11,7 @@ from core.units import NS_PER_S
 
 
 class DamageKind(StrEnum):
-    """Kind of damage: four of the film, then of the bracket and of the transducers."""
+    """Kind of damage: four kinds of the film, one of the bracket, two of the transducers."""
 
     STIFFNESS_LOSS = "stiffness_loss"
     CLEARANCE_GROWTH = "clearance_growth"
@@ -32,19 +32,19 @@ class Damage:
     Parameters
     ----------
     size
-        Final loss as a share: of the stiffness of the film (all pads; or by growing clearance, with
-        the shaft following the pads), of the viscosity, of the stiffness of the bracket. Of a
-        pivot, recession of its pad over the configured clearance. Of a gain, its signed relative
-        change: -0.2 loses a fifth.
+        Final size, by kind. Stiffness loss and clearance growth: relative loss of film stiffness at
+        a constant eccentricity ratio. Oil and bracket: relative loss of viscosity and of bracket
+        stiffness. Pivot wear: recession of the pad divided by the configured clearance. Gains:
+        signed relative change, -0.2 is a decrease by 20 %.
     ramp_days
-        Time of linear growth from onset to `size`; 0 is a step.
+        Duration of the linear growth from 0 to `size`; 0 is a step.
     directions
-        Directions of the changed transducers, for gains.
+        Directions of the affected transducers, for gains only.
 
     Raises
     ------
     ValueError
-        If size, ramp or directions are out of range; the message has key and value.
+        If size, ramp or directions are invalid; the message contains name and value.
     """
 
     kind: DamageKind
@@ -66,7 +66,7 @@ class Damage:
             raise ValueError(f"directions = {self.directions} must be of {DIRECTIONS}")
 
     def extent(self, time_ns: TimeArray) -> FloatArray:
-        """(n,) reached share of `size`."""
+        """Return the fraction of `size` that the damage has reached, (n,)."""
         since_days = (time_ns - self.onset_ns) / (86_400.0 * NS_PER_S)
         if self.ramp_days == 0.0:
             return (since_days >= 0.0).astype(np.float64)
@@ -75,16 +75,16 @@ class Damage:
 
 @dataclass(frozen=True, eq=False)
 class Alteration:
-    """Effect of damage on one bearing: factors and lengths, 1 and 0 without damage.
+    """Effect of damage on one bearing over time; factors are 1 without damage.
 
     Parameters
     ----------
     stiffness, clearance, viscosity, bracket : (n,)
         Factors.
     pivot_share : (n,)
-        Recession of the pad nearest to the shaft, over the configured clearance.
+        Recession of the worn pad divided by the configured clearance; 0 without damage.
     probe_gain, accelerometer_gain : (2, n)
-        Factors, x and y.
+        Factors of the gains in x and y.
     """
 
     stiffness: FloatArray
@@ -97,7 +97,7 @@ class Alteration:
 
 
 def alteration(damage: tuple[Damage, ...], bearing: str, time_ns: TimeArray) -> Alteration:
-    """Combine the effect of all damage on one bearing."""
+    """Return the combined effect of all damage on one bearing."""
     lost = {
         kind: sum(
             (d.size * d.extent(time_ns) for d in damage if d.bearing == bearing and d.kind is kind),

@@ -1,4 +1,4 @@
-"""Unbalance, turbulence and vortex over the years, and the response at 1×."""
+"""Unbalance, hydraulic force and vortex rope of a life, and the response at 1×."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,42 +18,42 @@ from core.arrays import ComplexArray, FloatArray
 from core.units import um_from_m
 
 WARM_UNBALANCE = 0.76
-"""Unbalance of the warm rotor over that of the cold one.
+"""Ratio of the unbalance of the warm rotor to that of the cold rotor.
 
-Fitted: with the films of Table 8 (Brito et al.) alone, shaft motion at the UJB falls from 85 to
-51 µm. Bearing motion fell too, in both bearings and directions, which films do not explain.
+Fitted: with the films of Table 8 (Brito et al.), the shaft motion at the UJB decreases from 85 to
+51 µm. The measured motion of both bearings decreased too, which the films do not explain.
 """
 
 WARM_UNBALANCE_TIME_S = 1.2 * 3600.0
 
 BALANCED_GRADES_MM_S = (0.8, 2.0)
 MAGNETIC_UNBALANCE = 0.12
-"""Relative increase of unbalance by the field at full load."""
+"""Relative increase of the unbalance at full load by the magnetic field."""
 
 GRADE_WANDER, GRADE_TIME_S = 0.03, 5.0 * 86_400.0
 
 NO_LOAD_FORCE_N = 6.0e3
 FULL_LOAD_FORCE_N = 20.0e3
-"""Broadband hydraulic force, rms; at full load that of the accuracy trial of the design."""
+"""Rms of the broadband hydraulic force; at full load as in the accuracy trial of the design."""
 
 VORTEX_LOADS = (0.35, 0.65)
-"""Load over rated power with a vortex in a Francis turbine (320 MW of 700 in Brito et al., section
-3.2)."""
+"""Load range with a vortex rope in a Francis turbine, as a share of rated power (320 MW of 700 MW
+in Brito et al., section 3.2)."""
 
 VORTEX_FORCE_N = 60.0e3
 VORTEX_TURBULENCE = 1.6
-"""Relative turbulence of the flow there."""
+"""Factor of the broadband hydraulic force in this load range."""
 
 
 def warm_unbalance(operation: Operation) -> FloatArray:
-    """Unbalance over that of the cold rotor, over warming and cooling, (n,)."""
+    """Return the ratio of the unbalance to that of the cold rotor, (n,)."""
     turns = operation.is_turning
     time_s = WARM_UNBALANCE_TIME_S * np.where(turns, 1.0, STANDING_TIME_FACTOR)
     return lagged(np.where(turns, WARM_UNBALANCE, 1.0), time_s, operation.step_s, 1.0)
 
 
 def draw_grade_mm_s(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Draw the residual unbalance of a balanced machine, as an ISO grade, (n,)."""
+    """Draw the residual unbalance of a balanced machine as an ISO balance grade, (n,)."""
     cold_mm_s = random.uniform(*BALANCED_GRADES_MM_S) / WARM_UNBALANCE
     magnetic = 1.0 + MAGNETIC_UNBALANCE * operation.load
     slow = wander(random, len(operation), operation.step_s, GRADE_TIME_S, GRADE_WANDER)
@@ -61,14 +61,14 @@ def draw_grade_mm_s(random: np.random.Generator, operation: Operation) -> FloatA
 
 
 def has_vortex(load: FloatArray) -> FloatArray:
-    """(n,) 1 with the part-load vortex, with flanks of a twentieth of rated power."""
+    """Return 1 with and 0 without vortex rope, with linear edges of 5 % of rated power, (n,)."""
     low, high = VORTEX_LOADS
     rising = np.clip((load - low) / 0.05, 0.0, 1.0)
     return rising * np.clip((high - load) / 0.05, 0.0, 1.0)
 
 
 def hydraulic_force_n(load: FloatArray) -> FloatArray:
-    """Rms of the broadband hydraulic force in each direction, (n,)."""
+    """Return the rms of the broadband hydraulic force in each direction, (n,)."""
     smooth_n = NO_LOAD_FORCE_N + (FULL_LOAD_FORCE_N - NO_LOAD_FORCE_N) * np.clip(load, 0.0, 1.0)
     return smooth_n * (1.0 + (VORTEX_TURBULENCE - 1.0) * has_vortex(load))
 
@@ -84,22 +84,22 @@ def order1_um_pk(
     grade_mm_s: FloatArray,
     rotor: RotorParameters,
 ) -> dict[str, ComplexArray]:
-    """Response to an unbalance in the plane of the mass centre, by the model of `plant.rotor`.
+    """Return the 1x response to an unbalance at the mass centre, by the model of `plant.rotor`.
 
     Brackets are eliminated: with D = K + iΩC of the film and b = k_b − m_b Ω² of the bracket, the
-    shaft has the support (D⁻¹ + b⁻¹)⁻¹, which leaves four equations instead of ten.
+    stiffness of the support is (D⁻¹ + b⁻¹)⁻¹, which reduces ten equations to four.
 
     Parameters
     ----------
     bracket_factors : (n,) by bearing
-        True stiffness of the brackets over that of `rotor`.
+        Ratio of the true bracket stiffness to that of `rotor`.
     speed_rpm
         Rated speed; its variation is negligible.
     grade_mm_s : (n,)
 
     Returns
     -------
-    (4, n) by bearing: phasors of u_x, u_y, x_b, y_b.
+    (4, n) by bearing: phasors of u_x, u_y, x_b, y_b in µm.
     """
     alone = rotor_matrices(rotor, {b.bearing: NO_FILM for b in rotor.brackets}, speed_rpm)
     omega = alone.speed_rad_s
@@ -123,30 +123,30 @@ def order1_um_pk(
 
 
 def rotor_of(ids: tuple[str, ...]) -> RotorParameters:
-    """Rotor of the paper on the brackets of some bearings."""
+    """Return the rotor of Brito et al. with only the brackets of the bearings `ids`."""
     rotor = RotorParameters()
     return replace(rotor, brackets=tuple(b for b in rotor.brackets if b.bearing in ids))
 
 
 def shaft_motion(height_m: float) -> FloatArray:
-    """Map X, Y, φ_x, φ_y to the motion (x, y) of the shaft at a height (Brito et al., Table 3)."""
+    """Return the map from X, Y, φ_x, φ_y to the shaft motion (x, y) at a height (Table 3)."""
     return np.array([[1.0, 0.0, 0.0, height_m], [0.0, 1.0, -height_m, 0.0]])
 
 
 def _split(share: ComplexArray, shaft_m: ComplexArray) -> ComplexArray:
-    """Motion of the shaft relative to the bearing, and of the bearing."""
+    """Return the shaft motion relative to the bearing and the bearing motion in µm, (4, n)."""
     relative = (share @ shaft_m)[:, :, 0].T
     return np.asarray(um_from_m(1.0) * np.concatenate([relative, shaft_m[:, :, 0].T - relative]))
 
 
 def _matrices(film: FilmColumns) -> FloatArray:
-    """Stiffness, (n, 2, 2)."""
+    """Return the stiffness matrices of a film, (n, 2, 2)."""
     rows = ((film.k_xx_n_per_m, film.k_xy_n_per_m), (film.k_xy_n_per_m, film.k_yy_n_per_m))
     return np.moveaxis(np.array(rows), -1, 0)
 
 
 def _inverse(matrix: ComplexArray) -> ComplexArray:
-    """Inverses of symmetric 2×2 matrices, (n, 2, 2)."""
+    """Return the inverses of symmetric 2×2 matrices, (n, 2, 2)."""
     a, b, d = matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 1, 1]
     inverse = np.moveaxis(np.array([[d, -b], [-b, a]]), -1, 0)
     return np.asarray(inverse / (a * d - b * b)[:, np.newaxis, np.newaxis])

@@ -1,4 +1,4 @@
-"""Films over the years; rows of dataclasses of columns."""
+"""Oil films of a life: pad clearances and stiffness; row selection in column dataclasses."""
 
 import math
 from collections.abc import Callable
@@ -15,19 +15,19 @@ from core.arrays import FloatArray
 
 UNIT_CLEARANCE_RMS = 0.02
 PAD_CLEARANCE_RMS = 0.01
-"""Scatter of clearance from machine to machine and from pad to pad: accuracy of the wedges."""
+"""Relative rms of the clearance between machines and between pads: accuracy of the wedges."""
 
 
 @dataclass(frozen=True, eq=False)
 class PadSetting:
-    """Setting of the pads of one machine.
+    """Pad clearances of one bearing of one machine.
 
     Parameters
     ----------
     cold_um : (n_pads,)
         Cold clearance of each pad.
     opening_angle_rad
-        Direction of the diameter that the field of the generator stretches.
+        Angle of the diameter in which the magnetic field of the generator moves the pads outward.
     """
 
     cold_um: FloatArray
@@ -36,14 +36,14 @@ class PadSetting:
 
 @dataclass(frozen=True, eq=False)
 class FilmCourse:
-    """A film over time.
+    """Time series of a film, with its clearance and shaft position.
 
     Parameters
     ----------
     clearance_um : (n,)
-        Mean over the pads.
+        Mean clearance of the pads.
     centre_um : (2, n)
-        Shaft centre from bearing centre.
+        Position of the shaft centre relative to the bearing centre.
     """
 
     film: FilmColumns
@@ -52,12 +52,12 @@ class FilmCourse:
 
 
 def even_setting(bearing: LifeBearing) -> PadSetting:
-    """Pads exactly as in the drawing."""
+    """Return a setting with the nominal cold clearance at all pads."""
     return PadSetting(np.full(bearing.ring.n_pads, bearing.cold_clearance_um))
 
 
 def draw_setting(random: np.random.Generator, bearing: LifeBearing) -> PadSetting:
-    """Draw the setting of the pads of one machine."""
+    """Draw random pad clearances of one machine."""
     each = 1.0 + PAD_CLEARANCE_RMS * random.standard_normal(bearing.ring.n_pads)
     whole = 1.0 + UNIT_CLEARANCE_RMS * random.standard_normal()
     angle_rad = float(random.uniform(0.0, math.pi))
@@ -73,13 +73,13 @@ def film_course(
     altered: Alteration | None = None,
     worn: int = 0,
 ) -> FilmCourse:
-    """Stiffness of a film at given shaft positions.
+    """Return the film, clearance and shaft position over time.
 
     Parameters
     ----------
     speed_rpm : (n,)
     centre_um : (2, n)
-        Shaft position without damage; the shaft follows worn pads.
+        Shaft position without damage; growing clearance scales it.
     worn
         Index of the pad with a worn pivot.
     """
@@ -99,21 +99,21 @@ def film_course(
 def mean_clearance_um(
     bearing: LifeBearing, setting: PadSetting, thermal: ThermalCourse
 ) -> FloatArray:
-    """Mean over the pads, undamaged, (n,)."""
+    """Return the mean clearance of the pads without damage, (n,)."""
     return np.asarray(np.mean(_pad_clearance_um(bearing, setting, thermal), axis=0))
 
 
 def _pad_clearance_um(
     bearing: LifeBearing, setting: PadSetting, thermal: ThermalCourse
 ) -> FloatArray:
-    """Film thickness at each pivot with the shaft centred, (n_pads, n)."""
+    """Return the film thickness at each pivot with a centred shaft, (n_pads, n)."""
     ovality = np.cos(2.0 * (bearing.ring.pad_angles_rad - setting.opening_angle_rad))
     cold_um = setting.cold_um[:, np.newaxis]
     return cold_um - thermal.closing_um + ovality[:, np.newaxis] * thermal.opening_um
 
 
 def worn_pad(bearing: LifeBearing, centre_um: FloatArray) -> int:
-    """Index of the pad that carries the shaft most of the time, and wears."""
+    """Return the index of the pad nearest to the median shaft position, the pad that wears."""
     x_um, y_um = np.median(centre_um, axis=1)
     angles = bearing.ring.pad_angles_rad
     return int(np.argmax(x_um * np.cos(angles) + y_um * np.sin(angles)))
@@ -121,30 +121,30 @@ def worn_pad(bearing: LifeBearing, centre_um: FloatArray) -> int:
 
 T = TypeVar("T")
 Column: TypeAlias = npt.NDArray[Any]
-"""Numbers or codes, with rows along the last axis."""
+"""Array of numbers or codes with rows along the last axis."""
 
 
 def rows_of(columns: T, rows: npt.NDArray[np.bool_]) -> T:
-    """Select rows of all arrays of a dataclass.
+    """Return a column dataclass with selected rows of all arrays.
 
     Parameters
     ----------
     rows : (n,)
-        Selected rows. Arrays whose last axis is not n long have no rows, and are kept.
+        Mask of the selected rows. Arrays with a last axis of another length are unchanged.
     """
     return _mapped(columns, rows.size, lambda value: value[..., rows])
 
 
 def row_between(columns: T, n: int, row: int, share: float) -> T:
-    """Interpolate one row between two, as columns of one row.
+    """Return a column dataclass of one row, interpolated between two rows.
 
     Parameters
     ----------
     n
-        Number of all rows.
+        Number of rows of `columns`.
     share
-        Share of the way from `row` to the next; 0 is `row` itself. Integers and codes are those of
-        `row`.
+        Fraction of the interval from `row` to the next row; 0 is `row` itself. Integers and codes
+        are taken from `row`.
     """
 
     def between(value: Column) -> Column:

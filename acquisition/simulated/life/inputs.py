@@ -1,4 +1,4 @@
-"""Inputs of a life: operation, temperatures and shaft position of a unit, at all times."""
+"""Random inputs of a life: operation, temperatures, shaft position and transducer errors."""
 
 from dataclasses import dataclass
 
@@ -20,19 +20,19 @@ from acquisition.simulated.life.truth import Chain, draw_chain
 from core.arrays import FloatArray
 
 RATED_SPEEDS_RPM = (92.3, 90.9)
-"""Rated speeds of units for 60 Hz and 50 Hz (Brito et al., section 1): even and odd seeds."""
+"""Rated speeds of 60 Hz units (even seeds) and 50 Hz units (odd) (Brito et al., section 1)."""
 
 
 @dataclass(frozen=True, eq=False)
 class BearingInputs:
-    """Inputs of one bearing on an even grid of times, without damage.
+    """Inputs of one bearing at evenly spaced times, without damage.
 
     Parameters
     ----------
     position_um : (2, n)
         Shaft position without damage.
     worn_pad
-        Pad that carries the shaft most of the time it turns.
+        Index of the pad nearest to the median shaft position while turning.
     """
 
     bearing: LifeBearing
@@ -45,13 +45,14 @@ class BearingInputs:
 
 @dataclass(frozen=True, eq=False)
 class LifeInputs:
-    """Inputs of one unit on an even grid of times.
+    """Inputs of one unit at evenly spaced times.
 
     Parameters
     ----------
     water_c, grade_mm_s : (n,)
+        Cooling water temperature and ISO balance grade.
     noise
-        Seeds of the scatter of readings, by bearing.
+        Seeds of the random errors of the readings, in the order of `bearings`.
     """
 
     unit_seed: int
@@ -71,7 +72,7 @@ def draw_inputs(
     bearings: tuple[LifeBearing, ...] = LIFE_BEARINGS,
     held: HeldLoad | None = None,
 ) -> LifeInputs:
-    """Draw the inputs of a life.
+    """Draw the random inputs of a life.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ def draw_inputs(
     Raises
     ------
     ValueError
-        If years are too few, or the unit never turns.
+        If `years` is less than a day, or the unit never turns.
     """
     random = _Streams(unit_seed, len(bearings))
     time_ns = time_grid_ns(start_ns, years)
@@ -106,12 +107,12 @@ def draw_inputs(
 
 
 def rated_speed_rpm(unit_seed: int) -> float:
-    """Rated speed of the unit of a seed."""
+    """Return the rated speed of the unit with a seed."""
     return RATED_SPEEDS_RPM[unit_seed % 2]
 
 
 class _Streams:
-    """Independent random generators, so that a draw of one subject changes no other."""
+    """Independent random generators of operation, water, position, unbalance and bearings."""
 
     def __init__(self, unit_seed: int, n_bearings: int) -> None:
         plant, *own = np.random.SeedSequence(unit_seed).spawn(1 + 3 * n_bearings)

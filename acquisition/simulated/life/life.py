@@ -1,4 +1,4 @@
-"""`live`: years of readings of a unit, with the truth."""
+"""Simulation of years of readings of a unit, with the true state."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ from core.baseline.history import ReadingOutcome, StiffnessHistory
 
 
 def ln_stiffness(film: FilmColumns) -> FloatArray:
-    """Logarithm of the direct stiffnesses, (2, n)."""
+    """Return the logarithm of the direct stiffness in x and y, (2, n)."""
     return np.log(np.stack([film.k_xx_n_per_m, film.k_yy_n_per_m]))
 
 
@@ -40,11 +40,11 @@ def readings(
     chain: Chain,
     operation: Operation,
 ) -> StiffnessHistory:
-    """Readings of one bearing at every row, all with the shaft turning.
+    """Return the readings of one bearing at all rows of `operation`; the shaft turns at all rows.
 
-    Stiffness is force over motion, k = |X_b| / |U| · k_b (Brito et al., equation 5; other
-    estimators differ in the way to the ratio), with the configured k_b: errors of accelerometer,
-    probe and bracket enter it.
+    Stiffness is force divided by motion, k = |X_b| / |U| · k_b with the configured k_b (Brito et
+    al., equation 5; other estimators compute the ratio differently). Errors of accelerometer, probe
+    and bracket therefore affect the stiffness.
     """
     n = len(operation)
     probe_gain = chain.probe_gain[:, np.newaxis] * truth.altered.probe_gain
@@ -95,7 +95,7 @@ def _amplitudes_um_pk(
 def _position(
     bearing: LifeBearing, truth: BearingLifeTruth, chain: Chain
 ) -> tuple[FloatArray, float, FloatArray]:
-    """Eccentricity ratio, its standard uncertainty, attitude angle in degrees."""
+    """Return eccentricity ratio, its standard uncertainty, and attitude angle in degrees."""
     gain = chain.gap_gain[:, np.newaxis] * truth.altered.probe_gain
     x_um, y_um = gain * truth.centre_um + chain.position_error_um
     told_um = bearing.configured_clearance_um
@@ -110,7 +110,7 @@ def _oil_c(truth: BearingLifeTruth, chain: Chain) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class _BearingLife:
-    """State of one bearing, without the coupling to the others."""
+    """True state of one bearing over time, before the coupled response at 1× is computed."""
 
     bearing: LifeBearing
     course: FilmCourse
@@ -129,21 +129,21 @@ def live(
     bearings: tuple[LifeBearing, ...] = LIFE_BEARINGS,
     held: HeldLoad | None = None,
 ) -> UnitLife:
-    """Simulate the life of one unit, with a reading every 10 minutes while the shaft turns.
+    """Simulate the life of one unit, with one reading every 10 minutes while the shaft turns.
 
-    The same seed gives the same life; damage and changes have no effect on its random draws.
+    The same seed gives the same life; damage and changes do not affect its random numbers.
 
     Parameters
     ----------
     start_ns
         Midnight in the time zone of the plant.
     held
-        Operation at one load; by default the unit starts and stops at random.
+        Operation at a constant load; by default random starts and stops.
 
     Raises
     ------
     ValueError
-        If years are too few or damage names an unknown bearing.
+        If `years` is less than a day, the unit never turns, or damage has an unknown bearing.
     """
     damage = tuple(damage)
     require_known_bearings(damage, bearings)
@@ -152,12 +152,12 @@ def live(
 
 
 def require_known_bearings(damage: tuple[Damage, ...], bearings: tuple[LifeBearing, ...]) -> None:
-    """Check that all damage is of existing bearings.
+    """Check that the bearings of all damage exist.
 
     Raises
     ------
     ValueError
-        If it is not; the message has the name.
+        If a bearing is unknown; the message contains its id.
     """
     known = {bearing.id for bearing in bearings}
     for one in damage:
@@ -168,12 +168,12 @@ def require_known_bearings(damage: tuple[Damage, ...], bearings: tuple[LifeBeari
 def life_of(
     inputs: LifeInputs, damage: tuple[Damage, ...], turns: npt.NDArray[np.bool_]
 ) -> UnitLife:
-    """Truth and readings of a life.
+    """Return the true state and the readings of a life.
 
     Parameters
     ----------
     turns : (n,)
-        Selected rows, all with the shaft turning.
+        Mask of the selected rows; the shaft turns at all selected rows.
     """
     turning, grade_mm_s = rows_of(inputs.operation, turns), inputs.grade_mm_s[turns]
     lives = [_bearing_life(one, turns, turning, damage) for one in inputs.bearings]

@@ -1,4 +1,4 @@
-"""One moment of a life as a scenario, whose bearings can be sampled at 600 Hz."""
+"""Scenario of a simulated unit at one time of its life, for samples at 600 Hz."""
 
 from collections.abc import Iterator
 
@@ -23,32 +23,33 @@ from core.arrays import FloatArray
 from core.machine.unit import Bearing, Unit
 
 TRANSDUCER_NOISE = TransducerNoise(gap_um_rms=1.2, accelerometer_g_per_sqrt_hz=5e-6)
-"""The realistic noise of the accuracy benchmark."""
+"""Realistic transducer noise of the accuracy benchmark."""
 
 HYDRAULIC_CUTOFF_HZ = 20.0
-"""Upper limit of turbulence, well above the harmonics between which stiffness is measured."""
+"""Cutoff of the hydraulic force, well above the harmonics near which stiffness is measured."""
 
 
 def scenario_at(
     life: UnitLife, time_ns: int, machine: Unit, noise: TransducerNoise = TRANSDUCER_NOISE
 ) -> Scenario:
-    """Steady scenario of the newest reading up to a moment.
+    """Return the steady scenario at the newest reading up to a time.
 
-    The transducers are those of the readings. Gaps grow with the shaft where four probes separate
-    growth from displacement; two probes show the displacement that four would measure.
+    The transducer errors are those of the readings. At bearings with four probes, which separate
+    growth from displacement, the gaps include thermal growth. At bearings with two probes, the gaps
+    show the displacement that four probes would measure.
 
     Parameters
     ----------
     machine
-        Unit to be sampled, with bearings of the life. Clearances equal to
-        `LifeBearing.configured_clearance_um` give the eccentricity of the readings.
+        Unit to be sampled; its bearings must be in the life. With clearances equal to
+        `LifeBearing.configured_clearance_um` the eccentricity equals that of the readings.
 
     Raises
     ------
     ValueError
-        If the life has not begun, or the unit is not at speed.
+        If the time is before the first reading, or the unit is not at rated speed.
     KeyError
-        If the life lacks a bearing of the machine.
+        If a bearing of the machine is missing in the life.
     """
     row, grow = row_at(life, time_ns), growing(machine)
     operation = life.operation
@@ -71,17 +72,17 @@ def scenario_at(
 
 
 def growing(machine: Unit) -> frozenset[str]:
-    """Bearings with four probes, which separate growth from displacement."""
+    """Return the ids of the bearings with four probes, which separate growth from displacement."""
     return frozenset(b.id for b in machine.bearings if b.opposite_reference_um is not None)
 
 
 def row_at(life: UnitLife, time_ns: int) -> int:
-    """Row of the newest reading up to a moment.
+    """Return the row of the newest reading up to a time.
 
     Raises
     ------
     ValueError
-        If there is none, or the unit is not at speed.
+        If the time is before the first reading, or the unit is not at rated speed.
     """
     row = int(np.searchsorted(life.operation.time_ns, time_ns, side="right")) - 1
     if row < 0:
@@ -92,26 +93,26 @@ def row_at(life: UnitLife, time_ns: int) -> int:
 
 
 def hydraulic_noise(load: float) -> HydraulicNoise:
-    """Broadband force at a share of rated power."""
+    """Return the broadband hydraulic force at a load, as a share of rated power."""
     return HydraulicNoise(float(hydraulic_force_n(np.array([load]))[0]), HYDRAULIC_CUTOFF_HZ)
 
 
 def vortex_rope(load: float) -> VortexRope:
-    """Vortex at a share of rated power; without force outside its range."""
+    """Return the vortex rope at a load, as a share of rated power; zero force outside its range."""
     return VortexRope(VORTEX_FORCE_N * float(has_vortex(np.array([load]))[0]))
 
 
 def bearing_at(
     truth: BearingMoments, row: int, grows: bool, usual_clearance_um: float | None = None
 ) -> BearingScenario:
-    """Scenario of one bearing in one row.
+    """Return the scenario of one bearing at one row.
 
     Parameters
     ----------
     grows
-        Whether gaps show the growth of the shaft.
+        Whether the gaps include thermal growth.
     usual_clearance_um
-        Clearance of the reference gaps; the median over all rows by default.
+        Clearance at zero gap growth; the median over all rows by default.
     """
     usual_um = usual_clearance_um or float(np.median(truth.clearance_um))
     x_um, y_um = (float(x) for x in truth.centre_um[:, row])
@@ -131,7 +132,7 @@ def bearing_at(
 def channels_at(
     truth: BearingMoments, row: int, bearing: Bearing
 ) -> Iterator[tuple[str, ChannelScenario]]:
-    """Transducers of a bearing in one row, by channel."""
+    """Yield the channel ids of a bearing with their transducers at one row."""
     probe_gain, accelerometer_gain = _probe_gain(truth, row), _accelerometer_gain(truth, row)
     near, far = bearing.channels[:2], (bearing.opposite_x, bearing.opposite_y)
     for axis in range(2):
@@ -147,7 +148,7 @@ def _probe_gain(truth: BearingMoments, row: int) -> FloatArray:
 
 
 def _accelerometer_gain(truth: BearingMoments, row: int) -> FloatArray:
-    """Gain including the errors of stiffness common over hours and days, (2,)."""
+    """Return the gain including the slow stiffness errors `Chain.ln_k_error`, (2,)."""
     errors = np.exp(truth.chain.ln_k_error[:, row])
     return np.asarray(
         truth.chain.accelerometer_gain * truth.altered.accelerometer_gain[:, row] * errors
@@ -155,9 +156,9 @@ def _accelerometer_gain(truth: BearingMoments, row: int) -> FloatArray:
 
 
 def _position_error_um(truth: BearingMoments, row: int) -> FloatArray:
-    """Error of the gaps before the gain of the probe that gives the errors of the readings, (2,).
+    """Return the gap error before the probe gain that reproduces the errors of the readings, (2,).
 
-    In a life mean gaps have their own gain, that of four probes together.
+    In the readings mean gaps have a separate gain, that of four probes combined.
     """
     centre_um, chain = truth.centre_um[:, row], truth.chain
     read_um = chain.gap_gain * truth.altered.probe_gain[:, row] * centre_um

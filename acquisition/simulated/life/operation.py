@@ -1,4 +1,4 @@
-"""Operation of a unit over years: running times, load, speed; random processes over time."""
+"""Operation of a unit over years: running times, load and speed; random processes."""
 
 import math
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ YEAR_S = YEAR_DAYS * DAY_S
 
 @dataclass(frozen=True, eq=False)
 class Operation:
-    """Speed and power at evenly spaced times; all (n,).
+    """Time series of speed and power of a unit; all (n,).
 
     Parameters
     ----------
     time_ns
-        Times of the readings.
+        Times of the rows.
     """
 
     time_ns: TimeArray
@@ -38,37 +38,37 @@ class Operation:
 
     @property
     def step_s(self) -> float:
-        """Time from one row to the next."""
+        """Time between the first two rows."""
         return float(self.time_ns[1] - self.time_ns[0]) / NS_PER_S
 
     @property
     def load(self) -> FloatArray:
-        """(n,) power over rated power."""
+        """Power as a share of rated power, (n,)."""
         return self.power_mw / self.rated_power_mw
 
     @property
     def is_turning(self) -> npt.NDArray[np.bool_]:
-        """(n,) whether the shaft turns at all."""
+        """Whether the shaft turns, (n,)."""
         return self.speed_rpm > 0.0
 
     @property
     def is_at_speed(self) -> npt.NDArray[np.bool_]:
-        """(n,) whether the shaft has its rated speed, which excludes run-ups."""
+        """Whether the shaft has rated speed, which excludes run-ups, (n,)."""
         return self.speed_rpm > 0.95 * self.rated_speed_rpm
 
     @property
     def starts(self) -> npt.NDArray[np.int64]:
-        """First row of every stretch of turning."""
+        """Indices of the first row of each run."""
         return np.flatnonzero(np.diff(self.is_turning.astype(np.int8), prepend=np.int8(0)) == 1)
 
 
 def time_grid_ns(start_ns: int, years: float, step_s: float = STEP_S) -> TimeArray:
-    """Times of the readings of some years of 365.25 days.
+    """Return evenly spaced times of the readings over `years` of 365.25 days, (n,).
 
     Raises
     ------
     ValueError
-        If the years are less than a day.
+        If `years` is less than a day.
     """
     n = int(years * YEAR_S / step_s)
     if not n * step_s >= DAY_S:
@@ -78,19 +78,19 @@ def time_grid_ns(start_ns: int, years: float, step_s: float = STEP_S) -> TimeArr
 
 @dataclass(frozen=True)
 class HeldLoad:
-    """Operation without a stop at one load, from a time on.
+    """Operation at constant load without a stop, from a given time.
 
     Parameters
     ----------
     from_ns
-        Begin; earlier operation is unchanged.
+        Start time; earlier operation is unchanged.
     load
-        Share of rated power.
+        Load as a share of rated power.
 
     Raises
     ------
     ValueError
-        If the load is not above 0 and up to 1.
+        If the load is not above 0, or is above 1.
     """
 
     from_ns: int
@@ -104,8 +104,8 @@ class HeldLoad:
 def wander(
     random: np.random.Generator, n: int, step_s: float, time_s: float, rms: float
 ) -> FloatArray:
-    """First-order Gauss-Markov wander about zero, stationary from the first row on."""
-    import scipy.signal  # slow to load, and not needed to begin
+    """Return a first-order Gauss-Markov process with zero mean, stationary from row 0, (n,)."""
+    import scipy.signal  # slow import, not needed at start-up
 
     memory = math.exp(-step_s / time_s)
     fresh = random.standard_normal(n)
@@ -116,32 +116,32 @@ def wander(
 def change_rows(
     random: np.random.Generator, n: int, step_s: float, interval_s: float
 ) -> FloatArray:
-    """Number of the current level, from 0, (n,); changes are random.
+    """Return the index of the current level at each row, (n,); levels change at random times.
 
     Parameters
     ----------
     interval_s
-        Mean time between two changes.
+        Mean time between two changes of level.
     """
     return np.cumsum(random.random(n) < step_s / interval_s).astype(np.float64)
 
 
 def held(levels: FloatArray, which: FloatArray) -> FloatArray:
-    """Current level at each row."""
+    """Return the current level at each row, selected by the indices `which`."""
     return np.asarray(levels[which.astype(np.int64)])
 
 
 def lagged(target: FloatArray, time_s: FloatArray, step_s: float, initial: float) -> FloatArray:
-    """First-order lag behind a target: τ dy/dt = target − y, exact for targets held per step.
+    """Return a first-order lag, τ dy/dt = target − y, exact for targets constant in each step.
 
     Parameters
     ----------
     target, time_s : (n,)
-        The time constant may change from row to row; each change costs time.
+        Target and time constant; each change of the time constant costs computing time.
     initial
         Value before the first row.
     """
-    import scipy.signal  # slow to load, and not needed to begin
+    import scipy.signal  # slow import, not needed at start-up
 
     followed = np.empty_like(target)
     edges = np.flatnonzero(np.diff(time_s)) + 1
@@ -161,7 +161,7 @@ STEPS_PER_HOUR = STEPS_PER_DAY // 24
 BASE, TWO_SHIFT, WEEKDAYS, RESERVE = range(4)
 WET_SHARES = (0.72, 0.20, 0.06, 0.02)
 DRY_SHARES = (0.40, 0.36, 0.18, 0.06)
-"""Probability of each kind of week."""
+"""Probabilities of the kinds of week in the wet and the dry season."""
 
 LOAD_EDGES_H = (0, 6, 9, 12, 17, 22, 24)
 LOAD_RANGES = (
@@ -170,14 +170,14 @@ LOAD_RANGES = (
     ((0.6, 0.9), (0.7, 0.95), (0.8, 1.0), (0.8, 1.0), (0.9, 1.0), (0.7, 0.95)),
     ((0.5, 0.7), (0.5, 0.8), (0.6, 0.9), (0.6, 0.9), (0.7, 1.0), (0.5, 0.7)),
 )
-"""Share of rated power over the day, by kind of week."""
+"""Load ranges over the day as shares of rated power, by kind of week."""
 
 OUTAGE_BEGINS_DAY = (130.0, 270.0)
 OUTAGE_DAYS = (12.0, 26.0)
 TRIPS_PER_YEAR = 5.0
 TRIP_H = (2.0, 40.0)
 LONG_NO_LOAD_SHARE = 0.03
-"""Share of starts with tests at speed without load, 3 to 8 h instead of 10 to 30 min."""
+"""Share of starts with 3 to 8 h at speed without load for tests, instead of 10 to 30 min."""
 
 RUN_UP_SHARE = 0.3
 """Share of starts with a reading during the three minutes of the run-up."""
@@ -189,7 +189,7 @@ def draw_operation(
     rated_speed_rpm: float,
     held: HeldLoad | None = None,
 ) -> Operation:
-    """Draw the operation of a unit, on a grid of 10 min whose first row is midnight."""
+    """Draw the operation of a unit at times every 10 min; the first time is midnight."""
     first_day = int(time_ns[0] // DAY_NS)
     n_weeks = math.ceil(time_ns.size / STEPS_PER_DAY / 7)
     load = np.concatenate([_week(random, first_day + 7 * week) for week in range(n_weeks)])
@@ -198,7 +198,7 @@ def draw_operation(
     _trip(random, load)
     speed = np.where(load > 0.0, 1.0, 0.0)
     _start(random, load, speed)
-    if held is not None:  # after all random draws, which it does not change
+    if held is not None:  # after all random draws, so that their values do not change
         load[time_ns >= held.from_ns], speed[time_ns >= held.from_ns] = held.load, 1.0
     speed *= 1.0 + wander(random, load.size, STEP_S, 1800.0, 3e-4)
     power_mw = RATED_POWER_MW * np.maximum(load, 0.0)
@@ -207,7 +207,7 @@ def draw_operation(
 
 
 def _week(random: np.random.Generator, day: int) -> FloatArray:
-    """Share of rated power through one week; 0 is standstill."""
+    """Draw the load of one week as a share of rated power; 0 is standstill."""
     wetness = 0.5 + 0.5 * math.cos(2.0 * math.pi * (day - 30) / YEAR_DAYS)
     shares = wetness * np.array(WET_SHARES) + (1.0 - wetness) * np.array(DRY_SHARES)
     kind = int(random.choice(4, p=shares))
@@ -231,7 +231,7 @@ def _day(random: np.random.Generator, kind: int) -> FloatArray:
 
 
 def _stop_for_outages(random: np.random.Generator, load: FloatArray, first_day: float) -> None:
-    """One long outage a year, in the dry season."""
+    """Add one long outage per year, in the dry season, in place."""
     for year in range(math.ceil(load.size / STEPS_PER_DAY / YEAR_DAYS) + 1):
         day = year * YEAR_DAYS - first_day + random.uniform(*OUTAGE_BEGINS_DAY)
         steps = int(random.uniform(*OUTAGE_DAYS) * STEPS_PER_DAY)
@@ -246,7 +246,7 @@ def _trip(random: np.random.Generator, load: FloatArray) -> None:
 
 
 def _start(random: np.random.Generator, load: FloatArray, speed: FloatArray) -> None:
-    """Begin every run at speed without load, and some with a reading during run-up."""
+    """Begin each run at speed without load, and some runs with a reading during run-up."""
     for first in np.flatnonzero(np.diff((load > 0.0).astype(np.int8), prepend=np.int8(0)) == 1):
         is_long = random.random() < LONG_NO_LOAD_SHARE
         steps = random.integers(18, 49) if is_long else random.integers(1, 4)

@@ -1,4 +1,4 @@
-"""Shaft position in its bearings over the years, and changes of condition."""
+"""Shaft position in the bearings of a life, and changes of the operating condition."""
 
 import math
 from dataclasses import dataclass
@@ -19,14 +19,14 @@ from core.arrays import FloatArray, TimeArray
 
 @dataclass(frozen=True)
 class ConditionChange:
-    """A temporary change of condition that is not damage.
+    """Temporary change of the operating condition without damage.
 
     Parameters
     ----------
     eccentricity_ratio
-        Mean eccentricity in every bearing, with the usual wander; None leaves it unchanged.
+        Mean eccentricity ratio in all bearings, with the usual variation; None leaves it unchanged.
     oil_offset_c
-        Additional oil temperature while running: a failing cooler, or one more open valve.
+        Additional oil temperature while running; positive for a failed cooler.
     """
 
     start_ns: int
@@ -35,7 +35,7 @@ class ConditionChange:
     oil_offset_c: float = 0.0
 
     def holds(self, time_ns: TimeArray) -> FloatArray:
-        """(n,) 1 while the change lasts, else 0."""
+        """Return 1 during the change and 0 outside, (n,)."""
         return ((time_ns >= self.start_ns) & (time_ns < self.stop_ns)).astype(np.float64)
 
 
@@ -46,12 +46,12 @@ WARM_C, COLD_C = 3.0, -3.0
 def four_fold(
     start_ns: int, days: float = 30.0, *, stiffer: bool = True
 ) -> tuple[ConditionChange, ConditionChange]:
-    """Changes that make films four times as stiff, or as soft, by condition alone.
+    """Return two changes that make the films four times as stiff, or as soft, without damage.
 
-    For `days` before `start_ns` the shaft runs near the centre in warm oil, then as long far out in
-    cold oil, or in reverse order. The factor is 3.5 to 8 in the most sensitive direction, depending
-    on the machine. Both conditions are usual for a healthy machine in spring and autumn; in
-    midwinter the colder oil, in midsummer the warmer, may be unusual.
+    For `days` before `start_ns` the shaft runs near the centre in warm oil, then for `days` at high
+    eccentricity in cold oil; in reverse order if not `stiffer`. The factor is 3.5 to 8 in the most
+    sensitive direction, depending on the machine. A healthy machine has both conditions in spring
+    and autumn; the colder oil may be unusual in midwinter, the warmer oil in midsummer.
     """
     first, second = (CENTRED, WARM_C), (OUTWARD, COLD_C)
     if not stiffer:
@@ -66,7 +66,7 @@ def four_fold(
 def cooling_failure(
     start_ns: int, days: float = 5.0, oil_offset_c: float = 12.0
 ) -> ConditionChange:
-    """Oil far warmer than ever before: a condition outside every healthy history."""
+    """Return a change with oil warmer than in any healthy history."""
     return ConditionChange(start_ns, start_ns + round(days * DAY_NS), oil_offset_c=oil_offset_c)
 
 
@@ -76,7 +76,7 @@ MIN_LEVEL, MAX_LEVEL = 0.07, 0.58
 LEVEL_TIME_S = 1200.0
 LEVEL_INTERVAL_S = 9.0 * 86_400.0
 COMMON_SHARE = 0.6
-"""Correlation of the levels of the three bearings of one shaft."""
+"""Correlation between the eccentricity levels of the bearings of one shaft."""
 
 START_RMS = 0.04
 LOAD_PULL = 0.05
@@ -93,7 +93,7 @@ def draw_positions_um(
     bearings: tuple[LifeBearing, ...],
     changes: tuple[ConditionChange, ...] = (),
 ) -> dict[str, FloatArray]:
-    """Draw the shaft's mean position from the bearing's centre, (2, n) by bearing."""
+    """Draw the position of the shaft centre relative to the bearing centre, (2, n) by bearing."""
     n, step_s = len(operation), operation.step_s
     which = change_rows(random, n, step_s, LEVEL_INTERVAL_S)
     common = random.standard_normal(n)
@@ -113,13 +113,13 @@ def draw_positions_um(
 
 
 def _reflected(level: FloatArray) -> FloatArray:
-    """Levels reflected at both limits, which avoids accumulation there."""
+    """Return levels reflected at both limits; clipping would accumulate them at the limits."""
     width = MAX_LEVEL - MIN_LEVEL
     return MIN_LEVEL + np.abs((level - MIN_LEVEL + width) % (2.0 * width) - width)
 
 
 def _deviation(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Deviation from the level by starts, load and wander."""
+    """Return the deviation from the level by starts, load and random variation, (n,)."""
     n, step_s = len(operation), operation.step_s
     run = np.cumsum(np.isin(np.arange(n), operation.starts)).astype(np.float64)
     by_start = held(START_RMS * random.standard_normal(n), run)

@@ -1,4 +1,4 @@
-"""Truth of a life, and errors of the measuring chain."""
+"""True state of a life, and errors of the measuring chain."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,20 +15,21 @@ from core.baseline.history import CodeArray, ReadingOutcome, StiffnessHistory
 
 U_RANDOM_AT_REFERENCE = 0.005
 REFERENCE_FORCE_N = 20.0e3
-"""Relative scatter of `dynamic` over 5 min, and its hydraulic force (benchmarks/accuracy.py)."""
+"""Relative random uncertainty of the estimator `dynamic` over 5 min, and the hydraulic force at
+which it is valid (benchmarks/accuracy.py)."""
 
 U_RANDOM_KNOWN = 0.1
-"""Relative error of the random uncertainty of a reading."""
+"""Relative error of the random uncertainty that a reading states."""
 
 COMMON_ERRORS = ((4.0 * 3600.0, 0.004), (8.0 * 86_400.0, 0.003))
-"""Time constant and relative rms of errors that successive readings share: chains, excitation."""
+"""Time constant and relative rms of slow stiffness errors: transducers, excitation."""
 
 GAIN_HALF_WIDTH = 0.05
 """Accuracy class of probes and accelerometers (Brito et al., section 2.2.1)."""
 
 GAP_DRIFT = ((30.0 * 86_400.0, 0.8), (6.0 * 3600.0, 0.5), (600.0, 0.3))
-"""Time constant and rms in µm of the error of a displacement from four probes. An assumption: a
-drift of 0.03 % of the gap of 2 mm per kelvin, mostly common to opposite probes."""
+"""Time constant and rms in µm of the displacement error of four probes. Assumption: a drift of
+0.03 % of the gap of 2 mm per kelvin, mostly equal at opposite probes."""
 
 REFERENCE_UM_RMS = 3.0
 GAP_GAIN_HALF_WIDTH = 0.02
@@ -39,13 +40,13 @@ OIL_RESOLUTION_C = 0.1
 
 SHAFT_NOISE_UM, BEARING_NOISE_UM = 0.15, 0.02
 RUNOUT_UM_PK = 1.0
-"""Residue at 1× after subtraction of the slow-roll vector."""
+"""Residual runout at 1× after subtraction of the slow-roll vector."""
 
 NO_LOAD_SILENCE, LOADED_SILENCE = 0.08, 0.002
-"""Share of readings with insufficient excitation."""
+"""Share of readings with insufficient excitation, without load and with load."""
 
 OUTAGES_PER_YEAR, OUTAGE_H = 3.0, (1.0, 10.0)
-"""Outages of a transducer, per direction."""
+"""Number per year and duration of transducer outages in each direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,15 +56,15 @@ class Chain:
     Parameters
     ----------
     probe_gain, accelerometer_gain : (2,)
-        True sensitivity over the configured one, before any damage.
+        Ratio of true to configured sensitivity, without damage.
     ln_k_error : (2, n)
-        Error of stiffness, common over hours and days.
+        Logarithmic stiffness error, correlated over hours and days.
     position_error_um : (2, n)
     oil_error_c : (n,)
     runout_um_pk : (2,)
-        Phasors.
+        Phasors of the residual runout.
     evidence : (2, n)
-        Members of `ReadingOutcome`.
+        Outcomes of the readings, codes of `ReadingOutcome`.
     """
 
     probe_gain: FloatArray
@@ -77,12 +78,12 @@ class Chain:
 
 
 def u_random(force_n: FloatArray) -> FloatArray:
-    """Random relative uncertainty of stiffness under a broadband force, falling as 1/F, (n,)."""
+    """Return the relative random uncertainty of stiffness at a broadband force F, ∝ 1/F, (n,)."""
     return U_RANDOM_AT_REFERENCE * REFERENCE_FORCE_N / force_n
 
 
 def draw_chain(random: np.random.Generator, operation: Operation) -> Chain:
-    """Draw the measuring chain of one bearing."""
+    """Draw the errors of the measuring chain of one bearing."""
     n, step_s = len(operation), operation.step_s
 
     def wanders(parts: tuple[tuple[float, float], ...]) -> FloatArray:
@@ -126,14 +127,14 @@ def _is_out_of_order(random: np.random.Generator, n: int, step_s: float) -> npt.
 
 @dataclass(frozen=True, eq=False)
 class BearingMoments:
-    """State of one bearing that samples depend on, row by row.
+    """True state of one bearing at each row.
 
     Parameters
     ----------
     clearance_um : (n,)
-        Mean over the pads.
+        Mean clearance of the pads.
     centre_um : (2, n)
-        Shaft centre from bearing centre.
+        Position of the shaft centre relative to the bearing centre.
     oil_temperature_c : (n,)
     altered
         Effect of damage on film, bracket and transducers.
@@ -151,12 +152,12 @@ class BearingMoments:
 
 @dataclass(frozen=True, eq=False)
 class BearingLifeTruth(BearingMoments):
-    """Truth of one bearing, at the rows of its readings.
+    """True state of one bearing at the rows of its readings, with stiffness and 1x response.
 
     Parameters
     ----------
     ln_k, ln_k_healthy : (2, n)
-        Stiffness of the film, with and without damage.
+        Logarithm of the film stiffness, with and without damage.
     order1_um_pk : (4, n)
         Phasors of u_x, u_y, x_b, y_b at 1×.
     """
@@ -167,25 +168,25 @@ class BearingLifeTruth(BearingMoments):
 
     @property
     def eccentricity_ratio(self) -> FloatArray:
-        """(n,) distance of the shaft centre over the true clearance."""
+        """Ratio of the shaft centre displacement to the true clearance, (n,)."""
         return np.asarray(np.hypot(*self.centre_um) / self.clearance_um)
 
     @property
     def film_loss(self) -> FloatArray:
-        """(2, n) share of the stiffness of the film lost by damage."""
+        """Relative loss of film stiffness by damage, (2, n)."""
         return np.asarray(1.0 - np.exp(self.ln_k - self.ln_k_healthy))
 
 
 @dataclass(frozen=True, eq=False)
 class UnitLife:
-    """Years of one unit: readings and truth, by bearing.
+    """Simulated life of one unit: readings and true state by bearing.
 
     Parameters
     ----------
     operation
         Operation at the rows of the readings, while the shaft turns; unevenly spaced.
     grade_mm_s, water_c : (n,)
-        Residual unbalance and cooling water at these rows.
+        Residual unbalance and cooling water temperature at these rows.
     """
 
     unit_seed: int
@@ -198,7 +199,7 @@ class UnitLife:
     changes: tuple[ConditionChange, ...]
 
     def is_damaged(self) -> npt.NDArray[np.bool_]:
-        """(n,) whether any damage has set in."""
+        """Return whether any damage has begun, (n,)."""
         time_ns = self.operation.time_ns
         onsets = [damage.onset_ns for damage in self.damage]
         return np.asarray(time_ns >= min(onsets, default=int(time_ns[-1]) + 1))

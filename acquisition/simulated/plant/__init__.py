@@ -1,1 +1,1 @@
-"""Simulated generating unit: 10-DOF rotor, films, excitation, transducers and converter."""
+"""Simulated generating unit: 10-DOF rotor, oil films, excitation, transducers, converter."""

@@ -1,8 +1,8 @@
-"""Transducer chain of one unit: gap, runout, key phase, response, gain and noise of its channels.
+"""Transducer chain of a unit: gap, runout, key phase, frequency response, gain and noise.
 
-Noise of accelerometers is white, rises as 1/f below a corner, and is integrated on velocity
-channels. It extends down to `FLOOR_HZ`, where a double high-pass cuts it off: 1/f noise integrated
-to velocity has infinite power towards 0 Hz, and charge amplifiers do not pass it either.
+The noise of accelerometers is white with a 1/f rise below a corner frequency; velocity channels
+integrate it. A high-pass of order 2 at `FLOOR_HZ` limits it, because the power of integrated 1/f
+noise is infinite towards 0 Hz, and charge amplifiers do not pass low frequencies either.
 """
 
 import math
@@ -28,10 +28,10 @@ from core.units import STANDARD_GRAVITY_M_S2
 
 
 class KeyPhasePulses:
-    """Pulses at the beginning of each turn, on every key-phase channel.
+    """Signal of the key-phase channels: one pulse per turn.
 
-    The converter averages over its sampling interval: a sample on an edge is the share of the
-    interval that the pulse filled.
+    The converter averages over its sampling interval: a sample on an edge of the pulse is
+    proportional to the share of the interval within the pulse.
     """
 
     def __init__(self, machine: Unit, pulse: KeyPhasePulse) -> None:
@@ -43,14 +43,14 @@ class KeyPhasePulses:
         self._pulse = pulse
 
     def add_to(self, readings: FloatArray, turns: FloatArray) -> None:
-        """Add the pulses to the key-phase channels, in place.
+        """Add the pulses to the readings of the key-phase channels, in place.
 
         Parameters
         ----------
         readings
             (n_channels, n_samples)
         turns
-            (n_samples,) angle of the shaft, at nearly constant speed.
+            (n_samples,) angle of the shaft in turns, at nearly constant speed.
         """
         if not self._directions:
             return
@@ -58,13 +58,13 @@ class KeyPhasePulses:
         passed = np.fmod(turns, 1.0) + self._pulse.mark_turns
         if step > 0.0:
             filled = (self._so_far(passed + step / 2) - self._so_far(passed - step / 2)) / step
-        else:  # standing still, under the mark or not
+        else:  # standstill, with the mark at the pick-up or not
             filled = (np.fmod(passed, 1.0) < self._pulse.width_turns).astype(np.float64)
         for row, direction in self._directions.items():
             readings[row] += self._pulse.rest_v + direction * self._pulse.height_v * filled
 
     def _so_far(self, turns: FloatArray) -> FloatArray:
-        """Turns under the pulse since turn 0."""
+        """Return the total angle within pulses from turn 0, in turns."""
         whole = np.floor(turns)
         covered: FloatArray = whole * self._pulse.width_turns
         covered += np.minimum(turns - whole, self._pulse.width_turns)
@@ -73,19 +73,19 @@ class KeyPhasePulses:
 
 FLOOR_HZ = 0.1
 PINK_BAND_HZ = (0.02, 60.0)
-"""Band of accurate 1/f noise: to 2 % in power, and to 0.3 % between 0.1 and 25 Hz."""
+"""Band of the 1/f noise; its power is accurate to 2 %, and to 0.3 % from 0.1 to 25 Hz."""
 POLES_PER_DECADE = 3
 
 
 class AccelerometerNoise:
-    """Noise of some channels, as endless streams.
+    """Generator of continuous accelerometer noise.
 
     Parameters
     ----------
     integrated
-        (n_channels,) whether the channel reads velocity in mm/s; else acceleration in m/s².
+        (n_channels,) true for velocity channels in mm/s, false for acceleration in m/s².
     density_g_per_sqrt_hz
-        One-sided, above the corner.
+        One-sided amplitude density above the corner frequency.
     """
 
     def __init__(
@@ -106,15 +106,15 @@ class AccelerometerNoise:
         self._floor_states = [np.zeros((len(floor), 2)) for floor in self._floors]
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Return the next noise, (n_channels, n_samples)."""
-        import scipy.signal  # slow to load, and not needed to begin
+        """Return the next noise samples, (n_channels, n_samples)."""
+        import scipy.signal  # slow import, not needed at start-up
 
         white, pink = self._white * self._random.standard_normal((2, self._n_channels, n_samples))
         pink, self._pink_state = scipy.signal.sosfilt(self._pink, pink, zi=self._pink_state)
         return np.array(list(self._floored(white + pink))).reshape(white.shape)
 
     def _floored(self, noise: FloatArray) -> Iterator[FloatArray]:
-        import scipy.signal  # slow to load, and not needed to begin
+        import scipy.signal  # slow import, not needed at start-up
 
         for channel, floor in enumerate(self._floors):
             row, self._floor_states[channel] = scipy.signal.sosfilt(
@@ -124,8 +124,8 @@ class AccelerometerNoise:
 
 
 def _floor(integrates: bool, rate_hz: float) -> FloatArray:
-    """High-pass of order 2, from m/s² to m/s² or, with one zero less, to mm/s."""
-    import scipy.signal  # slow to load, and not needed to begin
+    """Return a high-pass of order 2 for m/s²; with `integrates`, its output is in mm/s."""
+    import scipy.signal  # slow import, not needed at start-up
 
     floor_rad_s = 2.0 * math.pi * FLOOR_HZ
     numerator = [1e3, 0.0] if integrates else [1.0, 0.0, 0.0]
@@ -134,8 +134,8 @@ def _floor(integrates: bool, rate_hz: float) -> FloatArray:
 
 
 def _pink(corner_hz: float, rate_hz: float) -> FloatArray:
-    """Filter whose power falls as corner / f, of alternating poles and zeros (Oustaloup, 1991)."""
-    import scipy.signal  # slow to load, and not needed to begin
+    """Return a filter with power gain corner / f, poles and zeros alternating (Oustaloup, 1991)."""
+    import scipy.signal  # slow import, not needed at start-up
 
     low_hz, high_hz = PINK_BAND_HZ
     high_hz = min(high_hz, 0.3 * rate_hz)
@@ -152,12 +152,12 @@ def _pink(corner_hz: float, rate_hz: float) -> FloatArray:
 
 
 class TransducerChain:
-    """Gap, runout, key-phase, response, gain and noise of every channel of one unit.
+    """Transducers of all channels of one unit: converts motion of the rotor to readings.
 
     Parameters
     ----------
     white, own
-        Generators of the white noise and of the accelerometers' own noise.
+        Random generators of the white noise and of the sensor noise of the accelerometers.
 
     Raises
     ------
@@ -188,16 +188,16 @@ class TransducerChain:
     def read(
         self, motion: FloatArray, turns: FloatArray, start: Conditions, stop: Conditions
     ) -> FloatArray:
-        """Readings of the transducers for a chunk of motion, without white noise.
+        """Return the readings of the transducers for a chunk of motion, without white noise.
 
         Parameters
         ----------
         motion
-            (n_channels, n_samples) in each channel's engineering unit; overwritten.
+            (n_channels, n_samples) in the engineering unit of each channel; overwritten.
         turns
-            (n_samples,) angle of the shaft.
+            (n_samples,) angle of the shaft in turns.
         start, stop
-            Conditions at the first sample and at the one that follows the last.
+            Conditions at the first sample and one sample after the last.
         """
         gap_um, next_gap_um = (standing_gap_um(self._machine, c) for c in (start, stop))
         motion += gap_um[:, np.newaxis]
@@ -214,13 +214,13 @@ class TransducerChain:
         return motion
 
     def add_white_noise(self, readings: FloatArray) -> None:
-        """Add the noise of the electronics behind the transducers, in place."""
+        """Add the white noise of the electronics after the transducers, in place."""
         noise = self._white.standard_normal(readings.shape, dtype=np.float32)
         readings += noise * self._white_rms[:, np.newaxis]
 
 
 def noise_rms(machine: Unit, noise: TransducerNoise) -> FloatArray:
-    """White noise of each channel in its engineering unit, (n_channels,)."""
+    """Return the rms of the white noise of each channel in its engineering unit, (n_channels,)."""
     by_measurand = {
         Measurand.GAP_UM: noise.gap_um_rms,
         Measurand.DISPLACEMENT_UM: noise.displacement_um_rms,
@@ -234,7 +234,7 @@ def noise_rms(machine: Unit, noise: TransducerNoise) -> FloatArray:
 def _own_noise(
     machine: Unit, noise: TransducerNoise, random: np.random.Generator
 ) -> tuple[list[int], AccelerometerNoise | None]:
-    """Rows of the accelerometers, and their noise if they have any."""
+    """Return the rows of the accelerometers and their noise generator; None without noise."""
     integrated = {Measurand.VELOCITY_MM_S: True, Measurand.ACCELERATION_M_S2: False}
     rows = [r for r, channel in enumerate(machine.channels) if channel.measurand in integrated]
     if not rows or noise.accelerometer_g_per_sqrt_hz == 0.0:
@@ -249,7 +249,7 @@ def _own_noise(
 
 
 def _channels(machine: Unit, scenario: Scenario) -> list[ChannelScenario]:
-    """Scenario of every channel of the machine, in wire order."""
+    """Return the scenarios of all channels, in the channel order of the machine."""
     unknown = scenario.channels.keys() - {channel.id for channel in machine.channels}
     if unknown:
         raise ConfigError(f"unit {machine.id!r} has no channel {', '.join(sorted(unknown))}")

@@ -1,4 +1,4 @@
-"""Slow conditions of a running machine: shaft position, temperature, power, gain."""
+"""Slow quantities of a running machine: shaft position, temperature, power, gain."""
 
 import math
 from dataclasses import dataclass, fields
@@ -12,18 +12,19 @@ from core.machine.unit import Unit
 
 @dataclass(frozen=True)
 class Conditions:
-    """Slow quantities at one instant.
+    """Slow quantities of a unit at one instant.
 
     Parameters
     ----------
     centre_um, position_error_um
-        (n_bearings, 2) shaft centre from bearing centre, and error of the gaps.
+        (n_bearings, 2) position of the shaft centre relative to the bearing centre, and error of
+        the gaps.
     oil_temperature_c, oil_temperature_error_c
         (n_bearings,) oil temperature, and error of the thermometers.
     gap_growth_um
-        (n_bearings,) growth common to all gaps of a bearing.
+        (n_bearings,) common growth of all gaps of a bearing.
     gain
-        (n_channels,) true sensitivity over the nominal one.
+        (n_channels,) ratio of true to nominal sensitivity.
     """
 
     centre_um: FloatArray
@@ -36,7 +37,7 @@ class Conditions:
 
 
 def between(start: Conditions, stop: Conditions, fraction: float) -> Conditions:
-    """Conditions part of the way from one instant to another."""
+    """Return conditions interpolated linearly; `fraction` 0 is `start`, 1 is `stop`."""
 
     def part(name: str) -> FloatArray:
         a, b = getattr(start, name), getattr(stop, name)
@@ -48,14 +49,14 @@ def between(start: Conditions, stop: Conditions, fraction: float) -> Conditions:
 
 
 class SlowWander:
-    """First-order Gauss-Markov wander about a scenario's means, step by step.
+    """First-order Gauss-Markov variation about the means of a scenario, step by step.
 
     Parameters
     ----------
     growth_random, random
-        Generators of the wander of gap growth, and of everything else.
+        Random generators of the gap growth, and of all other quantities.
     scenario
-        Scenario of the first step, which sets the rms of the wander for good.
+        Scenario of the first step; it sets the rms of the variation, which does not change later.
     """
 
     def __init__(
@@ -77,7 +78,7 @@ class SlowWander:
         self._growth = _Wander(growth_random, memory, np.array(growth_rms))
 
     def now(self, scenario: Scenario) -> Conditions:
-        """Conditions at the current step, about the means of a scenario."""
+        """Return the conditions at the current step, about the means of a scenario."""
         bearings = [scenario.bearings[b.id] for b in self._machine.bearings]
         mean = [centre for b in bearings for centre in (b.centre_x_um, b.centre_y_um)]
         mean += [b.oil_temperature_c for b in bearings] + [scenario.active_power_mw]

@@ -1,4 +1,4 @@
-"""Rotation of the shaft and forces on the rotor, as streams independent of the requested pieces."""
+"""Rotation of the shaft and forces on the rotor; results do not depend on the piece length."""
 
 import math
 from typing import TypeAlias
@@ -11,16 +11,16 @@ from core.arrays import FloatArray
 from core.units import hz_from_rpm
 
 PARTS = ((0.5, 1.0), (0.3, 0.57), (0.2, 0.31))
-"""Share of the whole wander, and period in wander times, of its swings."""
+"""Sines of the speed variation: share of the total amplitude, and period in wander times."""
 
 CUTOFF_FILTER_ORDER = 4
 IMPULSE_SAMPLES_PER_CUTOFF_PERIOD = 20
 
 
 class FollowedRotation:
-    """Rotation of a shaft whose speed runs in straight lines from chunk to chunk.
+    """Rotation of a shaft with a speed that is linear within each chunk.
 
-    Only samples of the newest chunk are available.
+    Only sample indices of the newest chunk are valid.
     """
 
     def __init__(self, rated_speed_rpm: float, rate_hz: float) -> None:
@@ -30,35 +30,35 @@ class FollowedRotation:
         self._start, self._stop = 1.0, 1.0
 
     def follow(self, first: int, n_samples: int, start_rpm: float, stop_rpm: float) -> None:
-        """Change from one speed to another over the next samples."""
+        """Begin a chunk, in which the speed changes linearly from `start_rpm` to `stop_rpm`."""
         self._turns = float(self.turns(np.array([float(first)]))[0])
         self._first, self._n_samples = first, n_samples
         self._start = start_rpm / self._rated_speed_rpm
         self._stop = stop_rpm / self._rated_speed_rpm
 
     def relative_speed(self, index: FloatArray) -> FloatArray:
-        """Speed over the rated one at some samples, (n_samples,)."""
+        """Return the ratio of speed to rated speed at sample indices, (n_samples,)."""
         share = (index - self._first) / self._n_samples
         return np.asarray(self._start + (self._stop - self._start) * share)
 
     def turns(self, index: FloatArray) -> FloatArray:
-        """Whole and broken turns since sample 0, (n_samples,)."""
+        """Return the angle since sample 0 in turns, (n_samples,)."""
         mean = 0.5 * (self._start + self.relative_speed(index))
         return np.asarray(self._turns + self._turns_per_sample * mean * (index - self._first))
 
 
 class Rotation:
-    """Rotation of a shaft whose speed wanders slowly, as a closed function of the sample number.
+    """Rotation of a shaft with slowly varying speed, as a closed function of the sample index.
 
-    The wander is a sum of three slow swings: speed and angle agree exactly, and the speed never
-    leaves its limits.
+    The variation is a sum of three slow sines, so that the angle is the exact integral of the
+    speed, and the speed stays within its limits.
 
     Parameters
     ----------
     speed_wander
-        Largest relative deviation from the mean speed.
+        Maximum relative deviation from the mean speed.
     wander_time_s
-        Period of the largest swing.
+        Period of the largest sine.
     """
 
     def __init__(
@@ -80,14 +80,14 @@ class Rotation:
         ]
 
     def relative_speed(self, index: FloatArray) -> FloatArray:
-        """Speed over its mean at some samples, (n_samples,)."""
+        """Return the ratio of speed to mean speed at sample indices, (n_samples,)."""
         relative = np.ones_like(index)
         for swing, step_rad, phase_rad in self._swings:
             relative += swing * np.cos(step_rad * index + phase_rad)
         return relative
 
     def turns(self, index: FloatArray) -> FloatArray:
-        """Whole and broken turns since sample 0, (n_samples,)."""
+        """Return the angle since sample 0 in turns, (n_samples,)."""
         evenly = index.copy()
         for swing, step_rad, phase_rad in self._swings:
             evenly += swing / step_rad * np.sin(step_rad * index + phase_rad)
@@ -95,16 +95,16 @@ class Rotation:
 
 
 Turning: TypeAlias = FollowedRotation | Rotation
-"""Rotation of a shaft by number of samples."""
+"""Rotation of a shaft as a function of the sample index."""
 
 
 class UnbalanceForce:
-    """Force that rotates forward with the shaft and grows with the square of its speed.
+    """Unbalance force: rotates with the shaft and is proportional to the square of the speed.
 
     Parameters
     ----------
     force_n
-        At the mean speed.
+        Force at a relative speed of 1.
     """
 
     def __init__(self, force_n: float, rotation: Turning) -> None:
@@ -113,7 +113,7 @@ class UnbalanceForce:
         self._index = 0
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Return the next forces (x, y) in newtons, (2, n_samples)."""
+        """Return the force (x, y) at the next samples in newtons, (2, n_samples)."""
         index = np.arange(self._index, self._index + n_samples, dtype=np.float64)
         self._index += n_samples
         angle = 2.0 * math.pi * np.fmod(self._rotation.turns(index), 1.0)
@@ -121,10 +121,10 @@ class UnbalanceForce:
 
 
 class RopeForce:
-    """Force that rotates forward at its own frequency, with a wandering phase.
+    """Force of the vortex rope: rotates forward at its own frequency, with random phase.
 
-    The phase is a random walk, which spreads the line into a Lorentzian of the given width at half
-    power (phase noise of a free oscillator: variance 2π · width · time).
+    The phase is a random walk. Its spectrum is a Lorentzian line with `line_width_hz` at half power
+    (phase noise of a free oscillator: variance 2π · width · time).
     """
 
     def __init__(
@@ -142,7 +142,7 @@ class RopeForce:
         self._angle = float(random.uniform(0.0, 2.0 * math.pi))
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Return the next forces (x, y) in newtons, (2, n_samples)."""
+        """Return the force (x, y) at the next samples in newtons, (2, n_samples)."""
         steps = self._mean_step + self._step_rms * self._random.standard_normal(n_samples)
         angle = np.cumsum(np.concatenate([[self._angle], steps]))
         self._angle = float(angle[-1]) % (2.0 * math.pi)
@@ -150,7 +150,7 @@ class RopeForce:
 
 
 class HydraulicForce:
-    """Gaussian force, independent in x and y, white or limited to a band."""
+    """Broadband hydraulic force: Gaussian, independent in x and y, white or low-pass filtered."""
 
     def __init__(
         self, random: np.random.Generator, rms_n: float, cutoff_hz: float | None, rate_hz: float
@@ -161,8 +161,8 @@ class HydraulicForce:
         self._filter_state = np.zeros((CUTOFF_FILTER_ORDER // 2, 2, 2))
 
     def advance(self, n_samples: int) -> FloatArray:
-        """Return the next forces (x, y) in newtons, (2, n_samples)."""
-        import scipy.signal  # slow to load, and not needed to begin
+        """Return the force (x, y) at the next samples in newtons, (2, n_samples)."""
+        import scipy.signal  # slow import, not needed at start-up
 
         force_n = self._rms_n * self._random.standard_normal((n_samples, 2)).T
         if self._sections is not None:
@@ -173,7 +173,7 @@ class HydraulicForce:
 
 
 Excitation: TypeAlias = UnbalanceForce | RopeForce | HydraulicForce
-"""Radial force on the rotor."""
+"""Generator of a radial force on the rotor."""
 
 
 def _rotating(force_n: float, angle_rad: FloatArray) -> FloatArray:
@@ -181,8 +181,8 @@ def _rotating(force_n: float, angle_rad: FloatArray) -> FloatArray:
 
 
 def _low_pass(cutoff_hz: float, rate_hz: float) -> FloatArray:
-    """Second-order sections that preserve the rms value of white noise."""
-    import scipy.signal  # slow to load, and not needed to begin
+    """Return second-order sections of a low-pass that preserves the rms of white noise."""
+    import scipy.signal  # slow import, not needed at start-up
 
     sections: FloatArray = scipy.signal.butter(
         CUTOFF_FILTER_ORDER, cutoff_hz, fs=rate_hz, output="sos"
@@ -195,21 +195,21 @@ def _low_pass(cutoff_hz: float, rate_hz: float) -> FloatArray:
 
 
 def force_planes(scenario: Scenario) -> list[ForcePlane]:
-    """Planes on which forces act, in order; each costs computing time."""
+    """Return the planes with forces, in the order of `ForcePlane`; each costs computing time."""
     used = {ForcePlane.MASS_CENTRE, ForcePlane.RUNNER, scenario.hydraulic.plane}
     return [plane for plane in ForcePlane if plane in used]
 
 
 class Forces:
-    """Unbalance, broadband hydraulic force and vortex rope.
+    """All forces on the rotor: unbalance, broadband hydraulic force and vortex rope.
 
     Parameters
     ----------
     first
-        Scenario of the first chunk, which sets the planes, the band of the hydraulic force, order
-        and width of the rope; only the size of the forces may change later.
+        Scenario of the first chunk. It sets the planes, the band of the hydraulic force, and the
+        order and line width of the rope; later scenarios only change the size of the forces.
     rated_speed_rpm
-        Reference speed of `rotation`.
+        Speed at a relative speed of 1 of `rotation`.
     """
 
     def __init__(
@@ -234,7 +234,7 @@ class Forces:
         self._n_planes = len(planes)
 
     def advance(self, n_samples: int, start: Scenario, stop: Scenario) -> FloatArray:
-        """Return the next forces, during the transition from one scenario to another.
+        """Return the forces at the next samples, during the transition between two scenarios.
 
         Returns
         -------
@@ -248,7 +248,7 @@ class Forces:
         return total.reshape(2 * self._n_planes, n_samples)
 
     def _sizes_n(self, scenario: Scenario) -> tuple[float, float, float]:
-        """Unbalance at rated speed, rms of the hydraulic force, rope."""
+        """Return the unbalance force at rated speed, the rms hydraulic force and the rope force."""
         grade_mm_s = scenario.unbalance_grade_mm_s
         return (
             unbalance_force_n(grade_mm_s, self._rated_speed_rpm),
@@ -258,7 +258,7 @@ class Forces:
 
 
 def straight(start: float, stop: float, n_samples: int) -> FloatArray | float:
-    """Straight line over a chunk, without its end point; one number if it is constant."""
+    """Return a linear ramp over a chunk, without its end point; one number if it is constant."""
     if start == stop:
         return start
     return np.linspace(start, stop, n_samples, endpoint=False)

@@ -1,4 +1,4 @@
-"""Converter from engineering units to counts; failing transducers, cables and amplifiers."""
+"""Conversion of readings to counts, and faults of transducers, cables and amplifiers."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,32 +12,32 @@ from core.checks.channels import COUNTS_FULL_SCALE
 from core.samples.calibration import UnitCalibration
 
 RAIL_HIT_SPACING = 997
-"""Samples between two hits; a prime, so that hits fall anywhere in blocks."""
+"""Samples between two rail hits; a prime, so that their position in blocks varies."""
 
 RAILS = (COUNTS_FULL_SCALE - 1, -COUNTS_FULL_SCALE)
 
 
 class FaultKind(StrEnum):
-    """Kind of failure of a channel."""
+    """Kind of a channel fault."""
 
     DEAD = "dead"
-    """No voltage: 0 counts."""
+    """No voltage: all samples are 0 counts."""
     STUCK = "stuck"
-    """The last value from then on, ±1 count."""
+    """All samples are the last value before the fault, ±1 count."""
     CLIPPED = "clipped"
-    """The bias has drifted to the positive rail, which cuts off the upper half of the signal."""
+    """The bias is at the positive rail, which clips the upper half of the signal."""
     RAIL_HITS = "rail_hits"
-    """A loose contact: single samples on one rail or the other."""
+    """A loose contact: single samples are at the positive or negative rail."""
 
 
 @dataclass(frozen=True)
 class Fault:
-    """Permanent failure of a channel.
+    """Permanent fault of a channel.
 
     Parameters
     ----------
     from_sample
-        Index of the first wrong sample.
+        Sample index at which the fault begins.
     """
 
     kind: FaultKind
@@ -45,12 +45,12 @@ class Fault:
 
 
 class FaultInjector:
-    """Applies faults to the counts of one stream.
+    """Fault injection into the counts of one unit.
 
     Parameters
     ----------
     faults
-        By row of the counts; each applies to the result of those before.
+        Faults by row of the counts, applied one after another.
     """
 
     def __init__(self, random: np.random.Generator, faults: Mapping[int, Sequence[Fault]]) -> None:
@@ -58,7 +58,7 @@ class FaultInjector:
         self._running = [(row, _Running(fault)) for row, found in faults.items() for fault in found]
 
     def spoil(self, counts: CountArray, first_index: int) -> None:
-        """Apply the faults to the next counts of the stream, (n_channels, n_samples), in place."""
+        """Apply the faults to the next counts, (n_channels, n_samples), in place."""
         for row, running in self._running:
             jitter = self._random.integers(-1, 2, (counts.shape[1],))
             running.spoil(counts[row], first_index, jitter)
@@ -68,7 +68,7 @@ class FaultInjector:
 class _Running:
     fault: Fault
     last: int | None = None
-    """Sample before the fault; the first of all if the fault is there from the start."""
+    """Last count before the fault; the first count if the fault begins at the first sample."""
 
     def spoil(self, counts: CountArray, first_index: int, jitter: npt.NDArray[np.int64]) -> None:
         healthy = min(max(self.fault.from_sample - first_index, 0), counts.size)
@@ -105,7 +105,7 @@ def _broken(
 
 
 def to_counts(readings: FloatArray, calibration: UnitCalibration) -> CountArray:
-    """Convert readings to whole counts, clipped at the rails.
+    """Convert readings to integer counts, clipped at the rails.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Oil films: coefficients of a bearing, tilting pads, viscosity of oil."""
+"""Oil films: stiffness and damping coefficients, tilting pads, viscosity of oil."""
 
 import math
 from dataclasses import dataclass
@@ -9,15 +9,15 @@ import numpy as np
 from core.arrays import FloatArray
 
 DAMPING_OVER_STIFFNESS_S = 0.0125
-"""c = α k with α = 0.0125 s (Brito et al., section 2.2.1, after Cardinali)."""
+"""Factor α of proportional damping c = α k (Brito et al., section 2.2.1, after Cardinali)."""
 
 
 @dataclass(frozen=True)
 class Film:
-    """Stiffness and damping of one oil film, linear about the shaft's mean position.
+    """Stiffness and damping of one oil film, linear about the mean position of the shaft.
 
-    The force on the bracket is ``k u + c du/dt`` with u the shaft relative to the bracket
-    (Brito et al., equation 1).
+    The force on the bracket is ``k u + c du/dt`` with u the displacement of the shaft relative to
+    the bracket (Brito et al., equation 1).
     """
 
     k_xx_n_per_m: float
@@ -37,10 +37,10 @@ class Film:
         k_cross_n_per_m: float = 0.0,
         damping_over_stiffness_s: float = DAMPING_OVER_STIFFNESS_S,
     ) -> Self:
-        """Film with damping proportional to its direct stiffness.
+        """Return a film with direct damping proportional to its direct stiffness.
 
-        The paper's text makes cross-coupled damping proportional too, but only without it do its
-        conditions 4 and 5 come out; `k_cross_n_per_m` is both k_xy and k_yx.
+        According to Brito et al., cross-coupled damping is proportional too, but their conditions 4
+        and 5 are reproduced only without it. `k_cross_n_per_m` is both k_xy and k_yx.
         """
         return cls(
             k_xx_n_per_m=k_xx_n_per_m,
@@ -55,22 +55,22 @@ class Film:
 
     @property
     def stiffness_n_per_m(self) -> FloatArray:
-        """(2, 2) stiffness: rows are force directions, columns motion directions."""
+        """Stiffness matrix, (2, 2): rows are force directions, columns motion directions."""
         return np.array(
             [[self.k_xx_n_per_m, self.k_xy_n_per_m], [self.k_yx_n_per_m, self.k_yy_n_per_m]]
         )
 
     @property
     def damping_n_s_per_m(self) -> FloatArray:
-        """(2, 2) damping: rows are force directions, columns motion directions."""
+        """Damping matrix, (2, 2): rows are force directions, columns motion directions."""
         return np.array(
             [[self.c_xx_n_s_per_m, self.c_xy_n_s_per_m], [self.c_yx_n_s_per_m, self.c_yy_n_s_per_m]]
         )
 
     def effective_stiffness_n_per_m(self, frequency_rad_s: float) -> tuple[float, float]:
-        """Magnitudes ``|k_xx + iωc_xx|`` and ``|k_yy + iωc_yy|``.
+        """Return the magnitudes ``|k_xx + iωc_xx|`` and ``|k_yy + iωc_yy|``.
 
-        They are what equation (5) of Brito et al. estimates when cross-coupling is negligible.
+        Equation (5) of Brito et al. estimates these magnitudes if cross-coupling is negligible.
         """
         return (
             math.hypot(self.k_xx_n_per_m, frequency_rad_s * self.c_xx_n_s_per_m),
@@ -80,17 +80,17 @@ class Film:
 
 @dataclass(frozen=True, eq=False)
 class FilmColumns:
-    """Stiffness of a film over time, N/m; all (n,). k_yx equals k_xy."""
+    """Time series of the stiffness coefficients of a film in N/m; all (n,). k_yx equals k_xy."""
 
     k_xx_n_per_m: FloatArray
     k_xy_n_per_m: FloatArray
     k_yy_n_per_m: FloatArray
 
     def at(self, row: int) -> Film:
-        """Film at one moment.
+        """Return the film of one row.
 
-        Damping is proportional to the full stiffness matrix: oil squeezed out from under a pad that
-        follows the shaft resists by μ/h³, as it does in sliding.
+        Damping is proportional to the full stiffness matrix, because the squeeze film of a tilting
+        pad has the same factor μ/h³ as the sliding film.
         """
         k_xx, k_xy, k_yy = (
             float(k[row]) for k in (self.k_xx_n_per_m, self.k_xy_n_per_m, self.k_yy_n_per_m)
@@ -101,17 +101,17 @@ class FilmColumns:
 
 @dataclass(frozen=True)
 class PadRing:
-    """Equal pads evenly spaced around the shaft, described by their stiffness when centred.
+    """Tilting-pad bearing with equal, evenly spaced pads.
 
     Parameters
     ----------
     first_pad_deg
         Angle of the first pad's pivot from x towards y.
     stiffness_n_per_m
-        Direct stiffness, equal in all directions, with the shaft centred and the clearance,
-        viscosity and speed below.
+        Direct stiffness, equal in all directions, with a centred shaft at the parameters
+        `clearance_um`, `viscosity_pa_s` and `speed_rpm`.
     clearance_um
-        Film thickness at the pivots with the shaft centred: the assembled radial clearance.
+        Film thickness at the pivots with a centred shaft: the assembled radial clearance.
     """
 
     n_pads: int
@@ -127,7 +127,7 @@ class PadRing:
 
     @property
     def pad_angles_rad(self) -> FloatArray:
-        """(n_pads,) directions of the pivots."""
+        """Angles of the pivots from x towards y, (n_pads,)."""
         turns = np.arange(self.n_pads) / self.n_pads
         return math.radians(self.first_pad_deg) + 2.0 * math.pi * turns
 
@@ -138,13 +138,13 @@ class PadRing:
         viscosity_pa_s: FloatArray,
         speed_rpm: FloatArray,
     ) -> FilmColumns:
-        """Stiffness about a mean position of the shaft.
+        """Return the stiffness of the film about a mean position of the shaft.
 
         Parameters
         ----------
         pad_clearance_um : (n_pads, n) or (n_pads, 1)
         centre_um : (2, n)
-            Shaft centre from bearing centre.
+            Position of the shaft centre relative to the bearing centre.
         viscosity_pa_s, speed_rpm : (n,)
 
         Raises
@@ -171,9 +171,9 @@ class PadRing:
         viscosity_pa_s: FloatArray,
         speed_rpm: FloatArray,
     ) -> FloatArray:
-        """Mean force (x, y) of the pads on the bearing, (2, n); parameters as in `film`.
+        """Return the mean force (x, y) of the films on the pads, (2, n); parameters as in `film`.
 
-        It is the static load that holds the shaft in this position.
+        This force is the static load that holds the shaft in this position.
         """
         total = np.zeros((2, centre_um.shape[1]))
         for clearance_um, angle in zip(pad_clearance_um, self.pad_angles_rad, strict=True):
@@ -183,7 +183,7 @@ class PadRing:
         return self._strength(viscosity_pa_s, speed_rpm) * total
 
     def _strength(self, viscosity_pa_s: FloatArray, speed_rpm: FloatArray) -> FloatArray:
-        """Force of one pad times its thickness squared, N µm²."""
+        """Return the force of one pad times the square of its film thickness, in N µm²."""
         pad_n_per_um = 1e-6 * self.stiffness_n_per_m * 2.0 / self.n_pads  # mean of cos² is a half
         oil = viscosity_pa_s / self.viscosity_pa_s * (speed_rpm / self.speed_rpm)
         return np.asarray(0.5 * pad_n_per_um * self.clearance_um**3 * oil)
@@ -200,14 +200,14 @@ def _thickness_um(
 
 
 WALTHER_OFFSET_MM2_S = 0.7
-"""Constant of ASTM D341 for viscosities above 2 mm²/s."""
+"""Offset of the kinematic viscosity in ASTM D341, valid above 2 mm²/s."""
 
 KELVIN_AT_0_C = 273.15
 
 
 @dataclass(frozen=True)
 class Oil:
-    """Oil described by its viscosity at two temperatures.
+    """Temperature-dependent viscosity and density of an oil.
 
     The defaults are Lubrax Turbina Plus 50 as in Brito et al., Table 1.
 
@@ -216,7 +216,7 @@ class Oil:
     viscosity_40_pa_s, viscosity_100_pa_s
         Dynamic viscosity at 40 °C and 100 °C.
     expansion_per_k
-        Relative loss of density per kelvin; 6.5e-4 is usual for mineral oils.
+        Relative decrease of density per kelvin; 6.5e-4 is usual for mineral oils.
 
     Raises
     ------
@@ -237,11 +237,11 @@ class Oil:
             )
 
     def density_kg_per_m3(self, temperature_c: FloatArray) -> FloatArray:
-        """Density, linear in temperature."""
+        """Return the density, linear in temperature."""
         return self.density_20_kg_per_m3 * (1.0 - self.expansion_per_k * (temperature_c - 20.0))
 
     def viscosity_pa_s(self, temperature_c: FloatArray) -> FloatArray:
-        """Dynamic viscosity by Walther's law, ASTM D341: lg lg (ν + 0.7) = A − B lg T.
+        """Return the dynamic viscosity by Walther's law, ASTM D341: lg lg (ν + 0.7) = A − B lg T.
 
         ν is the kinematic viscosity in mm²/s and T the absolute temperature.
         """
@@ -256,7 +256,7 @@ class Oil:
         return fall / (_lg_kelvin(100.0) - _lg_kelvin(40.0))
 
     def _walther(self, temperature_c: float) -> float:
-        """Left side of Walther's law at one of the two known temperatures."""
+        """Return lg lg (ν + 0.7) at 40 °C or 100 °C, the temperatures with given viscosity."""
         known = self.viscosity_40_pa_s if temperature_c == 40.0 else self.viscosity_100_pa_s
         kinematic_mm2_s = 1e6 * known / float(self.density_kg_per_m3(np.asarray(temperature_c)))
         return math.log10(math.log10(kinematic_mm2_s + WALTHER_OFFSET_MM2_S))

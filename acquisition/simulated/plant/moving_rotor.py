@@ -1,4 +1,4 @@
-"""Rotor of a unit on changing films and brackets."""
+"""Rotor of a unit with time-varying oil films and brackets."""
 
 import math
 from collections.abc import Iterator
@@ -19,16 +19,16 @@ from core.machine.unit import Unit
 LIFTED_STEPS = 32
 
 MIN_CHANGE = 1e-4
-"""Relative change of a film or bracket above which the rotor is computed anew."""
+"""Relative change of a film or bracket above which the rotor matrices are recomputed."""
 
 MAX_STEP, MAX_PIECES = 1e-3, 16
-"""Relative change within one piece of a chunk, above which the chunk is cut into more pieces, and
-their largest number. The state continues across a step: its jump is below the noise of the
-accelerometers, the only transducers that show it."""
+"""Maximum relative change of a film within one piece of a chunk, and maximum number of pieces.
+The state is continuous at a change of the matrices. Only accelerometers show the resulting jump,
+which is below their noise."""
 
 
 class MovingRotor:
-    """Motion of a rotor at its transducers.
+    """Rotor on films and brackets that follow a course of scenarios; outputs transducer motion.
 
     Raises
     ------
@@ -43,12 +43,13 @@ class MovingRotor:
         self._state = np.zeros(self._rotor.transition.shape[0])
 
     def advance(self, forces: FloatArray, start: Scenario, stop: Scenario) -> FloatArray:
-        """Return the motion under the next forces, during the transition between two scenarios.
+        """Return the motion at the transducers during the transition between two scenarios.
 
         Parameters
         ----------
         forces
-            (n_forces, n_samples), n_samples a multiple of `MAX_PIECES` times `LIFTED_STEPS`.
+            (n_forces, n_samples) in newtons; n_samples is a multiple of `MAX_PIECES` times
+            `LIFTED_STEPS`.
 
         Returns
         -------
@@ -64,14 +65,14 @@ class MovingRotor:
         return np.concatenate(readings, axis=1)
 
     def _follow(self, scenario: Scenario) -> None:
-        """Use the films, brackets and speed of a scenario from the next sample on."""
+        """Set the films, brackets and speed of the following samples."""
         wanted = _coefficients(scenario)
         if _change(self._coefficients, wanted) > MIN_CHANGE:
             self._rotor, self._coefficients = _lifted_rotor(self._machine, scenario), wanted
 
 
 def _coefficients(scenario: Scenario) -> FloatArray:
-    """Coefficients of every film with its bracket, and the speed, (n_bearings + 1, 5)."""
+    """Return the coefficients of all films and brackets, and the speed, (n_bearings + 1, 5)."""
     return np.array([*_rows(scenario), 5 * (scenario.speed_rpm,)])
 
 
@@ -86,14 +87,14 @@ def _rows(scenario: Scenario) -> Iterator[tuple[float, ...]]:
 
 
 def _change(before: FloatArray, after: FloatArray) -> float:
-    """Largest change relative to the largest value of the same row."""
+    """Return the largest change relative to the largest value of its row."""
     scale = np.maximum(np.max(np.abs(before), axis=1), np.max(np.abs(after), axis=1))
     change = np.max(np.abs(after - before), axis=1)
     return float(np.max(np.divide(change, scale, out=np.zeros_like(change), where=scale > 0.0)))
 
 
 def _between(start: Scenario, stop: Scenario, share: float) -> Scenario:
-    """Films, brackets and speed part of the way from one scenario to another."""
+    """Return `start` with films, brackets and speed interpolated linearly to `stop`."""
     if start is stop:
         return start
     bearings = {

@@ -1,4 +1,4 @@
-"""Motion of one unit and readings of its transducers, in chunks of fixed length."""
+"""Readings of the transducers of one simulated unit, in chunks of fixed length."""
 
 from dataclasses import dataclass
 
@@ -14,24 +14,24 @@ from core.machine.unit import Unit
 from core.units import hz_from_rpm
 
 CHUNK_SAMPLES = 64 * LIFTED_STEPS
-"""Length of the pieces in which random numbers are drawn, independent of the requested pieces."""
+"""Length of a chunk, so that random numbers do not depend on the requested lengths."""
 
 WARM_UP_S = 15.0
-"""Transients of films as soft as 0.3 GN/m have died to 1e-7 by then (7 % damping at 3 Hz)."""
+"""Warm-up time: transients of films of 0.3 GN/m decay to 1e-7 (7 % damping at 3 Hz)."""
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """CHUNK_SAMPLES of every channel and the conditions at both ends.
+    """Readings of all channels over `CHUNK_SAMPLES`, with the conditions at both ends.
 
     Parameters
     ----------
     readings
         (n_channels, CHUNK_SAMPLES) in engineering units.
     first_index
-        Samples since the plant began to warm up.
+        Index of the first sample, counted from the start of the warm-up.
     scenario
-        Scenario at the start.
+        Scenario at the first sample.
     """
 
     readings: FloatArray
@@ -42,12 +42,12 @@ class Chunk:
 
 
 class SimulatedPlant:
-    """Rotor, forces and transducers of one unit, advancing chunk by chunk.
+    """Simulation of rotor, forces and transducers of one unit, chunk by chunk.
 
     Parameters
     ----------
     course
-        Steady operation, or a course of scenarios.
+        A `Scenario` for steady operation, or a course of scenarios.
 
     Raises
     ------
@@ -75,7 +75,7 @@ class SimulatedPlant:
         self._warm_index = self._index
 
     def advance(self) -> Chunk:
-        """Produce the next chunk."""
+        """Return the next chunk."""
         first_index, scenario = self._index, self._scenario
         elapsed_s = (first_index + CHUNK_SAMPLES - self._warm_index) / self._rate_hz
         start, following = self._wander.now(scenario), self._course.at(elapsed_s)
@@ -86,12 +86,12 @@ class SimulatedPlant:
         return Chunk(readings, start, stop, first_index, scenario)
 
     def speed_rpm(self, chunk: Chunk, offset: int) -> float:
-        """Speed at a sample of the newest chunk."""
+        """Return the speed at the sample `offset` of the newest chunk."""
         index = np.array([float(chunk.first_index + offset)])
         return self._course.rated_speed_rpm * float(self._rotation.relative_speed(index)[0])
 
     def _readings(self, following: Scenario, start: Conditions, stop: Conditions) -> FloatArray:
-        """Readings during the transition to the following scenario, without white noise."""
+        """Return the readings of a transition to `following`, without white noise."""
         index = np.arange(self._index, self._index + CHUNK_SAMPLES, dtype=np.float64)
         if isinstance(self._rotation, FollowedRotation):
             speeds_rpm = self._scenario.speed_rpm, following.speed_rpm

@@ -1,4 +1,4 @@
-"""Transducers on the motion of the rotor: probes, their gap and runout, and accelerometers."""
+"""Signals at the transducers: mean gap and runout of the probes, vibration of all channels."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,20 +22,20 @@ from core.machine.unit import Unit
 
 @dataclass(frozen=True)
 class Probe:
-    """A probe on the shaft, which measures its gap or its displacement.
+    """Proximity probe at the shaft, which measures gap or displacement.
 
     Parameters
     ----------
     row
-        Row of its channel.
+        Row of the channel.
     slow_channel
-        Slow channel of its mean gap, if there is one.
+        Slow channel of the mean gap; None if the unit has no such channel.
     bearing, axis
-        Index of the bearing; 0 is x, 1 is y.
+        Index of the bearing, and axis of the probe: 0 is x, 1 is y.
     opposite
-        Whether it is on the negative axis, opposite the first probe.
+        Whether the probe is on the negative axis, opposite the main probe.
     reference_um
-        Gap with the shaft centred.
+        Gap at a centred shaft.
     """
 
     row: int
@@ -52,7 +52,7 @@ class Probe:
         return self.channel.measurand is Measurand.GAP_UM
 
     def gap_um(self, now: Conditions) -> float:
-        """Mean gap, including the position error."""
+        """Return the mean gap, including the position error."""
         place = self.bearing, self.axis
         shift_um = float(now.centre_um[place] + now.position_error_um[place])
         growth_um = float(now.gap_growth_um[self.bearing])
@@ -60,7 +60,7 @@ class Probe:
 
 
 def probes(machine: Unit) -> Iterator[Probe]:
-    """All probes on the shaft of a unit."""
+    """Yield all proximity probes of a unit."""
     rows = {channel.id: row for row, channel in enumerate(machine.channels)}
     for index, bearing in enumerate(machine.bearings):
         near_um, far_um = bearing.gap_reference_um, bearing.opposite_reference_um
@@ -79,7 +79,7 @@ def probes(machine: Unit) -> Iterator[Probe]:
 
 
 def standing_gap_um(machine: Unit, now: Conditions | None = None) -> FloatArray:
-    """Mean reading of every channel, (n_channels,): the gap of gap probes, else zero.
+    """Return the mean reading of each channel, (n_channels,): gap of gap probes, otherwise zero.
 
     Without conditions the shaft is centred.
     """
@@ -102,7 +102,7 @@ class ShaftRunout:
             phasors = np.zeros(max(len(runout), len(own)), np.complex128)
             order = np.arange(1, len(runout) + 1)
             passed = np.exp(-0.5j * np.pi * order * (probe.axis + 2 * probe.opposite))
-            # a bump towards the probe is a smaller gap, or motion along a near probe's axis
+            # a bump is a smaller gap, or a displacement towards the probe
             sign = -1 if probe.measures_gap else channel.direction * (-1 if probe.opposite else 1)
             phasors[: len(runout)] += sign * np.array(runout) * passed
             phasors[: len(own)] += channel.direction * np.array(own)
@@ -110,7 +110,10 @@ class ShaftRunout:
                 self._phasors[probe.row] = phasors
 
     def add_to(self, readings: FloatArray, turns: FloatArray) -> None:
-        """Add the runout to the probe channels, in place."""
+        """Add the runout to the readings of the probe channels, in place.
+
+        `turns` is the angle of the shaft in turns, (n_samples,).
+        """
         if not self._phasors:
             return
         once = np.exp(2j * np.pi * np.fmod(turns, 1.0))
@@ -126,24 +129,24 @@ SHAFT, BEARING = "shaft", "bearing"
 
 
 def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatrices) -> FloatArray:
-    """Map the state of the rotor to the vibration at the transducers.
+    """Return the matrix that maps the state of the rotor to the vibration at the transducers.
 
     Returns
     -------
-    (n_channels, n_states) in each channel's engineering unit, without the frequency response of
-    the transducers.
+    (n_channels, n_states) in the engineering unit of each channel, without the frequency response
+    of the transducers.
 
     Raises
     ------
     ConfigError
-        If a bearing is not one of the rotor's, a channel belongs to no bearing, or a measurand does
-        not exist at its place.
+        If a bearing is missing in the rotor, a channel belongs to no bearing, or a channel has
+        a measurand that does not exist at a shaft or at a bearing.
     """
     maps, places = _motion_maps(parameters, matrices), _places(machine, parameters)
     rows = []
     for channel in machine.channels:
         if channel.measurand is Measurand.KEY_PHASE_V:
-            rows.append(np.zeros(maps[SHAFT, Measurand.GAP_UM].shape[1]))  # angle only
+            rows.append(np.zeros(maps[SHAFT, Measurand.GAP_UM].shape[1]))  # no vibration
             continue
         if channel.id not in places:
             raise ConfigError(f"channel {channel.id!r} belongs to no bearing of {machine.id!r}")
@@ -159,7 +162,7 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
 def _motion_maps(
     parameters: RotorParameters, matrices: RotorMatrices
 ) -> dict[tuple[str, Measurand], FloatArray]:
-    """Signals of Table 3 from the state, (6, 20) each, in the measurand's unit."""
+    """Return the maps from the state to the signals of Table 3 (Brito et al.), (6, 20) each."""
     shaft, bracket = relative_motion(parameters), bracket_motion(parameters)
     still = np.zeros_like(shaft)
     shaft_um = 1e6 * np.hstack([shaft, still])
@@ -175,7 +178,7 @@ def _motion_maps(
 
 
 def _places(machine: Unit, parameters: RotorParameters) -> dict[str, tuple[str, int]]:
-    """Part and row of each channel in the maps: two rows per bracket, in the rotor's order."""
+    """Return part and row of each channel in the motion maps: two rows per bracket."""
     names = [bracket.bearing for bracket in parameters.brackets]
     places = {}
     for bearing in machine.bearings:

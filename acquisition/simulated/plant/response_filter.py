@@ -1,7 +1,7 @@
-"""Frequency response of a transducer as digital filters over a continuous stream.
+"""Digital filters with the frequency response of a transducer, for a continuous signal.
 
-A filter has exactly the poles of the response; its numerator is fitted so that the sampled response
-is that of the transducer, without the frequency warping of a bilinear transform.
+A filter has exactly the poles of the response. Its numerator is a least-squares fit to the
+frequency response, without the frequency warping of a bilinear transform.
 """
 
 from collections.abc import Sequence
@@ -14,19 +14,19 @@ from core.arrays import ComplexArray, FloatArray
 from core.machine.response import HighPass, Resonance, Response, ResponseChain, ResponseTable
 
 EXACT_BAND_HZ = (0.1, 25.0)
-"""Band in which a filter matches the response of its transducer to `TOLERANCE`."""
+"""Frequency band in which a filter matches the transducer response to `TOLERANCE`."""
 TOLERANCE = 1e-3
 
 N_TAPS = 6
 N_POINTS = 400
 CARE_ABOVE_BAND = 1e-3
-"""Weight of the fit above the band, which keeps the filter bounded there."""
+"""Weight of the fit above the band, which limits the gain of the filter there."""
 
 
 class ResponseFilter:
-    """Response of one channel, applied to a stream piece by piece.
+    """Filter with the frequency response of one transducer, applied to successive pieces.
 
-    The filter starts in the steady state of the first sample.
+    The initial state is the steady state for the first sample.
 
     Raises
     ------
@@ -47,13 +47,13 @@ class ResponseFilter:
             )
 
     def advance(self, samples: FloatArray) -> FloatArray:
-        """Filter the next samples of the stream, (n_samples,)."""
+        """Filter the next samples of the signal, (n_samples,)."""
         for stage in self._stages:
             samples = stage.advance(samples)
         return samples
 
     def response_at(self, frequency_hz: FloatArray, rate_hz: float) -> ComplexArray:
-        """Response of the filter itself, (n_lines,)."""
+        """Return the frequency response of the filter, (n_lines,)."""
         factor = np.ones(frequency_hz.shape, dtype=np.complex128)
         for stage in self._stages:
             factor *= _response(stage.numerator, stage.denominator, frequency_hz, rate_hz)
@@ -67,7 +67,7 @@ class _Stage:
     state: FloatArray | None = None
 
     def advance(self, samples: FloatArray) -> FloatArray:
-        import scipy.signal  # slow to load, and not needed to begin
+        import scipy.signal  # slow import, not needed at start-up
 
         if self.state is None:
             self.state = scipy.signal.lfilter_zi(self.numerator, self.denominator) * samples[0]
@@ -86,7 +86,7 @@ def _parts(response: Response) -> list[HighPass | Resonance | ResponseTable]:
 def _section(
     response: HighPass | Resonance | ResponseTable, rate_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Numerator and denominator of a digital filter."""
+    """Return numerator and denominator of the digital filter of one response."""
     match response:
         case HighPass(corner_hz, order=1):
             return _fitted(response, [-2.0 * np.pi * corner_hz], order=1, rate_hz=rate_hz)
@@ -108,19 +108,19 @@ def _pole_pair(natural_hz: float, damping: float) -> list[complex]:
 def _fitted(
     response: Response, poles: Sequence[complex], order: int, rate_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Filter of the given poles, `order` zeros at 0 Hz, and a numerator fitted to the rest."""
+    """Return a filter with the given poles, `order` zeros at 0 Hz and fitted further zeros."""
     denominator, zeros = _polynomial(np.exp(np.array(poles) / rate_hz)), _polynomial(np.ones(order))
     frequency_hz = np.linspace(0.1, 0.45 * rate_hz, 10 * N_POINTS)
     shape = _response(zeros, denominator, frequency_hz, rate_hz)
     target = response.at(frequency_hz)
     delays = np.exp(-2j * np.pi * np.outer(frequency_hz / rate_hz, np.arange(N_TAPS)))
     care = np.where(frequency_hz <= 1.5 * EXACT_BAND_HZ[1], 1.0, CARE_ABOVE_BAND)
-    # relative to the target, so that all frequencies of a high-pass count alike
+    # relative error, so that all frequencies of a high-pass have equal weight
     taps = _taps(delays * (shape / target * care)[:, np.newaxis], care)
-    if not poles:  # a formal recursion: rounding of convolution depends on the piece length
+    if not poles:  # a recursive filter: rounding of a convolution depends on the piece length
         denominator = np.array([1.0, 0.0])
     if order == 0:
-        taps *= denominator.sum() / taps.sum()  # exact for a constant gap
+        taps *= denominator.sum() / taps.sum()  # exact gain at 0 Hz, for a constant gap
     return np.convolve(zeros, taps), denominator
 
 
@@ -129,7 +129,7 @@ def _polynomial(roots: ComplexArray | FloatArray) -> FloatArray:
 
 
 def _taps(columns: ComplexArray, wanted: FloatArray) -> FloatArray:
-    """Real least squares of complex equations."""
+    """Return the real least-squares solution of complex equations."""
     taps: FloatArray = np.linalg.lstsq(
         np.vstack([columns.real, columns.imag]),
         np.concatenate([wanted, np.zeros_like(wanted)]),
@@ -141,6 +141,6 @@ def _taps(columns: ComplexArray, wanted: FloatArray) -> FloatArray:
 def _response(
     numerator: FloatArray, denominator: FloatArray, frequency_hz: FloatArray, rate_hz: float
 ) -> ComplexArray:
-    import scipy.signal  # slow to load, and not needed to begin
+    import scipy.signal  # slow import, not needed at start-up
 
     return np.asarray(scipy.signal.freqz(numerator, denominator, frequency_hz, fs=rate_hz)[1])

@@ -1,4 +1,4 @@
-"""10-DOF rotor of Brito et al.: parameters, matrices, response to unbalance."""
+"""10-DOF rotor model of Brito et al.: parameters, matrices and harmonic response."""
 
 import math
 from collections.abc import Mapping
@@ -12,17 +12,17 @@ from core.arrays import ComplexArray, FloatArray
 from core.units import rad_s_from_rpm
 
 N_SHAFT_COORDINATES = 4
-"""Position X, Y of the mass centre and tilts φ_x, φ_y."""
+"""Number of shaft coordinates: position X, Y of the mass centre and tilts φ_x, φ_y."""
 
 UNBALANCE_REFERENCE_FORCE_N = 75.6e3
-"""Rotating force of unbalance grade G4.25 at 92.3 r/min, read back from the paper's Table 4."""
+"""Unbalance force of grade G4.25 at 92.3 r/min, derived from Table 4 of Brito et al."""
 UNBALANCE_REFERENCE_GRADE_MM_S = 4.25
 UNBALANCE_REFERENCE_SPEED_RPM = 92.3
 
 
 @dataclass(frozen=True)
 class Bracket:
-    """Structure that holds a guide bearing: an effective mass on an isotropic spring.
+    """Support structure of a guide bearing: an effective mass on an isotropic spring.
 
     Parameters
     ----------
@@ -49,10 +49,10 @@ class RotorParameters:
     ----------
     magnetic_stiffness_n_per_m
         Stiffness of the air gap of the generator. Table 2 gives -0.60e9 for the excited machine;
-        the default and the paper's simulations are for the machine without excitation.
+        the default and the simulations of Brito et al. are for the machine without excitation.
     thrust_stiffness_n_per_m, thrust_radius_m
-        Axial stiffness of the thrust bearing and radius of its pad circle. The paper does not
-        describe its action; its tables follow if the pads resist tilt.
+        Axial stiffness of the thrust bearing and radius of its pad circle. Brito et al. do not
+        describe its effect; their tables are reproduced if the pads resist tilt.
     """
 
     rotor_mass_kg: float = 2.37e6
@@ -68,12 +68,12 @@ class RotorParameters:
 
     @property
     def tilt_stiffness_n_m_per_rad(self) -> float:
-        """Resistance of evenly spread thrust pads to tilt about a diameter, k₈ l₅² / 2."""
+        """Tilt stiffness k₈ l₅² / 2 of evenly spaced thrust pads about a diameter."""
         return self.thrust_stiffness_n_per_m * self.thrust_radius_m**2 / 2.0
 
     @property
     def n_coordinates(self) -> int:
-        """Degrees of freedom: four of the shaft and two of each bracket."""
+        """Number of degrees of freedom: four of the shaft and two of each bracket."""
         return N_SHAFT_COORDINATES + 2 * len(self.brackets)
 
 
@@ -86,9 +86,9 @@ class ForcePlane(StrEnum):
 
 
 def unbalance_force_n(grade_mm_s: float, speed_rpm: float) -> float:
-    """Rotating force of an unbalance of the given ISO grade at 92.3 r/min.
+    """Return the unbalance force at a speed, for an ISO balance grade at 92.3 r/min.
 
-    The force of an unbalanced mass grows with the square of speed.
+    The force of an unbalanced mass is proportional to the square of the speed.
     """
     grade = grade_mm_s / UNBALANCE_REFERENCE_GRADE_MM_S
     return UNBALANCE_REFERENCE_FORCE_N * grade * (speed_rpm / UNBALANCE_REFERENCE_SPEED_RPM) ** 2
@@ -96,9 +96,9 @@ def unbalance_force_n(grade_mm_s: float, speed_rpm: float) -> float:
 
 @dataclass(frozen=True)
 class RotorMatrices:
-    """``M x'' + (C + Ω G) x' + K x = F`` (Brito et al., equation 6); all (10, 10), SI.
+    """Matrices of ``M x'' + (C + Ω G) x' + K x = F`` (Brito et al., eq. 6), (10, 10) in SI units.
 
-    `gyroscopic` is G alone, before it is multiplied by the speed Ω.
+    `gyroscopic` is G without the factor Ω.
     """
 
     mass: FloatArray
@@ -111,12 +111,12 @@ class RotorMatrices:
 def rotor_matrices(
     parameters: RotorParameters, films: Mapping[str, Film], speed_rpm: float
 ) -> RotorMatrices:
-    """Assemble the equation of motion.
+    """Return the matrices of the equation of motion.
 
     Parameters
     ----------
     films
-        One for each bracket, by bearing.
+        Film of each bracket, by bearing id.
 
     Raises
     ------
@@ -136,19 +136,19 @@ def rotor_matrices(
 
 
 def relative_motion(parameters: RotorParameters) -> FloatArray:
-    """Map coordinates to shaft minus bracket, (6, 10): u_x, u_y of each bearing (Table 3)."""
+    """Return the map to u_x, u_y of each bearing, shaft minus bracket, (6, 10) (Table 3)."""
     return np.vstack(
         [_shaft_motion(parameters, b.height_m) for b in parameters.brackets]
     ) - bracket_motion(parameters)
 
 
 def bracket_motion(parameters: RotorParameters) -> FloatArray:
-    """Map coordinates to bracket motion, (6, 10): x_b, y_b of each bearing."""
+    """Return the map from coordinates to bracket motion x_b, y_b of each bearing, (6, 10)."""
     return np.eye(parameters.n_coordinates)[N_SHAFT_COORDINATES:]
 
 
 def force_map(parameters: RotorParameters, plane: ForcePlane) -> FloatArray:
-    """Map a radial force (x, y) in a plane to generalized forces, (10, 2)."""
+    """Return the map from a radial force (x, y) in a plane to generalized forces, (10, 2)."""
     height_m = {
         ForcePlane.MASS_CENTRE: 0.0,
         ForcePlane.GENERATOR: parameters.generator_height_m,
@@ -158,13 +158,13 @@ def force_map(parameters: RotorParameters, plane: ForcePlane) -> FloatArray:
 
 
 def forward_force(parameters: RotorParameters, plane: ForcePlane, force_n: float) -> ComplexArray:
-    """Phasor of a force rotating forward, F_x = F cos ωt and F_y = F sin ωt: (10,) generalized."""
+    """Return the generalized phasor of a forward force (F cos ωt, F sin ωt) in a plane, (10,)."""
     rotating: ComplexArray = np.array([force_n, -1j * force_n])
     return force_map(parameters, plane) @ rotating
 
 
 def receptance(matrices: RotorMatrices, frequency_hz: float) -> ComplexArray:
-    """Displacement of every coordinate per harmonic generalized force, (10, 10) in m/N."""
+    """Return the receptance matrix: displacement per harmonic force, (10, 10) in m/N."""
     omega_rad_s = 2.0 * math.pi * frequency_hz
     damping = matrices.damping + matrices.speed_rad_s * matrices.gyroscopic
     dynamic = matrices.stiffness - omega_rad_s**2 * matrices.mass + 1j * omega_rad_s * damping
@@ -174,7 +174,7 @@ def receptance(matrices: RotorMatrices, frequency_hz: float) -> ComplexArray:
 def bearing_response(
     parameters: RotorParameters, matrices: RotorMatrices, frequency_hz: float, force: ComplexArray
 ) -> dict[str, ComplexArray]:
-    """Displacement phasors u_x, u_y, x_b, y_b of each bearing in metres, the signals of Table 3.
+    """Return the displacement phasors of each bearing in metres, the signals of Table 3.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def bearing_response(
 
     Returns
     -------
-    (4,) by bearing.
+    (4,) by bearing: u_x, u_y, x_b, y_b.
     """
     coordinates = receptance(matrices, frequency_hz) @ force
     shaft = (relative_motion(parameters) @ coordinates).reshape(-1, 2)
@@ -213,7 +213,7 @@ def _gyroscopic(parameters: RotorParameters) -> FloatArray:
 
 
 def _structure_stiffness(parameters: RotorParameters) -> FloatArray:
-    """Stiffness without films: brackets, thrust bearing, seals, air gap."""
+    """Return the stiffness matrix without films: brackets, thrust bearing, seals, air gap."""
     tilt = parameters.tilt_stiffness_n_m_per_rad
     brackets = [b.stiffness_n_per_m for b in parameters.brackets for _ in "xy"]
     seals = _shaft_motion(parameters, parameters.runner_height_m)

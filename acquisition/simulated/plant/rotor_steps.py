@@ -1,4 +1,4 @@
-"""Exact discrete steps of the rotor, lifted over blocks of samples."""
+"""Exact time discretization of the rotor, with lifting over blocks of samples."""
 
 from dataclasses import dataclass
 
@@ -11,9 +11,9 @@ from core.arrays import FloatArray
 
 @dataclass(frozen=True)
 class DiscreteRotor:
-    """``s[n+1] = A s[n] + B f[n]``, ``y[n] = C s[n] + D f[n]``.
+    """Discrete state space: ``s[n+1] = A s[n] + B f[n]``, ``y[n] = C s[n] + D f[n]``.
 
-    Forces run in ramps from sample to sample. The state s is (x, dx/dt) minus a share of the force.
+    Forces are linear between samples. The state s is (x, dx/dt) minus a multiple of the force.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class DiscreteRotor:
 
 
 def state_matrix(matrices: RotorMatrices) -> FloatArray:
-    """Continuous state matrix of (x, dx/dt), (20, 20) (Brito et al., equation 7)."""
+    """Return the continuous state matrix of (x, dx/dt), (20, 20) (Brito et al., equation 7)."""
     damping = matrices.damping + matrices.speed_rad_s * matrices.gyroscopic
     n = matrices.mass.shape[0]
     return np.block(
@@ -49,18 +49,18 @@ def discretize(
     output_map: FloatArray,
     rate_hz: float,
 ) -> DiscreteRotor:
-    """Integrate exactly over one step, under forces that run in ramps from sample to sample.
+    """Discretize the rotor exactly, for forces that are linear between samples.
 
-    A force held over each step contains an image of itself near the sampling rate, which aliases:
-    negligible in displacement and velocity, but at 1.5 Hz and 600 Hz it turns the acceleration of a
-    stiffly held bracket by 1.5° and more. A ramp has no such image.
+    The spectrum of a force held over each step has an image near the sampling rate, which aliases.
+    It is negligible in displacement and velocity, but at 1.5 Hz and 600 Hz it shifts the phase of
+    the acceleration of a stiff bracket by 1.5° and more. Linear interpolation avoids this image.
 
     Parameters
     ----------
     force_map
-        (10, n_forces) generalized force of each input.
+        (10, n_forces) generalized force per unit of each force.
     output_map
-        (n_outputs, 20) outputs from displacement and velocity.
+        (n_outputs, 20) map from displacement and velocity to the outputs.
 
     Raises
     ------
@@ -79,10 +79,10 @@ def discretize(
 def _step(
     matrices: RotorMatrices, force_map: FloatArray, rate_hz: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Transition, effect of a constant force, and effect of a force that grows from 0 to 1."""
+    """Return the transition matrix and the step responses to a constant and to a ramp force."""
     n_states, n_forces = 2 * matrices.mass.shape[0], force_map.shape[1]
     held, ramped = n_states + n_forces, n_states + 2 * n_forces
-    # The exponential of A bordered by B and integrators holds its integrals (Van Loan, 1978)
+    # the exponential of A bordered by B and integrators contains its integrals (Van Loan, 1978)
     bordered = np.zeros((ramped, ramped))
     bordered[:n_states, :n_states] = state_matrix(matrices) / rate_hz
     bordered[n_states // 2 : n_states, n_states:held] = (
@@ -102,10 +102,10 @@ class LiftedRotor:
     transition
         (n_states, n_states) over the whole block.
     input_map
-        (n_states, n_forces * n_steps)
+        (n_states, n_forces * n_steps); time is the fastest index.
     output_map, feedthrough
         (n_outputs * n_steps, n_states) and (n_outputs * n_steps, n_forces * n_steps); time is the
-        fastest index. The second maps the forces of the block to its outputs.
+        fastest index. `feedthrough` maps the forces of the block to the outputs of the block.
     """
 
     n_steps: int
@@ -118,7 +118,7 @@ class LiftedRotor:
 
 
 def lift(rotor: DiscreteRotor, n_steps: int) -> LiftedRotor:
-    """Combine `n_steps` steps into one.
+    """Return a rotor that combines `n_steps` steps into one.
 
     Raises
     ------
@@ -146,24 +146,24 @@ def lift(rotor: DiscreteRotor, n_steps: int) -> LiftedRotor:
 def simulate(
     rotor: LiftedRotor, state: FloatArray, forces: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Simulate the rotor under given forces.
+    """Simulate the response of the rotor to given forces.
 
     Parameters
     ----------
     state
-        (n_states,) at the first sample, as in :class:`DiscreteRotor`.
+        (n_states,) state s of :class:`DiscreteRotor` at the first sample.
     forces
-        (n_forces, n_samples) in newtons, n_samples a multiple of the block's steps.
+        (n_forces, n_samples) in newtons; n_samples is a multiple of `n_steps`.
 
     Returns
     -------
     outputs, state
-        (n_outputs, n_samples), and the state at the next sample.
+        (n_outputs, n_samples), and the state at the sample after the last.
 
     Raises
     ------
     ValueError
-        If the forces do not fill whole blocks.
+        If the number of forces is wrong or the samples do not fill whole blocks.
     """
     if forces.shape[0] != rotor.n_forces or forces.shape[1] % rotor.n_steps:
         raise ValueError(
@@ -179,7 +179,7 @@ def simulate(
 def _block_states(
     rotor: LiftedRotor, state: FloatArray, driven: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """States at the start of each block, (n_blocks, n_states), and after the last."""
+    """Return the state at the start of each block, (n_blocks, n_states), and the final state."""
     states = np.empty_like(driven)
     for index, push in enumerate(driven):
         states[index] = state
@@ -188,7 +188,7 @@ def _block_states(
 
 
 def _feedthrough(observed: FloatArray, rotor: DiscreteRotor) -> FloatArray:
-    """Outputs of a block caused by its own forces: a lower-triangular Toeplitz block matrix."""
+    """Return the map from the forces to the outputs of a block: lower-triangular block Toeplitz."""
     n_outputs, n_steps, _ = observed.shape
     driven = (observed @ rotor.input_map).swapaxes(0, 1)
     impulse = [rotor.feedthrough, *driven[:-1]]

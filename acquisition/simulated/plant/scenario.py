@@ -1,4 +1,4 @@
-"""Scenario of a simulated unit: films, excitation, transducers; and courses of scenarios."""
+"""Scenarios of a simulated unit: films, excitation and transducers; courses of scenarios."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -12,27 +12,28 @@ from core.machine.response import Response
 
 @dataclass(frozen=True)
 class BearingScenario:
-    """Oil film of a bearing and position of the shaft in it.
+    """Oil film, shaft position and measurement errors of one bearing.
 
     Parameters
     ----------
     centre_x_um, centre_y_um
-        Mean position of the shaft centre from the bearing centre.
+        Mean position of the shaft centre relative to the bearing centre.
     centre_wander_um_rms
-        Slow wander of that position, in each direction.
+        Slow random variation of the shaft position, in each direction.
     gap_growth_um, gap_growth_wander_um_rms
-        Growth common to all gaps of the bearing, relative to the centred shaft at reference
-        temperature, and its slow wander; positive where the housing grows more than the shaft.
+        Common growth of all gaps of the bearing, relative to the centred shaft at reference
+        temperature, and its slow random variation; positive if the housing grows more than the
+        shaft.
     runout_um_pk
-        Runout of the shaft under the probes, 1×, 2×, …: phasors at the x probe, locked to the
-        shaft; the other probes see the same surface later. Positive is towards the probe.
+        Runout of the shaft surface, 1×, 2×, …: phasors at the x probe, locked to the shaft. The
+        other probes measure the same surface with a delay. Positive is towards the probe.
     bracket_stiffness_factor
-        True stiffness of the bracket over that of `Scenario.rotor`, which monitors use.
+        Ratio of the true bracket stiffness to that of `Scenario.rotor`, which monitors use.
     position_error_um
-        False displacement (x, y) in the gaps, before the gain of the probes: probe drift. It does
-        not affect the film.
+        Error (x, y) of the displacement in the gaps, before the gain of the probes: probe drift.
+        It does not affect the film.
     oil_temperature_error_c
-        Error of the thermometer; positive reads high.
+        Error of the thermometer; positive if the reading is too high.
     """
 
     film: Film
@@ -56,9 +57,9 @@ class HydraulicNoise:
     Parameters
     ----------
     rms_n
-        Force in each direction.
+        Rms of the force in each direction.
     cutoff_hz
-        Upper limit of the flat spectrum, which falls steeply above; None is white up to half the
+        Upper limit of the flat spectrum, with a steep roll-off; None is white noise up to half the
         sampling rate.
     """
 
@@ -69,14 +70,14 @@ class HydraulicNoise:
 
 @dataclass(frozen=True)
 class VortexRope:
-    """Rotating force of the part-load vortex on the runner; not locked to the shaft.
+    """Rotating force of the part-load vortex rope on the runner, not locked to the shaft.
 
     Parameters
     ----------
     order
         Mean frequency as a multiple of the running speed; nominally 0.25.
     line_width_hz
-        Width of the line at half its power: how fast the phase wanders.
+        Width of the spectral line at half power, caused by random phase.
     """
 
     force_n: float = 0.0
@@ -86,14 +87,14 @@ class VortexRope:
 
 @dataclass(frozen=True)
 class KeyPhasePulse:
-    """Pulse of a key-phase pick-up, once a turn.
+    """Pulse of a key-phase pick-up, once per turn.
 
     Parameters
     ----------
     mark_turns
-        Angle from the passage of the mark to the zero that unbalance and runout count from.
+        Angle from the passage of the mark to the zero angle of unbalance and runout.
     height_v
-        Above `rest_v`, or below it on a channel whose direction is -1.
+        Height above `rest_v`; below `rest_v` on a channel with direction -1.
     """
 
     width_turns: float = 6.0 / 360.0
@@ -104,17 +105,18 @@ class KeyPhasePulse:
 
 @dataclass(frozen=True)
 class TransducerNoise:
-    """Noise of each kind of transducer.
+    """Noise of the transducers, by measurand.
 
     Parameters
     ----------
     gap_um_rms, displacement_um_rms, velocity_mm_s_rms, acceleration_m_s2_rms, key_phase_v_rms
-        White noise over the whole band, added behind the transducer's frequency response.
+        White noise over the whole band, added after the frequency response of the transducer.
     accelerometer_g_per_sqrt_hz
-        One-sided density of the accelerometers' own noise, before their response; a velocity
-        channel is an accelerometer whose charge amplifier integrates.
+        One-sided density of the accelerometer noise, before the frequency response. A velocity
+        channel is an accelerometer with an integrating charge amplifier.
     accelerometer_corner_hz
-        Corner below which the power rises as 1/f; at the corner it is twice that of the density.
+        Corner frequency of the noise: the power rises as 1/f below, and is twice the white noise
+        at the corner.
     """
 
     gap_um_rms: float = 0.0
@@ -128,18 +130,17 @@ class TransducerNoise:
 
 @dataclass(frozen=True)
 class ChannelScenario:
-    """True properties of one transducer, which may differ from the configured ones.
+    """True properties of one transducer, which may differ from the configuration.
 
     Parameters
     ----------
     response
-        Complex response; None is flat. Must be a model, not a table.
+        Complex frequency response, a model and not a table; None is flat.
     gain
-        True sensitivity over the nominal one. A probe's reference gap was read with the probe
-        itself, so the gain acts on the difference from it.
+        Ratio of true to nominal sensitivity. The reference gap of a probe was measured with the
+        probe itself, so the gain applies to the difference from the reference gap.
     runout_um_pk
-        Runout seen by this probe only, added to that of the shaft, 1×, 2×, …: phasors of motion
-        along its axis.
+        Additional runout of this probe only, 1×, 2×, …: phasors of motion along its axis.
     """
 
     response: Response | None = None
@@ -150,21 +151,21 @@ class ChannelScenario:
 
 @dataclass(frozen=True)
 class Scenario:
-    """One unit in steady operation; also the `Course` that stays there.
+    """Scenario of one unit in steady operation; also a constant `Course`.
 
     Parameters
     ----------
     bearings
-        One for each bracket of `rotor`, by bearing.
+        Scenario of each bracket of `rotor`, by bearing id.
     unbalance_grade_mm_s
-        ISO grade at 92.3 r/min, as in the paper: G4.25 is 75.6 kN there.
+        ISO balance grade at 92.3 r/min as in Brito et al., where G4.25 is 75.6 kN.
     wander_time_s
-        Time constant of the wander of shaft centres, temperatures, power and speed.
+        Time constant of the random variation of shaft centres, temperatures, power and speed.
     speed_wander
-        Largest relative deviation of the running speed from `speed_rpm`; 0.003 is 0.3 %. Film and
-        gyroscopic forces remain those of `speed_rpm`.
+        Maximum relative deviation of the running speed from `speed_rpm`; 0.003 is 0.3 %. Film and
+        gyroscopic forces are computed at `speed_rpm`.
     channels
-        Imperfect transducers, by channel.
+        Imperfect transducers, by channel id.
     exchanged
         Pairs of channels with swapped cables.
     """
@@ -186,7 +187,7 @@ class Scenario:
 
     @property
     def true_rotor(self) -> RotorParameters:
-        """Rotor on brackets of their true stiffness."""
+        """Rotor with the true stiffness of its brackets."""
         factors = {id_: bearing.bracket_stiffness_factor for id_, bearing in self.bearings.items()}
         brackets = tuple(
             replace(b, stiffness_n_per_m=factors.get(b.bearing, 1.0) * b.stiffness_n_per_m)
@@ -196,7 +197,7 @@ class Scenario:
 
     @property
     def rated_speed_rpm(self) -> float:
-        """Speed of the scenario."""
+        """Rated speed, which is the speed of the scenario."""
         return self.speed_rpm
 
     def at(self, elapsed_s: float) -> "Scenario":  # noqa: ARG002  steady operation
@@ -204,7 +205,7 @@ class Scenario:
         return self
 
     def channel(self, id_: str) -> ChannelScenario:
-        """Transducer of a channel; a perfect one by default."""
+        """Return the transducer of a channel; an ideal transducer by default."""
         return self.channels.get(id_, ChannelScenario())
 
 
@@ -212,14 +213,15 @@ class Course(Protocol):
     """Sequence of scenarios over time.
 
     Films, brackets, forces, speed and the fields of `Conditions` may change between two scenarios;
-    everything else keeps its initial value. The unit interpolates linearly, its films in steps.
+    all other values remain those of the first scenario. The unit interpolates linearly between two
+    scenarios, the films in small steps.
     """
 
     @property
     def rated_speed_rpm(self) -> float:
-        """Usual speed of the unit, above zero."""
+        """Rated speed of the unit, above zero."""
         ...
 
     def at(self, elapsed_s: float) -> Scenario:
-        """Scenario at a time after the first sample; times of successive calls rise."""
+        """Return the scenario at a time after the first sample; the times of calls increase."""
         ...

@@ -1,4 +1,4 @@
-"""`SimulatedUnit`: a generating unit with its converter; its slow values and true state."""
+"""Sample feed of a simulated generating unit, with its slow values and its true state."""
 
 import math
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from core.units import NS_PER_S, rad_s_from_rpm
 
 
 def slow_values(machine: Unit, now: Conditions, speed_rpm: float) -> dict[str, float]:
-    """Values of all slow channels of a simulated unit, by channel id; gaps in mm."""
+    """Return the values of all slow channels of a simulated unit by channel id; gaps in mm."""
     values: dict[str | None, float] = {
         machine.speed_channel: speed_rpm,
         machine.power_channel: now.active_power_mw,
@@ -41,13 +41,13 @@ class BearingTruth:
     Parameters
     ----------
     k_eff_xx_n_per_m, k_eff_yy_n_per_m
-        ``|k + iΩc|`` at the running speed, which equation (5) of Brito et al. estimates.
+        Magnitude ``|k + iΩc|`` at the running speed (estimated by Brito et al., equation 5).
     eccentricity
-        Distance of the shaft centre from the bearing centre over the clearance.
+        Distance of the shaft centre from the bearing centre divided by the clearance.
     gap_growth_um
-        Growth common to all gaps of the bearing.
+        Common growth of all gaps of the bearing.
     bracket_stiffness_n_per_m
-        True stiffness, which may differ from the configured one.
+        True stiffness of the bracket, which may differ from the configured stiffness.
     """
 
     film: Film
@@ -71,7 +71,7 @@ class UnitTruth:
 
 
 def unit_truth(machine: Unit, scenario: Scenario, now: Conditions, speed_rpm: float) -> UnitTruth:
-    """Collect the true state at one instant."""
+    """Return the true state of a unit at one instant."""
     brackets = {b.bearing: b.stiffness_n_per_m for b in scenario.true_rotor.brackets}
     bearings = {}
     for index, bearing in enumerate(machine.bearings):
@@ -95,16 +95,16 @@ def unit_truth(machine: Unit, scenario: Scenario, now: Conditions, speed_rpm: fl
 class SimulatedUnit:
     """Sample feed of one simulated unit.
 
-    The same seed gives the same counts, whatever pieces the samples are requested in.
+    The same seed gives the same counts, independent of the requested block lengths.
 
     Parameters
     ----------
     machine
-        Has some or all of the bearings UJB, LJB and TJB.
+        Unit with one or more of the bearings UJB, LJB and TJB.
     scenario
-        Steady operation, or a course of scenarios.
+        A `Scenario` for steady operation, or a course of scenarios.
     start_ns
-        Time of sample 0; in whole seconds it is also the epoch of the blocks.
+        Time of sample 0; its whole seconds are the epoch of the blocks.
 
     Raises
     ------
@@ -132,12 +132,12 @@ class SimulatedUnit:
         self._next_chunk()
 
     def advance(self, n_samples: int) -> RawBlock:
-        """Return the next samples, following directly on the previous ones.
+        """Return the next `n_samples` consecutive samples.
 
         Raises
         ------
         ValueError
-            If less than one sample is requested.
+            If `n_samples` is less than 1.
         """
         if n_samples < 1:
             raise ValueError(f"a block needs at least 1 sample, got {n_samples}")
@@ -162,7 +162,7 @@ class SimulatedUnit:
         )
 
     def begin_at(self, start_ns: int) -> None:
-        """Set the time of sample 0; building a plant of many machines takes time."""
+        """Set the time of sample 0, because the construction of many units takes time."""
         self._start_ns = start_ns
 
     def truth(self) -> UnitTruth:
@@ -213,7 +213,7 @@ def _faults(machine: Unit, scenario: Scenario, seed: int) -> FaultInjector:
 
 
 def _exchanged(machine: Unit, calibration: UnitCalibration, scenario: Scenario) -> list[list[int]]:
-    """Pairs of rows with swapped cables."""
+    """Return the pairs of rows with swapped cables."""
     rows = {channel.id: row for row, channel in enumerate(machine.channels)}
     pairs = []
     for pair in scenario.exchanged:
