@@ -3,6 +3,8 @@
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
+from operator import itemgetter
 
 from core.alarms.alarm import Alarm, AlarmNews
 from core.alarms.board import AlarmBoard, AlarmMemory, is_same_occurrence
@@ -81,7 +83,7 @@ class UnitAlarms(AlarmBoard):
         self._references = {(r.bearing, r.state): r for r in references}
         self._segment_faults: dict[str, Reason] = {}
         self._clipped_percent: dict[str, float] = {}
-        self._points: dict[str, tuple[OperatingPoint, int]] = {}
+        self._points: dict[str, list[tuple[OperatingPoint, int]]] = {}  # of the newest block
         self._stop: tuple[int, int] | None = None
         self._inactive_with: tuple[Quality, ...] | None = None
         self._link: tuple[bool, str | None] = (False, None)
@@ -105,6 +107,8 @@ class UnitAlarms(AlarmBoard):
         """Judge new assessments, the channels of a block and the device clock; return changes."""
         if self._is_repeated(block):
             return []
+        for points in self._points.values():
+            del points[:-1]
         for assessment in assessments:
             self._take_assessment(assessment)
         now_ns = block.stop_ns
@@ -160,7 +164,8 @@ class UnitAlarms(AlarmBoard):
         """
         news = super().restore(stored, host_ns, memory)
         if memory is not None:
-            self._segment_faults, self._points = dict(memory.segment_faults), dict(memory.points)
+            self._segment_faults = dict(memory.segment_faults)
+            self._points = {bearing: [newest] for bearing, newest in memory.points.items()}
             self._stop, self._link = memory.stop, (memory.is_connected, memory.link_reason)
             kept = {alarm.identity.id: alarm for alarm in memory.alarms}
             for watch in self._of_rule[LINK]:
@@ -176,7 +181,7 @@ class UnitAlarms(AlarmBoard):
         return AlarmMemory(
             tuple(self.alarms),
             dict(self._segment_faults),
-            dict(self._points),
+            {bearing: points[-1] for bearing, points in self._points.items()},
             self._stop,
             *self._link,
         )
@@ -205,7 +210,7 @@ class UnitAlarms(AlarmBoard):
                 self._inactive_with = None
             self._clipped_percent[channel] = 100.0 * assessment.clipped_share.get(place, 0.0)
         point = point_of(assessment)
-        self._points[bearing] = (point, now_ns)
+        self._points.setdefault(bearing, []).append((point, now_ns))
         reference = self.reference(bearing, point.state)
         for watch in self._of_results[bearing]:
             if watch.group in VECTORS:
@@ -218,14 +223,18 @@ class UnitAlarms(AlarmBoard):
                 self.record(watch.id, _at(point, condition), then_ns)
 
     def _recent_point(self, subject: str, now_ns: int) -> OperatingPoint:
-        """Return the recent operating point of a bearing; other subjects have only a state."""
-        if subject in self._points:
-            point, seen_ns = self._points[subject]
-        elif self._points:
-            newest, seen_ns = max(self._points.values(), key=lambda found: found[1])
-            point = OperatingPoint(newest.state)
-        else:
+        """Return the newest operating point of a bearing up to a time; others have only a state.
+
+        The newest result of a block may be later than the time of a fault within it.
+        """
+        own = self._points.get(subject)
+        points = own or sorted(chain(*self._points.values()), key=itemgetter(1))
+        if not points:
             return NOWHERE_KNOWN
+        earlier = [each for each in points if each[1] <= now_ns]
+        point, seen_ns = earlier[-1] if earlier else points[0]
+        if not own:
+            point = OperatingPoint(point.state)
         return point if abs(now_ns - seen_ns) <= POINT_HOLDS_NS else NOWHERE_KNOWN
 
     def _update(self, watch: Watch, condition: Judgement, now_ns: int) -> None:
