@@ -69,7 +69,7 @@ def main() -> None:
             os.kill(os.getpid(), -code)
         elif code:
             sys.exit(code)
-        send(sys.stdout.buffer, {"kind": "end"})  # not before the fork has closed the file
+        send(sys.stdout.buffer, {"kind": "end"})  # only after the fork has closed the file
         sys.stdout.buffer.flush()
 
 
@@ -89,7 +89,7 @@ def _answer_and_exit(line: bytes) -> None:
 
 
 def _memory_bytes(request: Mapping[str, Any]) -> int:
-    """Return the memory limit for reading a file; it is lower for recordings in own format."""
+    """Return the memory limit in bytes; it is higher for formats without limits of their own."""
     return 2**31 if request["format"] in _ROWS else 2**28
 
 

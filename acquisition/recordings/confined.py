@@ -116,5 +116,5 @@ def memory_in_use_bytes() -> int:
 
 
 def printable(text: str, max_length: int = 300) -> str:
-    """Return a text with control characters replaced, safe to print on a terminal."""
+    """Return a text that is safe to print: shortened, with control characters replaced."""
     return "".join(c if c.isprintable() else "�" for c in text)[:max_length]

@@ -102,7 +102,7 @@ def export_tables(recording: Recording, schema: Any) -> Iterator[Any]:
 
 
 def csv_schema(manifest: Manifest) -> Any:
-    """Return the CSV columns; headings include the unit and are escaped against formulas."""
+    """Return the schema of a CSV export; no heading, name and unit, can act as a formula."""
     names = [f"{id_} [{unit}]" for id_, unit in _columns(manifest)]
     harmless = [f"'{n}" if n.startswith(_FORMULA_STARTS) else n for n in names]
     return _schema(manifest, "us", harmless)

@@ -106,7 +106,7 @@ def _require_file(path: Path, expected: RecordedFile) -> None:
 
 
 def _require_lengths(recording: Recording) -> None:
-    """Check the block headers: each must be valid, and the lengths must sum to the manifest's."""
+    """Check the block headers: each must be valid, and the total length must match the manifest."""
     path, manifest = recording.folder / BLOCKS, recording.manifest
     n_samples, n_blocks, progress = 0, 0, Progress()
     for rows, rejected in recording.rows():

@@ -96,7 +96,7 @@ def confined_messages(
 
 
 def _why_broken(process: ConfinedProcess, error: Exception) -> tuple[str, OSError | None]:
-    """Return why the child failed, and a system error if the file is not the cause."""
+    """Return the reason why the child failed, and a system error if the file is not the cause."""
     if isinstance(error, TimeoutError):
         return f"no answer for {SILENCE_S:g} s", _system_error(errno.ETIMEDOUT)
     words, code = process.last_words(), process.exit_code()

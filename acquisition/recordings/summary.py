@@ -21,7 +21,7 @@ class RecordingSummary:
     start_ns, stop_ns
         Time of the first sample, and end of the last sample, in UTC.
     n_passed
-        Samples recorded, missing in gaps and rejected.
+        Total number of recorded, missing and rejected samples.
     gaps
         First thousand gaps in order of time.
     n_gaps, n_gap_samples

@@ -147,7 +147,7 @@ MAX_BUSY_S = 60.0
 """Maximum duration of one write, in seconds."""
 
 MAX_PENDING_SAMPLES = 50_000_000
-"""Maximum number of samples in memory, of all channels and captures: 200 MB."""
+"""Maximum number of samples waiting to be written, of all channels and captures: 200 MB."""
 
 
 class Captures(WriterThread):
@@ -221,7 +221,7 @@ class Captures(WriterThread):
         return [*self._ended, *self._running.values()]
 
     def take(self, block: SampleBlock, news: Sequence[AlarmNews]) -> None:
-        """Process a block and the alarm news that resulted from its analysis."""
+        """Process a block and the alarm events that resulted from its analysis."""
         if block.unit not in self._histories:
             return
         is_new = self._histories[block.unit].add(block)

@@ -106,7 +106,7 @@ class UnitRecorder:
     ended
         Finished segments that are still to be joined.
     n_written, n_refused
-        Number of samples per channel since the start that were synced, and that failed to be
+        Numbers of samples per channel since the start that were synced, and that could not be
         written.
     """
 
@@ -126,7 +126,7 @@ class UnitRecorder:
         self.n_written = self.n_refused = 0
 
     def write(self, block: SampleBlock, now_s: float) -> None:
-        """Append a block; start a new segment if it does not fit the open one.
+        """Append a block; start a new segment if the open segment does not cover the block.
 
         Raises
         ------

@@ -26,7 +26,7 @@ LEFT = ".left"
 """Suffix of the folder of a removed recording that still contains files of other programs."""
 
 DAMAGED = ".damaged"
-"""Suffix of a recording that cannot be read."""
+"""Suffix of the folder of a recording that is damaged."""
 
 UNFINISHED = (INCOMPLETE, PARTS, REMOVED)
 
@@ -221,7 +221,7 @@ def _removed(folder: Path) -> Path:
 
 
 def _suffixed(folder: Path, suffix: str) -> Path:
-    """Return a free folder with a suffix, numbered before the suffix if necessary."""
+    """Return an unused folder with a suffix; add a number before the suffix if necessary."""
     free = _free(folder, suffix)
     return free.with_name(free.name + suffix)
 

@@ -29,7 +29,7 @@ class Order1:
     Parameters
     ----------
     frequency_hz
-        Running speed.
+        Running speed in Hz.
     x_um, y_um
         (n_samples,) displacement at running speed; NaN where too few neighbouring samples exist.
     ellipse

@@ -108,8 +108,8 @@ def make_room(
     Parameters
     ----------
     short_bytes
-        Space to free, by kind. Captures are removed only if removal of continuous recordings frees
-        too little, and never if evidence refers to them.
+        Disk space to free, by kind. Captures are removed for it only if the removal of continuous
+        recordings frees too little, and never if evidence refers to them.
 
     Raises
     ------

@@ -208,7 +208,7 @@ class Members:
 def members_of(
     store: FilmStore, cell: Cell, baseline: BearingBaseline, rules: FilmRules
 ) -> Members:
-    """Return the settled readings without an alarm level of a cell, in the learning period.
+    """Return the settled readings of a cell in the learning period, except those with an alarm.
 
     Raises
     ------

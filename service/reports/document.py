@@ -48,7 +48,7 @@ class AlarmPart(EvidencePart):
     """Kind of alarm."""
 
     occurrence: int
-    """Number of the occurrence: times that the alarm was raised or escalated so far."""
+    """Number of the occurrence, which counts how often the alarm was raised or escalated."""
 
     change: Annotated[str, Field(examples=["raised"])]
     """Change of the alarm: raised or escalated."""

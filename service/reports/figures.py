@@ -15,7 +15,7 @@ from service.reports.tables import Columns
 
 @dataclass(frozen=True)
 class Figure:
-    """Figure: a plot with a caption."""
+    """Figure of a report: a plot with a caption."""
 
     plot: Plot
     sentence: str

@@ -87,7 +87,7 @@ def around(values: Iterable[float | None], margin: float = 0.06) -> tuple[float,
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 8.0, 6.0, 30.0
 
 TIME_ROOM, NUMBER_ROOM = 62.0, 40.0
-"""Width reserved for a tick label of a time axis and of a number axis along x."""
+"""Width reserved for a tick label of a time axis and of a number axis, in SVG user units."""
 
 Values = Sequence[float | None]
 """Sequence of numbers; None for missing numbers."""

@@ -44,7 +44,7 @@ class OccurrenceModel(ApiModel):
     """Occurrence of an alarm with the state of its evidence."""
 
     occurrence: int
-    """Number of the occurrence: times that the alarm was raised or escalated so far."""
+    """Number of the occurrence, which counts how often the alarm was raised or escalated."""
 
     change: Annotated[str, Field(examples=["raised"])]
     """Change of the alarm: raised or escalated."""

@@ -23,7 +23,7 @@ _CANDUMP_LINE = re.compile(
     r"(?:(?P<error>[23][0-9A-Fa-f]{7})|[0-9A-Fa-f]{3}|[01][0-9A-Fa-f]{7})#"
     r"(?:R[0-9]?|(?:#[0-9])?(?:[0-9A-Fa-f]{2})*)(?: [RT])?\s*"
 )
-"""Valid line of a candump log; python-can misreads identifiers over 29 bits and error frames."""
+"""Pattern of a candump line; python-can misreads identifiers over 29 bits and error frames."""
 
 
 def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[Frames, float]]:
@@ -42,7 +42,7 @@ def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[Frames, float]]:
     with path.open("rb") as stream:
         frames = _of_one_bus(_data_frames(stream, job), job)
         while batch := list(islice(frames, _BATCH)):
-            done = 1.0 if stream.closed else min(stream.tell() / size, 1.0)  # by python-can
+            done = 1.0 if stream.closed else min(stream.tell() / size, 1.0)  # python-can closes it
             yield _batch(batch, job), done
 
 
@@ -90,7 +90,7 @@ def _blf_frames(stream: BinaryIO) -> Iterator[can.Message]:
 
 
 class _Refusal(logging.Handler):
-    """Handler that raises warnings of python-can about skipped objects as ConfigError."""
+    """Log handler that raises ConfigError for warnings of python-can about skipped objects."""
 
     def emit(self, record: logging.LogRecord) -> None:
         raise ConfigError(record.getMessage())

@@ -65,7 +65,7 @@ class _CsvFile:
         self._keeps_counts = counts_are_kept(job, [None] * len(job.channels))
 
     def rows(self, n_bytes: int) -> Iterator[Rows]:
-        """Yield all rows; the file size serves to report progress."""
+        """Yield all rows; `n_bytes` is the size of the file, to compute the fraction read."""
         n_at_once = max(1, min(_ROWS, _CELLS // max(1, len(self._headings))))
         cells = self._complete()
         while table := list(islice(cells, n_at_once)):

@@ -34,6 +34,7 @@ class Rows:
     Parameters
     ----------
     times_ns : (n_rows,)
+        Times of the rows, UTC in nanoseconds.
     samples : (n_channels, n_rows)
         int16 counts or float32 engineering units.
     slow
@@ -84,7 +85,7 @@ class Indexer:
         self._last_ns = 0
 
     def stretches(self, times_ns: TimeArray) -> Iterator[Stretch]:
-        """Divide the next rows into ranges without a gap; `start` 0 is the first of these rows.
+        """Divide the next rows into ranges without a gap, counted from the first of these rows.
 
         Raises
         ------
