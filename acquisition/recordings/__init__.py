@@ -1,1 +1,1 @@
-"""padwatch's own recordings (manifest and Parquet), and the files of other tools."""
+"""Recordings in padwatch's format (manifest and Parquet), and imported files of other tools."""

@@ -1,7 +1,7 @@
-"""The confined child: ``python -m acquisition.recordings.child``, requests on standard input.
+"""Confined child process ``python -m acquisition.recordings.child``; requests on standard input.
 
-Each request is a line of JSON. A fork with bounded memory and time that cannot write files answers
-it with :mod:`acquisition.recordings.messages`. A hostile file can harm that fork only.
+Each request is one line of JSON. A fork with limits on memory, time and file size answers it with
+:mod:`acquisition.recordings.messages`. A malicious file can affect only that fork.
 """
 
 import json
@@ -55,7 +55,7 @@ _ROWS: Mapping[str, Callable[[Path, ImportJob], Iterator[Rows]]] = {
 
 
 def main() -> None:
-    """Answer requests, each in a fork, until standard input ends or one of them ends badly."""
+    """Answer requests, each in a fork, until standard input ends or a fork fails."""
     sys.stdout.buffer.write(READY)
     sys.stdout.buffer.flush()
     for line in sys.stdin.buffer:
@@ -64,12 +64,12 @@ def main() -> None:
             _answer_and_exit(line)
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         if code < 0:
-            with suppress(OSError):  # SIGKILL has no other handler
+            with suppress(OSError):  # the action of SIGKILL cannot be set
                 signal.signal(-code, signal.SIG_DFL)
             os.kill(os.getpid(), -code)
         elif code:
             sys.exit(code)
-        send(sys.stdout.buffer, {"kind": "end"})  # not before the fork has closed the file
+        send(sys.stdout.buffer, {"kind": "end"})  # only after the fork has closed the file
         sys.stdout.buffer.flush()
 
 
@@ -78,7 +78,7 @@ def _answer_and_exit(line: bytes) -> None:
     try:
         request = json.loads(line)
         confine(memory_in_use_bytes() + _memory_bytes(request))
-        code = FAILED  # from here on by the file
+        code = FAILED  # later exceptions are caused by the file
         answer(request, sys.stdout.buffer)
         code = 0
     except BaseException:
@@ -89,18 +89,18 @@ def _answer_and_exit(line: bytes) -> None:
 
 
 def _memory_bytes(request: Mapping[str, Any]) -> int:
-    """Memory for reading a file; a recording has narrow bounds, foreign formats have none."""
+    """Return the memory limit in bytes; it is higher for formats without limits of their own."""
     return 2**31 if request["format"] in _ROWS else 2**28
 
 
 def answer(request: Mapping[str, Any], out: BinaryIO) -> None:
-    """Write the messages of one file; a file that is refused ends in an error message.
+    """Write the content of one file as messages; a rejected file ends with an error message.
 
     Parameters
     ----------
     request
-        ``path``, ``format``, and ``job`` of an import; of a recording ``manifest``, the blocks from
-        ``first`` to before ``stop``, and whether with their ``samples``.
+        ``path`` and ``format``; for an import ``job``; for a recording ``manifest``, the range of
+        blocks ``first`` to ``stop`` (excluded), and the flag ``samples`` to include the samples.
     """
     path = Path(request["path"])
     is_recording = request["format"] == "recording"
@@ -151,7 +151,7 @@ def _recording(folder: Path, request: Mapping[str, Any]) -> Iterator[Message]:
 
 
 def _pieces(n_samples: Any, start: int, stop: int) -> Iterator[tuple[int, int]]:
-    """Blocks that go into one message: all of these, or one by one if they are long."""
+    """Yield ranges of blocks, one per message: the whole range, or single blocks if it is long."""
     stop = min(stop, len(n_samples))
     if start < stop and n_samples[start:stop].sum() <= ROWS_PER_GROUP:
         yield start, stop
@@ -160,7 +160,7 @@ def _pieces(n_samples: Any, start: int, stop: int) -> Iterator[tuple[int, int]]:
 
 
 class _Counts:
-    """Counts by row, with one row group in memory."""
+    """Reader of samples by row number, with one row group in memory."""
 
     def __init__(self, file: Any, manifest: Manifest) -> None:
         self._file, self._n_rows = file, manifest.n_samples

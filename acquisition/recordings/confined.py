@@ -1,4 +1,4 @@
-"""Child processes that read foreign files, with limits on memory, processor time and files."""
+"""Child processes that read untrusted files, with limits on memory, CPU time and file size."""
 
 import os
 import resource
@@ -12,24 +12,24 @@ from pathlib import Path
 
 CPU_S = 3600
 LOG_BYTES = 1_000_000
-"""Largest file that a child may write: enough for its log, too small for an unpacked archive."""
+"""Maximum size of a file that a child may write: enough for its log, but not to unpack archives."""
 
 _LOG_BYTES_SHOWN = 4000
 
 _ENVIRONMENT = {
-    "ARROW_DEFAULT_MEMORY_POOL": "system",  # others reserve address space, which is limited
-    "HDF5_PLUGIN_PRELOAD": "::",  # no filters from libraries that a file names
-    "OPENBLAS_NUM_THREADS": "1",  # each thread takes address space
+    "ARROW_DEFAULT_MEMORY_POOL": "system",  # other pools reserve address space, which is limited
+    "HDF5_PLUGIN_PRELOAD": "::",  # disables filter plugins named in a file
+    "OPENBLAS_NUM_THREADS": "1",  # each thread reserves address space
 }
 
 
 class ConfinedProcess:
-    """Child process ``python -m module arguments``; to be closed.
+    """Child process ``python -m module arguments``; call `close` after use.
 
     Parameters
     ----------
     silence_s
-        How long a read from ``output`` waits before it raises TimeoutError; None: for ever.
+        Timeout of a read from ``output``, after which it raises TimeoutError; None for no timeout.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class ConfinedProcess:
     Raises
     ------
     OSError
-        If the system cannot start another process now.
+        If the system cannot start the process.
     """
 
     def __init__(self, module: str, *arguments: str, silence_s: float | None = None) -> None:
@@ -59,20 +59,20 @@ class ConfinedProcess:
             self.input, self.output = ours.makefile("wb"), ours.makefile("rb")
 
     def exit_code(self) -> int:
-        """Wait for the end of the child; negative if a signal ended it."""
+        """Wait for the end of the child; return its exit code, -N after signal N."""
         return self._process.wait()
 
     def is_running(self) -> bool:
-        """Whether the child has not ended yet."""
+        """Whether the child is still running."""
         return self._process.poll() is None
 
     def clear_log(self) -> None:
-        """Forget what the child has written to standard error so far."""
+        """Delete the captured standard error output of the child."""
         self._log.seek(0)
         self._log.truncate()
 
     def last_words(self) -> str:
-        """Wait for the end of the child; its last line of log, or the signal that ended it."""
+        """Wait for the end of the child; return its last log line, or the signal that ended it."""
         code = self._process.wait()
         if code < 0:
             return f"reading it was ended by {signal.Signals(-code).name}"
@@ -83,36 +83,38 @@ class ConfinedProcess:
         return printable(lines[-1] if lines else f"reading it ended with code {code}")
 
     def close(self) -> None:
-        """End the child and what it has started."""
+        """Kill the child and its process group, and close its streams."""
         if self.is_running():
             with suppress(ProcessLookupError):
                 os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
         for stream in (self.input, self.output, self._log):
-            with suppress(OSError):  # the child no longer takes requests
+            with suppress(OSError):  # unsent requests to a child that has ended
                 stream.close()
 
 
 def confine(memory_bytes: int) -> None:
-    """Limit memory, processor time and files that this process may use from now on."""
+    """Limit the memory, CPU time and file size of this process."""
     for kind, limit in (
         (resource.RLIMIT_AS, memory_bytes),
         (resource.RLIMIT_CPU, CPU_S),
         (resource.RLIMIT_CORE, 0),
         (resource.RLIMIT_FSIZE, LOG_BYTES),
     ):
-        highest = resource.getrlimit(kind)[1]  # inherited; an unprivileged process cannot raise it
+        highest = resource.getrlimit(kind)[
+            1
+        ]  # an unprivileged process cannot raise this inherited limit
         limit = limit if highest == resource.RLIM_INFINITY else min(limit, highest)
         is_lower = kind == resource.RLIMIT_CPU and limit != highest
-        resource.setrlimit(kind, (limit, limit + is_lower))  # SIGXCPU comes before SIGKILL
+        resource.setrlimit(kind, (limit, limit + is_lower))  # SIGXCPU precedes SIGKILL
 
 
 def memory_in_use_bytes() -> int:
-    """Address space of this process, which is what `confine` limits."""
+    """Return the address space of this process in bytes; `confine` limits it."""
     n_pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0])
     return n_pages * resource.getpagesize()
 
 
 def printable(text: str, max_length: int = 300) -> str:
-    """Text without control characters, safe to print on a terminal."""
+    """Return a text that is safe to print: shortened, with control characters replaced."""
     return "".join(c if c.isprintable() else "�" for c in text)[:max_length]

@@ -1,4 +1,4 @@
-"""Recordings as CSV and Parquet: engineering units, UTC, a row for each sample."""
+"""Export of recordings to CSV and Parquet: engineering units, UTC times, one row per sample."""
 
 import math
 import os
@@ -32,7 +32,7 @@ _FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 
 class ExportFormat(StrEnum):
-    """File formats of exports."""
+    """File format of an export."""
 
     CSV = "csv"
     PARQUET = "parquet"
@@ -44,20 +44,20 @@ def export_recording(
     out: Path,
     advanced: Callable[[int], None] = lambda _: None,
 ) -> None:
-    """Write a recording as a file of another format, whole or not at all.
+    """Export a recording to a file; a failed export leaves no file.
 
     Parameters
     ----------
     out
-        Must not exist yet.
+        Path of the file to create; it must not exist.
     advanced
-        Called with the number of samples per channel written since its last call.
+        Progress callback; receives the samples per channel written since its previous call.
 
     Raises
     ------
     ConfigError
-        If the file exists or cannot be written, a channel has the name of one of its own columns,
-        or the recording cannot be read; nothing is left behind then.
+        If the file exists or cannot be written, a channel has the name of a reserved column, or
+        the recording cannot be read.
     """
     if os.path.lexists(out):
         raise ConfigError(f"{out}: is there already; nothing is overwritten")
@@ -73,13 +73,12 @@ def export_recording(
 
 
 def write_rows(recording: Recording, kind: ExportFormat, sink: Path | RawIOBase) -> Iterator[int]:
-    """Write a recording, some thousands of rows at each step; returns the number of each step.
+    """Write a recording in steps of some thousand rows; yield the number of rows of each step.
 
     Raises
     ------
     ConfigError
-        If a channel has the name of a column of every export, or a file of the recording is
-        unreadable.
+        If a channel has the name of a reserved column, or a file of the recording is unreadable.
     """
     schema_of, open_writer = _FORMATS[kind]
     schema = schema_of(recording.manifest)
@@ -87,15 +86,15 @@ def write_rows(recording: Recording, kind: ExportFormat, sink: Path | RawIOBase)
         for table in export_tables(recording, schema):
             writer.write_table(table)
             yield table.num_rows
-    yield 0  # the end of the file is written, too
+    yield 0  # the writer is closed: the footer is written
 
 
 def export_tables(recording: Recording, schema: Any) -> Iterator[Any]:
-    """All rows of a recording, some thousands at once.
+    """Yield the rows of a recording as tables of some thousand rows.
 
-    Where samples are missing there are no rows: time and index jump. Times are whole microseconds;
-    samples of a bad channel, and slow values that cannot be, are NaN. Raises ConfigError if a file
-    of the recording is unreadable.
+    Missing samples have no rows: time and index jump. Times are whole microseconds. Samples of a
+    bad channel and implausible slow values are NaN. Raises ConfigError if a file of the recording
+    is unreadable.
     """
     blocks = recording.raw_blocks()
     while some := list(islice(blocks, _BLOCKS_AT_ONCE)):
@@ -103,19 +102,19 @@ def export_tables(recording: Recording, schema: Any) -> Iterator[Any]:
 
 
 def csv_schema(manifest: Manifest) -> Any:
-    """Headings have the unit in brackets; none can be taken for a formula by a spreadsheet."""
+    """Return the schema of a CSV export; no heading, name and unit, can act as a formula."""
     names = [f"{id_} [{unit}]" for id_, unit in _columns(manifest)]
     harmless = [f"'{n}" if n.startswith(_FORMULA_STARTS) else n for n in names]
     return _schema(manifest, "us", harmless)
 
 
 def parquet_schema(manifest: Manifest) -> Any:
-    """Columns have their unit in their metadata.
+    """Return the Parquet schema; the metadata of each column contain its unit.
 
     Raises
     ------
     ConfigError
-        If a channel has the name of a column of every export.
+        If a channel has the name of a reserved column.
     """
     columns = _columns(manifest)
     for id_, _ in columns:

@@ -1,4 +1,4 @@
-"""The manifest of a recording: what was recorded, how to read it, its files and its bounds."""
+"""Manifest of a recording: unit, calibration and files; limits of the recording format."""
 
 import hashlib
 import json
@@ -31,20 +31,20 @@ MAX_CHANNELS = 32
 MAX_SLOW_CHANNELS = 50
 
 ROWS_PER_GROUP = 131_072
-"""Samples of each channel that are written and read at once: 1 MB for four channels."""
+"""Samples per channel in a Parquet row group: 1 MB for four channels."""
 
 BLOCKS_PER_GROUP = 8192
 
 MAX_BLOCK_SAMPLES = ROWS_PER_GROUP
 
 MAX_SAMPLES = 2**29
-"""Per channel: ten days at 600 Hz."""
+"""Maximum number of samples per channel in a recording: ten days at 600 Hz."""
 
 MAX_INDEX = 2**53
-"""Largest index of a sample and number of an epoch; exact as a double, too."""
+"""Maximum sample index and maximum epoch number; exact in double precision."""
 
 MAX_REJECTIONS = 32
-"""Reasons for which samples before one block may have been refused."""
+"""Maximum number of rejections, one per reason, before a block."""
 
 MAX_REASON_LENGTH = 64
 
@@ -57,13 +57,13 @@ SampleType = Literal["int16", "float32"]
 
 
 class ManifestPart(BaseModel):
-    """Frozen, no unknown keys, no NaN or infinity."""
+    """Base model of the manifest: frozen, without unknown keys, NaN or infinity."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class RecordedChannel(ManifestPart):
-    """A waveform channel; the measurand names its engineering unit."""
+    """Recorded waveform channel; its measurand determines its engineering unit."""
 
     id: Name
     measurand: Measurand
@@ -74,7 +74,7 @@ class RecordedChannel(ManifestPart):
 
 
 class RecordedSlowChannel(ManifestPart):
-    """A slow channel with the unit and the plausible range of its values."""
+    """Recorded slow channel, with the unit and the plausible range of its values."""
 
     id: Name
     unit: Annotated[str, StringConstraints(min_length=1, max_length=16)]
@@ -83,20 +83,20 @@ class RecordedSlowChannel(ManifestPart):
 
 
 class RecordedUnit(ManifestPart):
-    """The unit whose samples are recorded; channels in the order of the columns.
+    """Generating unit whose samples are recorded; channels are in the order of the columns.
 
     Parameters
     ----------
     sample_type
-        "int16": counts of the converter. "float32": engineering units from a device that has no
-        counts, not a number where it has no sample.
+        "int16": counts of an A/D converter. "float32": engineering units from a device without
+        counts; NaN for a missing sample.
     block_samples
-        Grid of the blocks; see :class:`core.samples.calibration.UnitCalibration`.
+        Block length in samples; see :class:`core.samples.calibration.UnitCalibration`.
 
     Raises
     ------
     ValueError
-        If two channels have the same id, or a value is out of its limits.
+        If two channels have the same id, or a value exceeds its limits.
     """
 
     unit: Name
@@ -130,7 +130,7 @@ class RecordedUnit(ManifestPart):
 
 
 class RecordedFile(ManifestPart):
-    """Expected size and checksum of a file beside the manifest."""
+    """Expected size and checksum of a file of the recording."""
 
     size: Annotated[int, Field(ge=1, le=2**50)]
     sha256: Sha256
@@ -142,13 +142,13 @@ class Manifest(RecordedUnit):
     Parameters
     ----------
     start
-        Time of the first sample, for people; the blocks have it exactly.
+        Time of the first sample as text, for information; readers use the times of the blocks.
     made_by
-        Program and person.
+        Program and person that made the recording.
     n_samples
-        Per channel.
+        Number of samples per channel.
     checksum
-        SHA-256 of all other values, see :func:`checksum_of`.
+        SHA-256 of all other values; see :func:`checksum_of`.
     """
 
     format: Literal["padwatch-recording"]
@@ -163,14 +163,14 @@ class Manifest(RecordedUnit):
 
 @dataclass(frozen=True)
 class Progress:
-    """Position in a recording: what the next block, written or read, must follow on.
+    """Position in a recording after the last block that was written or read.
 
     Parameters
     ----------
     n_passed
-        Samples per channel, gaps within an epoch included.
+        Samples per channel so far, including gaps within an epoch.
     epoch, stop_index
-        Where the last block ended; no epoch before the first.
+        Epoch of the last block, and sample index after its end; epoch None before the first block.
     """
 
     n_passed: int = 0
@@ -180,12 +180,12 @@ class Progress:
     def after(
         self, epoch: int, first_index: int, n_samples: int, rejected: Sequence[Rejection]
     ) -> "Progress":
-        """Return the position after one more block.
+        """Return the position after the next block.
 
         Raises
         ------
         ConfigError
-            If no device can have delivered it at this position.
+            If the block is invalid at this position.
         """
         if not 1 <= n_samples <= MAX_BLOCK_SAMPLES:
             raise ConfigError(
@@ -216,7 +216,7 @@ def _require_room(rejected: Sequence[Rejection], n_missing: int) -> None:
 
 
 class _Head(BaseModel):
-    """Keys of every version of the format."""
+    """Keys that every version of the manifest contains."""
 
     format: str
     version: int
@@ -228,7 +228,7 @@ def read_manifest(folder: Path) -> Manifest:
     Raises
     ------
     ConfigError
-        If there is none, or anything in it is wrong; the message names the first mistake.
+        If the manifest is missing or invalid; the message names the first error.
     """
     path = folder / MANIFEST
     if not folder.is_dir():
@@ -257,14 +257,14 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def manifest_text(manifest: Manifest) -> str:
-    """Text of the manifest file: format and version first, checksum last."""
+    """Return the text of the manifest file: format and version first, checksum last."""
     values = manifest.model_dump(mode="json", exclude={"checksum"})
     first = {name: values[name] for name in ("format", "version", "made_by", "start")}
     return json.dumps(first | values | {"checksum": checksum_of(values)}, indent=1) + "\n"
 
 
 def checksum_of(document: dict[str, object]) -> str:
-    """SHA-256 of all values but the checksum, independent of order and white space."""
+    """Return the SHA-256 of all values except the checksum, independent of order and spacing."""
     rest = {name: value for name, value in document.items() if name != "checksum"}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("ascii")).hexdigest()

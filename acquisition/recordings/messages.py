@@ -1,4 +1,4 @@
-"""Messages of the confined child: short JSON heads and plain bytes, never pickled objects."""
+"""Messages of the confined child process: a short JSON header and raw bytes, never pickles."""
 
 import itertools
 import json
@@ -19,42 +19,42 @@ from core.samples.blocks import Rejection, SampleBlock, SideValues
 from core.samples.calibration import UnitCalibration
 
 READY = b"\n"
-"""First byte of a child that can take requests."""
+"""First byte that the child writes, once it accepts requests."""
 
 FAILED = 3
-"""Exit code of a child after an exception that a file has caused."""
+"""Exit code of a child after an exception caused by the file."""
 
 MAX_HEAD_BYTES = 2**22
 MAX_BODY_BYTES = 2**26
 MAX_DATA = 64
-"""Bytes of a CAN FD frame."""
+"""Maximum length of the data of a CAN FD frame, in bytes."""
 
 HEAD_NUMBERS = ("epoch", "first_index", "start_ns", "n_samples", "ok")
 
 Message = tuple[dict[str, Any], bytes]
 
 Frames = npt.NDArray[np.void]
-"""(n,) of `FRAME`, in the order of the log, without error frames and remote requests."""
+"""(n_frames,) data frames of type `FRAME` in log order, without error and remote frames."""
 
 Rejected = tuple[int, str, int]
-"""Row of the block, reason, number of samples."""
+"""Row of the block in the message, reason of the rejection, number of rejected samples."""
 
 
 def send(stream: BinaryIO, head: dict[str, Any], body: bytes = b"") -> None:
-    """Write one message."""
+    """Write one message to a stream."""
     text = json.dumps(head, ensure_ascii=False).encode("utf-8", "surrogatepass")
     stream.write(len(text).to_bytes(4, "little") + len(body).to_bytes(4, "little") + text + body)
 
 
 def receive(stream: BinaryIO) -> Message:
-    """Read one message.
+    """Read one message from a stream.
 
     Raises
     ------
     ConfigError
-        If it is malformed or too long.
+        If the message is malformed or too long.
     EOFError
-        If the stream ends within it.
+        If the stream ends within the message.
     """
     lengths = _read(stream, 8)
     n_head, n_body = (int.from_bytes(lengths[at : at + 4], "little") for at in (0, 4))
@@ -78,7 +78,7 @@ def _read(stream: BinaryIO, n_bytes: int) -> bytes:
 
 @dataclass(frozen=True)
 class BlockHead:
-    """A recorded block without its samples; see :class:`acquisition.delivery.blocks.RawBlock`."""
+    """Header of a recorded block; fields as in :class:`acquisition.delivery.blocks.RawBlock`."""
 
     epoch: int
     first_index: int
@@ -90,7 +90,7 @@ class BlockHead:
 
 
 def head_type(n_slow: int) -> np.dtype[np.void]:
-    """Fields of a block head on the pipe; ``ok`` has a bit for each channel, channel 0 lowest."""
+    """Return the dtype of a block header; ``ok`` has one bit per channel, channel 0 lowest."""
     return np.dtype([*((name, "<i8") for name in HEAD_NUMBERS), ("slow", "<f8", (n_slow,))])
 
 
@@ -100,16 +100,16 @@ def blocks_message(
     counts: RawArray | None = None,
     done: float = 0.0,
 ) -> Message:
-    """Consecutive blocks as a message.
+    """Return a message with consecutive blocks.
 
     Parameters
     ----------
     heads
-        (n_blocks,) of :func:`head_type`.
+        (n_blocks,) block headers of type :func:`head_type`.
     counts
-        (n_channels, n_samples) of all blocks together; None for heads only.
+        (n_channels, n_samples) samples of all blocks; None for a message with headers only.
     done
-        Share of the file that has been read.
+        Fraction of the file that has been read.
     """
     head = {"kind": "blocks", "done": done, "n": len(heads), "rejected": rejected}
     if counts is None:
@@ -118,7 +118,7 @@ def blocks_message(
 
 
 def block_message(block: RawBlock, done: float) -> Message:
-    """A block as a message."""
+    """Return a message with a single block."""
     row = np.zeros(1, head_type(len(block.slow)))
     ok = sum(is_ok << n for n, is_ok in enumerate(block.ok))
     row[0] = (block.epoch, block.first_index, block.start_ns, block.n_samples, ok, block.slow)
@@ -127,18 +127,18 @@ def block_message(block: RawBlock, done: float) -> Message:
 
 @dataclass(frozen=True)
 class BlockLayout:
-    """Shape of the blocks that a child sends, and the types that their samples may have."""
+    """Expected layout of the blocks from a child: channels and permitted sample types."""
 
     calibration: UnitCalibration
     sample_types: tuple[str, ...] = ("int16", "float32")
 
     def heads(self, message: Message) -> list[BlockHead]:
-        """Heads of the blocks of a message.
+        """Return the headers of the blocks in a message.
 
         Raises
         ------
         ConfigError
-            If the message is not one of blocks of this layout.
+            If the message does not contain blocks of this layout.
         """
         rows, rejected, _ = self.parts(message)
         n_channels = len(self.calibration.channels)
@@ -156,12 +156,12 @@ class BlockLayout:
         ]
 
     def runs(self, message: Message) -> Iterator[SampleBlock]:
-        """Blocks of a message with their samples, those that follow each other as one.
+        """Yield the samples of a message; blocks without a gap between them are joined.
 
         Raises
         ------
         ConfigError
-            As :meth:`heads`, and if the samples are not those of the heads.
+            As in :meth:`heads`, and if the samples do not match the headers.
         """
         rows, rejected, sample_type = self.parts(message)
         n_channels, n_samples = len(self.calibration.channels), rows["n_samples"]
@@ -193,7 +193,7 @@ class BlockLayout:
     def parts(
         self, message: Message
     ) -> tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]], SampleType | None]:
-        """Heads as (n_blocks,) of `head_type`, rejections by row, and the type of the samples."""
+        """Return (n_blocks,) headers of `head_type`, the rejections by row, and the sample type."""
         try:
             head = _BlocksHead.model_validate(message[0])
         except ValidationError as error:
@@ -212,7 +212,7 @@ class BlockLayout:
 def follows(
     rows: npt.NDArray[np.void], rejected: Mapping[int, list[Rejection]]
 ) -> npt.NDArray[np.bool_]:
-    """Which blocks follow the one before in the same message, nothing missing or rejected."""
+    """Return a mask of the blocks that continue the previous block without a gap or rejection."""
     found = np.zeros(len(rows), dtype=np.bool_)
     found[1:] = rows["epoch"][1:] == rows["epoch"][:-1]
     found[1:] &= rows["first_index"][1:] == (rows["first_index"] + rows["n_samples"])[:-1]
@@ -236,22 +236,22 @@ FRAME = np.dtype(
         ("data", "u1", (MAX_DATA,)),
     ]
 )
-"""A CAN data frame: time in UTC, id without flags and whether it has 29 bits, CAN FD or classic,
-length of the data; the data are zero behind that."""
+"""CAN data frame: UTC time, identifier without flags, whether the identifier has 29 bits, whether
+the frame is CAN FD, data length in bytes, and the data padded with zeros."""
 
 
 def frames_message(frames: Frames, done: float) -> Message:
-    """Frames as a message; `done` is the share of the file that has been read."""
+    """Return a message with CAN frames; `done` is the fraction of the file read so far."""
     return {"kind": "frames", "done": done}, frames.tobytes()
 
 
 def frames_of(message: Message) -> Frames:
-    """The frames of a message.
+    """Return the CAN frames in a message.
 
     Raises
     ------
     ConfigError
-        If it is malformed.
+        If the message is malformed.
     """
     if len(message[1]) % FRAME.itemsize:
         raise _malformed()

@@ -1,4 +1,4 @@
-"""`Recording`: a folder that has been checked, and its blocks one after the other."""
+"""`Recording`: checked folder of a recording, and sequential access to its blocks."""
 
 import hashlib
 import stat
@@ -28,7 +28,7 @@ from core.samples.blocks import Rejection, SampleBlock
 
 @dataclass(frozen=True)
 class Recording:
-    """A recording whose files are those of its manifest; see :func:`open_recording`.
+    """Recording whose files match its manifest; see :func:`open_recording`.
 
     The Parquet files are read in the confined child process. All methods raise ConfigError if a
     file has become unreadable.
@@ -40,23 +40,23 @@ class Recording:
     def raw_blocks(
         self, first_block: int = 0, stop_block: int | None = None
     ) -> Generator[RawBlock]:
-        """Blocks from one up to before another, as they were written; memory for one row group."""
+        """Yield blocks as written, `stop_block` excluded; one row group is held in memory."""
         for run in self.runs(first_block, stop_block):
             yield from cells_of(run)
 
     def runs(self, first_block: int = 0, stop_block: int | None = None) -> Generator[SampleBlock]:
-        """The same, those that follow each other as one."""
+        """Yield the same blocks as `raw_blocks`; blocks without a gap between them are joined."""
         stop_block = self.manifest.n_blocks if stop_block is None else stop_block
         for message in self._messages(first_block, stop_block, with_samples=True):
             yield from self._layout.runs(message)
 
     def heads(self) -> Iterator[BlockHead]:
-        """All blocks without their samples."""
+        """Yield the headers of all blocks."""
         for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
             yield from self._layout.heads(message)
 
     def rows(self) -> Iterator[tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]]]]:
-        """The same, some hundred at once; see `BlockLayout.parts`."""
+        """Yield the headers of all blocks as arrays of some hundred; see `BlockLayout.parts`."""
         for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
             rows, rejected, _ = self._layout.parts(message)
             if rows.size:
@@ -73,12 +73,12 @@ class Recording:
 
 
 def open_recording(folder: Path) -> Recording:
-    """Check a recording from end to end: manifest, sizes, checksums, columns, lengths.
+    """Open a recording and check it fully: manifest, file sizes, checksums, columns, lengths.
 
     Raises
     ------
     ConfigError
-        If anything is wrong; one sentence with the file and what is wrong with it.
+        If a check fails; the message states the file and the fault in one sentence.
     """
     manifest = read_manifest(folder)
     for name, expected in manifest.files.items():
@@ -106,7 +106,7 @@ def _require_file(path: Path, expected: RecordedFile) -> None:
 
 
 def _require_lengths(recording: Recording) -> None:
-    """Go through the blocks without their samples: each must be possible, all must add up."""
+    """Check the block headers: each must be valid, and the total length must match the manifest."""
     path, manifest = recording.folder / BLOCKS, recording.manifest
     n_samples, n_blocks, progress = 0, 0, Progress()
     for rows, rejected in recording.rows():

@@ -1,4 +1,4 @@
-"""The parent's end: blocks and frames of files that the confined child reads."""
+"""Client of the confined child process: returns the blocks and frames of files read there."""
 
 import atexit
 import errno
@@ -30,7 +30,7 @@ from acquisition.recordings.messages import (
 from core.samples.calibration import UNLIMITED, SlowCalibration, UnitCalibration
 
 SILENCE_S = 300.0
-"""Longest time without a message before the child is taken for hung."""
+"""Timeout for a message of the child, in seconds; after it the child is considered hung."""
 
 _SIGNALS_OF_FAULTS = {
     signal.SIGABRT,
@@ -40,29 +40,29 @@ _SIGNALS_OF_FAULTS = {
     signal.SIGSEGV,
     signal.SIGXCPU,
 }
-"""Signals that a file can bring about; another one comes from the system or an operator."""
+"""Signals that a malformed file can cause; other signals come from the system or an operator."""
 
 _MAX_IDLE = 2
 _idle: deque[ConfinedProcess] = deque()
-"""Children without a request: starting one costs 0.2 s, a request to one some milliseconds."""
+"""Idle child processes for later requests: a start takes 0.2 s, a request some milliseconds."""
 
 
 def confined_messages(
     path: Path, format_: str, kind: str, request: Mapping[str, Any]
 ) -> Generator[Message]:
-    """Read a file or recording in the child; closing the generator ends the reading.
+    """Read a file or recording in the child; closing the generator stops the reading.
 
     Parameters
     ----------
     format_
-        As :func:`acquisition.recordings.child.answer` has it.
+        Format in the request; see :func:`acquisition.recordings.child.answer`.
     kind
-        Of the messages that are expected.
+        Expected kind of the messages, "blocks" or "frames".
 
     Raises
     ------
     ConfigError
-        If the file is refused; one sentence with its path.
+        If the file is rejected; the message is one sentence with the path of the file.
     """
     try:
         process = _idle_or_new()
@@ -96,7 +96,7 @@ def confined_messages(
 
 
 def _why_broken(process: ConfinedProcess, error: Exception) -> tuple[str, OSError | None]:
-    """Why a child answers no more, and the error of the system if it is not the file's fault."""
+    """Return the reason why the child failed, and a system error if the file is not the cause."""
     if isinstance(error, TimeoutError):
         return f"no answer for {SILENCE_S:g} s", _system_error(errno.ETIMEDOUT)
     words, code = process.last_words(), process.exit_code()
@@ -139,7 +139,7 @@ def _started() -> ConfinedProcess:
 
 
 def close_idle_children() -> None:
-    """End the children that wait for another request."""
+    """Terminate the idle child processes."""
     while _idle:
         _idle.pop().close()
 
@@ -148,12 +148,12 @@ atexit.register(close_idle_children)
 
 
 def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[RawBlock, float]]:
-    """All blocks of a foreign file of waveforms, each with the share of the file read so far.
+    """Yield all blocks of a waveform file, each with the fraction of the file read so far.
 
     Raises
     ------
     ConfigError
-        If there is no such file, or the job does not describe it; one sentence with its path.
+        If the file is missing or does not match the job; one sentence with the path of the file.
     """
     slow = tuple(SlowCalibration(column.id, -math.inf, math.inf) for column in job.slow)
     layout = BlockLayout(
@@ -165,7 +165,7 @@ def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[RawBlock, flo
 
 
 def imported_frames(path: Path, job: ImportJob) -> Generator[tuple[Frames, float]]:
-    """All frames of a CAN log in batches; share and errors as of :func:`imported_blocks`."""
+    """Yield the frames of a CAN log in batches; fraction and errors as :func:`imported_blocks`."""
     for message in _imported(path, job, "frames"):
         yield frames_of(message), _done(message)
 

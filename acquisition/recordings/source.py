@@ -1,4 +1,4 @@
-"""`RecordingSource`: a recording, or some of its channels, as a source that comes to an end."""
+"""`RecordingSource`: finite source of samples that replays a recording or selected channels."""
 
 import itertools
 from collections.abc import AsyncGenerator, AsyncIterator, Iterable, Iterator, Mapping
@@ -19,12 +19,12 @@ from core.samples.calibration import UnitCalibration
 
 @dataclass(frozen=True)
 class Selection:
-    """Columns of a recording in the order of a unit's channels, and their calibration.
+    """Selected channels of a recording, in the order of a unit's channels, with calibration.
 
     Parameters
     ----------
     channels, slow
-        Positions in the recording.
+        Positions of the waveform channels and of the slow channels in the recording.
     """
 
     channels: tuple[int, ...]
@@ -32,7 +32,7 @@ class Selection:
     calibration: UnitCalibration
 
     def of(self, block: SampleBlock) -> SampleBlock:
-        """The selected part of recorded blocks that follow each other."""
+        """Return a recorded block reduced to the selected channels."""
         side, rows = block.side, list(self.channels)
         if rows == list(range(len(block.counts))):
             counts, is_ok = block.counts, side.ok
@@ -43,23 +43,23 @@ class Selection:
 
 
 def all_of(recorded: RecordedUnit) -> Selection:
-    """All columns with the recorded calibration."""
+    """Return the selection of all channels, with the recorded calibration."""
     n_channels, n_slow = len(recorded.channels), len(recorded.slow_channels)
     return Selection(tuple(range(n_channels)), tuple(range(n_slow)), recorded.calibration)
 
 
 def select(recorded: RecordedUnit, unit: Unit, slow_units: Mapping[str, str]) -> Selection:
-    """Find the channels of a unit in a recording; the calibration is that of the recording.
+    """Select the channels of a unit from a recording, with the recorded calibration.
 
     Parameters
     ----------
     slow_units
-        Unit of each slow channel wanted, by id, in the order wanted.
+        Unit of measurement of each requested slow channel, by channel id, in the order requested.
 
     Raises
     ------
     ConfigError
-        If the rates differ, or a channel is missing or in another unit; the message has both.
+        If rates or units of measurement differ (the message states both), or a channel is missing.
     """
     if recorded.rate_hz != unit.rate_hz:
         raise ConfigError(
@@ -106,21 +106,21 @@ def _listed(ids: Iterable[str]) -> str:
 
 
 class RecordingSource:
-    """Calibrated blocks of a recording, as fast as they are taken or at their own pace.
+    """Source of the calibrated blocks of a recording, paced in time or as fast as possible.
 
-    A paced recording runs from the first connection on: what passes without a connection is
-    missing, and the sample index jumps. Unpaced, a new connection continues where the last one
-    stopped. Gaps within an epoch take their time; a restart of the device, whose length is not
-    known, takes none.
+    A paced recording runs from the first connection on: samples due without a connection are
+    lost, and the sample index jumps. Without pacing, a new connection continues at the block after
+    the last one delivered. Gaps within an epoch take their recorded duration. The duration of a
+    device restart is unknown; it takes no time.
 
     Parameters
     ----------
     selection
-        Which channels, and how to read them; all as recorded if not given.
+        Channels and their calibration; by default all channels as recorded.
     speed
-        Seconds of the recording in a second, or None for unpaced.
+        Seconds of the recording per second of the clock; None without pacing.
     block_s
-        Length of the blocks, where nothing is missing in between.
+        Length of the blocks in seconds; blocks before a gap may be shorter.
 
     Raises
     ------
@@ -155,7 +155,7 @@ class RecordingSource:
         Raises
         ------
         ConfigError
-            While iterating, if a file has become unreadable.
+            During iteration, if a file of the recording has become unreadable.
         """
         if self._start_s is None:
             self._start_s = self._clock.monotonic_s()
@@ -179,7 +179,7 @@ class RecordingSource:
                 yield block
 
     def _pieces(self, run: SampleBlock) -> Iterator[SampleBlock]:
-        """Whole recorded blocks of the same stretch of samples, as one."""
+        """Yield a run split at recorded block boundaries into pieces of about the block length."""
         starts = run.side.starts
         stretch = (run.first_index + starts) // self._block_samples
         cuts = starts[1:][np.diff(stretch) > 0].tolist()

@@ -1,4 +1,4 @@
-"""Gaps, restarts and rejections of a recording, counted from its blocks."""
+"""Summary of a recording: gaps, device restarts and rejected samples, counted from its blocks."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -14,22 +14,24 @@ MAX_GAPS_LISTED = 1000
 
 @dataclass(frozen=True)
 class RecordingSummary:
-    """Counts are of samples per channel, and exact.
+    """Summary of a recording; all numbers of samples are exact and per channel.
 
     Parameters
     ----------
     start_ns, stop_ns
-        Time of the first sample and of the first one after the last.
+        Time of the first sample, and end of the last sample, in UTC.
     n_passed
-        Recorded, gaps and rejected ones within an epoch.
+        Total number of recorded, missing and rejected samples.
     gaps
-        The first thousand, in order of time.
+        First thousand gaps in order of time.
     n_gaps, n_gap_samples
-        All gaps, without rejected samples.
+        Number of all gaps and of the samples missing in them, without rejected samples.
+    rejected
+        Number of rejected samples by reason.
     epochs
-        In order of time; more than one if the device restarted.
+        Epochs in order of time; several if the device restarted.
     n_not_ok
-        Samples of each channel, by id, in blocks in which the device called it not OK.
+        Samples by channel id, in blocks where the device reported the channel as not OK.
     """
 
     start_ns: int
@@ -45,12 +47,12 @@ class RecordingSummary:
 
 
 def summary_of(recording: Recording) -> RecordingSummary:
-    """Go through all blocks of a recording.
+    """Return the summary of a recording, from the headers of all its blocks.
 
     Raises
     ------
     ConfigError
-        If they have become unreadable.
+        If a file of the recording has become unreadable.
     """
     rate_hz, ids = recording.manifest.rate_hz, [c.id for c in recording.manifest.channels]
     first: BlockHead | None = None
@@ -87,7 +89,7 @@ def summary_of(recording: Recording) -> RecordingSummary:
 
 
 def _gap(last: BlockHead, head: BlockHead) -> Gap:
-    """Samples missing between two blocks of an epoch, without rejected ones; possibly none."""
+    """Return the gap between two blocks of an epoch, without rejected samples; it may be empty."""
     n_missing = head.first_index - last.first_index - last.n_samples
     n_rejected = sum(rejection.n_samples for rejection in head.rejected)
     return Gap(head.epoch, head.first_index - n_missing, n_missing - n_rejected, head.start_ns)

@@ -1,4 +1,4 @@
-"""Blocks as Parquet tables and back."""
+"""Conversion of blocks to Parquet tables, and reading of these tables."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -18,11 +18,11 @@ from acquisition.recordings.messages import HEAD_NUMBERS, Rejected, head_type
 from core.arrays import RawArray
 
 ZSTD_LEVEL = 1
-"""Higher levels gain less than one per cent on differences that are already packed to bits."""
+"""Compression level; higher levels save less than 1 % on bit-packed differences."""
 
 _SAMPLE_TYPES = {"int16": pa.int16(), "float32": pa.float32()}
 _ENCODINGS = {"int16": "DELTA_BINARY_PACKED", "float32": "BYTE_STREAM_SPLIT"}
-"""Differences of counts need few bits; floats that follow each other share their high bytes."""
+"""Parquet encodings: differences of counts need few bits; successive floats share high bytes."""
 
 _HEADS_AT_ONCE = 256
 _REJECTED_COUNT = "rejected.list.element.n_samples"
@@ -33,13 +33,13 @@ def _required(types: Mapping[str, Any]) -> list[Any]:
 
 
 def samples_schema(unit: RecordedUnit) -> Any:
-    """Counts or engineering units, a column for each waveform channel."""
+    """Return the schema of the samples: one column per waveform channel."""
     type_ = _SAMPLE_TYPES[unit.sample_type]
     return pa.schema(_required({c.id: type_ for c in unit.channels}))
 
 
 def blocks_schema(unit: RecordedUnit) -> Any:
-    """All of the blocks but their counts; ``ok`` has a bit for each channel, channel 0 lowest."""
+    """Return the schema of block headers; ``ok`` has one bit per channel, channel 0 lowest."""
     rejection = pa.struct(_required({"reason": pa.string(), "n_samples": pa.int64()}))
     types = dict.fromkeys(("epoch", "first_index", "start_ns"), pa.int64())
     types |= {"n_samples": pa.int32(), "ok": pa.uint32()}
@@ -49,12 +49,12 @@ def blocks_schema(unit: RecordedUnit) -> Any:
 
 
 def samples_table(counts: RawArray, unit: RecordedUnit) -> Any:
-    """(n_channels, n_samples) counts or engineering units as a table."""
+    """Return (n_channels, n_samples) counts or engineering units as a table."""
     return pa.table(list(counts), schema=samples_schema(unit))
 
 
 def blocks_table(blocks: Sequence[RawBlock], unit: RecordedUnit) -> Any:
-    """Blocks without their counts as a table."""
+    """Return the headers of blocks as a table."""
     columns = [
         [b.epoch for b in blocks],
         [b.first_index for b in blocks],
@@ -68,14 +68,14 @@ def blocks_table(blocks: Sequence[RawBlock], unit: RecordedUnit) -> Any:
 
 
 def samples_writer(path: Path, unit: RecordedUnit) -> Any:
-    """Packed by differences, then zstd: 6 bits a count; int16 alone packs to 11."""
+    """Open a writer of samples: delta encoding and zstd, 6 bits per count (11 without delta)."""
     schema, encoding = samples_schema(unit), _ENCODINGS[unit.sample_type]
     encodings = dict.fromkeys(schema.names, encoding)
     return _writer(path, schema, use_dictionary=False, column_encoding=encodings)
 
 
 def blocks_writer(path: Path, unit: RecordedUnit) -> Any:
-    """Dictionaries and zstd, for rows that are few and repetitive; texts have no dictionary."""
+    """Open a writer of block headers: dictionary encoding, except of texts, and zstd."""
     schema = blocks_schema(unit)
     return _writer(path, schema, use_dictionary=[*schema.names, _REJECTED_COUNT])
 
@@ -94,14 +94,14 @@ def _writer(path: Path, schema: Any, **options: Any) -> Any:
 
 @contextmanager
 def parquet_file(path: Path, schema: Any, n_rows: int, rows_per_group: int) -> Iterator[Any]:
-    """Open a file whose footer agrees with the manifest; for the confined child only.
+    """Open a Parquet file whose footer matches the manifest; only for the confined child.
 
-    pyarrow allocates for a page what the header of the page says, up to 2 GB for one of 64 kB.
+    pyarrow allocates the size stated in a page header, up to 2 GB for a page of 64 kB.
 
     Raises
     ------
     ConfigError
-        If the file is something else, or if reading it fails inside the context.
+        If the file does not match the manifest, or reading it fails inside the context.
     """
     full, last = divmod(n_rows, rows_per_group)
     with foreign_errors_of(path), path.open("rb") as stream, pq.ParquetFile(stream) as file:
@@ -111,23 +111,23 @@ def parquet_file(path: Path, schema: Any, n_rows: int, rows_per_group: int) -> I
 
 @contextmanager
 def foreign_errors_of(path: Path) -> Iterator[None]:
-    """Rename what pyarrow and the disk raise to ConfigError, with the path in front."""
+    """Raise errors of pyarrow and of the disk as ConfigError, with the path in the message."""
     try:
         yield
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-        # names may not be text
+        # column names may be invalid UTF-8
         words = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise ConfigError(f"{path}: {words.splitlines()[0]}") from error
 
 
 def read_counts(file: Any, group: int) -> RawArray:
-    """(n_channels, n_rows) of one row group."""
+    """Return the (n_channels, n_rows) samples of one row group."""
     columns = file.read_row_group(group, use_threads=False).columns
     return np.stack([column.to_numpy() for column in columns])
 
 
 def read_heads(file: Any, n_slow: int) -> Iterator[tuple[npt.NDArray[np.void], list[Rejected]]]:
-    """Blocks without their samples, some hundred at once: heads and their rejections."""
+    """Yield the block headers and their rejections, some hundred blocks at a time."""
     for batch in file.iter_batches(_HEADS_AT_ONCE, use_threads=False):
         *numbers, rejected = batch.columns
         heads = np.empty(len(batch), head_type(n_slow))

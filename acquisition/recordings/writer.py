@@ -1,4 +1,4 @@
-"""`RecordingWriter`: raw blocks in, a finished recording out, or nothing."""
+"""`RecordingWriter`: atomic writing of a recording from raw blocks."""
 
 import hashlib
 import os
@@ -40,27 +40,27 @@ from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
 
 INCOMPLETE = ".incomplete"
-"""Suffix of the name of a folder that is being written."""
+"""Suffix of the folder of a recording that is being written."""
 
 
 class RecordingWriter:
-    """Writes a recording under another name and renames it when it is complete and synced.
+    """Writer of a recording under a temporary name; renames it once it is complete and synced.
 
-    As a context manager it finishes on a regular end, and leaves nothing behind on an exception.
+    As a context manager it finishes the recording, or removes it after an exception.
 
     Parameters
     ----------
     folder
-        The recording to be; must not exist yet.
+        Folder of the recording; it must not exist.
     made_by
-        Program and person, for the manifest.
+        Program and person that make the recording, for the manifest.
     first_decides
-        Whether the first block decides on the sample type, instead of the unit.
+        Whether the sample type is that of the first block instead of that of `unit`.
 
     Raises
     ------
     ConfigError
-        If the folder exists, is being written by another, or cannot be made.
+        If the folder exists, is being written by another process, or cannot be created.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class RecordingWriter:
 
     @property
     def duration_s(self) -> float:
-        """Time from the first sample to the last, gaps within an epoch included."""
+        """Duration from the first sample to the last, including gaps within an epoch."""
         return self._progress.n_passed / self.unit.rate_hz
 
     def write(self, raw: RawBlock) -> None:
@@ -116,8 +116,8 @@ class RecordingWriter:
         Raises
         ------
         ConfigError
-            If it is not of this unit's shape and rate or beyond the format's limits, or if the
-            disk refuses it.
+            If the block does not match the unit, exceeds the limits of the format, or cannot be
+            written.
         """
         if self._first_decides:
             self._decide(_type_of(raw))
@@ -141,26 +141,26 @@ class RecordingWriter:
                 self._write_blocks()
 
     def write_block(self, block: SampleBlock) -> None:
-        """Append a block of a source, cell by cell.
+        """Append a block of a source, one raw block per cell.
 
-        A slow value that another device measures is recorded as far as there is one.
+        Slow values measured by another device are included; a missing value is recorded as NaN.
 
         Raises
         ------
         ConfigError
-            As :meth:`write`, and if the block is of another unit or has another calibration.
+            As in :meth:`write`, and if the unit or the calibration of the block differs.
         """
         _require_calibration(block, self._calibration)
         for raw in _cells(block, self._calibration):
             self.write(raw)
 
     def finish(self) -> Manifest:
-        """Sync all files and rename the recording.
+        """Sync all files, rename the recording to its final name, and return its manifest.
 
         Raises
         ------
         ConfigError
-            If there is nothing to record, or the disk refuses.
+            If no block was written, or writing to the disk fails.
         """
         if self.n_blocks == 0:
             self.abandon()
@@ -179,15 +179,15 @@ class RecordingWriter:
         return manifest
 
     def abandon(self) -> None:
-        """Remove what was written.
+        """Remove the unfinished recording.
 
         Raises
         ------
         ConfigError
-            If the disk refuses.
+            If its files cannot be removed.
         """
         with suppress(ConfigError), foreign_errors_of(self._aside):
-            self._close()  # writes the footer, which a full disk may refuse
+            self._close()  # writes the footer, which fails on a full disk
         with foreign_errors_of(self._aside):
             for name in (SAMPLES, BLOCKS, MANIFEST):
                 (self._aside / name).unlink(missing_ok=True)
@@ -255,7 +255,7 @@ def _require_calibration(block: SampleBlock, calibration: UnitCalibration) -> No
 
 
 def _cells(block: SampleBlock, calibration: UnitCalibration) -> Iterator[RawBlock]:
-    """Parts of a block with one set of values beside the samples, slow values as recorded."""
+    """Yield one raw block per cell of a block, with the slow channels of the recording."""
     side, ids = block.side, block.calibration.slow_ids
     slow = np.full((len(calibration.slow), side.n_cells), np.nan)
     for row, channel in enumerate(calibration.slow):

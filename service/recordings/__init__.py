@@ -1,1 +1,1 @@
-"""Recordings of samples on the disk: around alarms and continuous; their library and retention."""
+"""Recordings of samples, around alarms and continuous; recording library and retention."""

@@ -1,4 +1,4 @@
-"""Samples before and after an alarm."""
+"""Captures: recordings of the samples before and after an alarm."""
 
 import asyncio
 from collections import deque
@@ -22,14 +22,16 @@ from service.settings.alarm_kinds import SAMPLED_KINDS
 
 @dataclass(frozen=True)
 class Outcome:
-    """Result of a capture.
+    """Outcome of a capture.
 
     Parameters
     ----------
+    alarms
+        Alarm events that the capture covers.
     folder
-        Folder of the capture; None if it could not be written.
+        Folder of the capture; None if the capture could not be written.
     reason
-        Why it could not be written.
+        Reason why the capture could not be written.
     """
 
     alarms: Sequence[AlarmEvent]
@@ -39,16 +41,16 @@ class Outcome:
 
 @dataclass(frozen=True)
 class CaptureSettings:
-    """Length of the samples around an alarm.
+    """Durations of a capture, in seconds.
 
     Parameters
     ----------
     pre_s, post_s
-        Length before the alarm and after it.
+        Duration before the alarm and after the alarm.
     max_s
-        Maximum length of a capture.
+        Maximum duration of a capture.
     window_s
-        Length of an averaging window, which is kept before an alarm about a film.
+        Duration of an averaging window, which is recorded before an alarm about a film.
     """
 
     pre_s: float = 60.0
@@ -58,17 +60,17 @@ class CaptureSettings:
 
     @property
     def longest_pre_s(self) -> float:
-        """Maximum length before an alarm, which leaves room for the samples after it."""
+        """Maximum duration before an alarm, so that `post_s` still fits into the capture."""
         return max(self.pre_s, min(self.window_s, self.max_s - self.post_s))
 
     def start_ns(self, event: AlarmEvent) -> int:
-        """Return the start of the samples around an alarm."""
+        """Return the start time of the capture of an alarm event."""
         is_film = event.identity.kind in FILM_KINDS
         return event.time_ns - ns_from_s(self.longest_pre_s if is_film else self.pre_s)
 
 
 def is_captured(event: AlarmEvent) -> bool:
-    """Return whether samples around an event are kept: a new occurrence that is not hidden."""
+    """Return whether an event is captured: a new occurrence, not shelved or suppressed."""
     return (
         event.change in ANNOUNCED
         and event.identity.kind in SAMPLED_KINDS
@@ -77,19 +79,19 @@ def is_captured(event: AlarmEvent) -> bool:
 
 
 class Capture:
-    """A capture that is being written; only whole blocks are taken.
+    """Capture in progress, which consists of whole blocks.
 
     Parameters
     ----------
     start_ns
-        Start of the capture, in the time of the samples.
+        Start time of the capture, by the time stamps of the samples.
     max_samples
-        Maximum per channel, in case the time of the device stands still or runs backwards.
+        Maximum number of samples per channel, in case the time stamps stop or decrease.
 
     Attributes
     ----------
     alarms
-        Events that the capture is made for, the first of them its cause.
+        Alarm events that the capture covers; the first event started the capture.
     deadline_s
         Monotonic time at which the capture is finished without further samples.
     pending
@@ -97,7 +99,7 @@ class Capture:
     is_lost
         Whether the capture is abandoned because the disk is too slow.
     is_replaced
-        Whether another capture contains all of it.
+        Whether the capture is abandoned because a newer capture contains its samples.
     """
 
     def __init__(
@@ -112,25 +114,25 @@ class Capture:
         self.is_lost = self.is_replaced = False
 
     def extend(self, event: AlarmEvent, now_s: float) -> None:
-        """Add an alarm; the capture lasts until after it, up to the maximum length."""
+        """Add an alarm event and extend the capture beyond it, up to the maximum duration."""
         self.alarms.append(event)
         end_ns = max(self._end_ns, event.time_ns + ns_from_s(self._settings.post_s))
         self._end_ns = min(end_ns, self._last_end_ns)
         self.deadline_s = now_s + self._settings.post_s + PATIENCE_S
 
     def add(self, block: SampleBlock) -> None:
-        """Append a block unless it lies behind the end."""
+        """Append a block unless it starts after the end of the capture."""
         if block.start_ns < self._end_ns and self._n_left > 0 and not self.is_lost:
             self.pending.append(block)
             self._n_left -= block.n_samples
 
     def is_over(self, newest: SampleBlock) -> bool:
-        """Return whether every block after this one lies behind the end."""
+        """Return whether all blocks after the newest block start after the end of the capture."""
         return newest.stop_ns >= self._end_ns or self._n_left <= 0
 
     @property
     def n_pending_samples(self) -> int:
-        """Samples of all channels that are to be written."""
+        """Number of samples of all channels that are still to be written."""
         return len(self.pending) * self.pending[0].counts.size if self.pending else 0
 
 
@@ -139,31 +141,31 @@ log = structlog.get_logger()
 WRITE_EVERY_S = 0.5
 
 PATIENCE_S = 30.0
-"""Time that a capture waits for missing samples after its end."""
+"""Time in seconds that a capture waits for late samples after its end."""
 
 MAX_BUSY_S = 60.0
-"""Maximum duration of one write."""
+"""Maximum duration of one write, in seconds."""
 
 MAX_PENDING_SAMPLES = 50_000_000
-"""Maximum of all channels and captures that wait for the disk: 200 MB."""
+"""Maximum number of samples waiting to be written, of all channels and captures: 200 MB."""
 
 
 class Captures(WriterThread):
-    """Sample histories and captures of all units; receives every block.
+    """Recorder of captures of all units; keeps the newest blocks of each unit in memory.
 
     Parameters
     ----------
     root
         Folder of all captures.
     make_writer
-        Opens a recording, by unit; other units are not captured.
+        Function that opens a recording, by unit; other units are not captured.
     rate_hz
-        Sampling rate of each unit that has a writer.
+        Sampling rate of each unit in `make_writer`.
 
     Attributes
     ----------
     n_written, n_failed
-        Captures finished, and failed writes, since the start.
+        Number of finished captures and of failed writes since the start.
     """
 
     def __init__(
@@ -188,27 +190,27 @@ class Captures(WriterThread):
         self.n_written = self.n_failed = 0
 
     def set_listener(self, listener: Callable[[Outcome], None]) -> None:
-        """Call a function on the event loop with the outcome of each capture."""
+        """Set the function that is called on the event loop with the outcome of each capture."""
         self._listener = listener
 
     def expects(self, event: AlarmEvent) -> bool:
-        """Return whether samples around an event are kept."""
+        """Return whether samples around an event are recorded."""
         return is_captured(event) and event.identity.unit in self._histories
 
     @property
     def being_made(self) -> frozenset[tuple[str, int]]:
-        """Alarm and occurrence of each event whose capture is being written."""
+        """Alarm id and occurrence of each event whose capture is being written."""
         events = (event for capture in self._all for event in capture.alarms)
         return frozenset((event.identity.id, event.occurrence) for event in events)
 
     @property
     def n_running(self) -> int:
-        """Captures that are being written."""
+        """Number of captures that are being written."""
         return len(self._all)
 
     @property
     def trouble(self) -> str | None:
-        """Why samples are not captured: an error, or a disk that does not answer."""
+        """Reason why samples are not captured, an error or a disk timeout; None if they are."""
         since_s = self._busy_since_s
         if since_s is not None and self._clock.monotonic_s() - since_s > MAX_BUSY_S:
             return "the disk does not answer"
@@ -219,7 +221,7 @@ class Captures(WriterThread):
         return [*self._ended, *self._running.values()]
 
     def take(self, block: SampleBlock, news: Sequence[AlarmNews]) -> None:
-        """Add a block and the alarm news that it caused."""
+        """Process a block and the alarm events that resulted from its analysis."""
         if block.unit not in self._histories:
             return
         is_new = self._histories[block.unit].add(block)
@@ -279,12 +281,12 @@ class Captures(WriterThread):
         return capture
 
     def _reaches_back(self, capture: Capture, unit: str, events: Sequence[AlarmEvent]) -> bool:
-        """Return whether a capture has the samples before all events, as far as they are held."""
+        """Return whether a capture starts early enough for all events, or at the oldest block."""
         oldest_ns = next(iter(self._histories[unit])).start_ns
         return capture.start_ns <= max(min(map(self._settings.start_ns, events)), oldest_ns)
 
     def _replace(self, unit: str, events: list[AlarmEvent]) -> Capture:
-        """Begin a capture with an earlier start and the alarms of the running one."""
+        """Replace the running capture by a capture with an earlier start and all its alarms."""
         before = self._running[unit]
         before.is_replaced, before.pending = True, deque()
         self._end(unit)
@@ -298,7 +300,7 @@ class Captures(WriterThread):
         self._ended.append(self._running.pop(unit))
 
     def _end_idle(self) -> None:
-        """End captures that wait for samples in vain."""
+        """End captures whose deadline has passed without further samples."""
         now_s = self._clock.monotonic_s()
         for unit, capture in list(self._running.items()):
             if now_s > capture.deadline_s:

@@ -1,4 +1,4 @@
-"""Continuous recording: all samples of units, and the samples that are dropped under pressure."""
+"""Continuous recording of all samples of units; samples are dropped under overload."""
 
 import asyncio
 from collections import Counter, deque
@@ -22,7 +22,7 @@ from service.runtime.heartbeats import UNHEARD, Pulse
 
 
 class DropReason(StrEnum):
-    """Why samples are missing from a continuous recording, as written in it."""
+    """Reason why samples are missing from a continuous recording, as stated in the recording."""
 
     ANALYSIS_BEHIND = "analysis_behind"
     DISK_SLOW = "disk_slow"
@@ -30,7 +30,7 @@ class DropReason(StrEnum):
     DISK_REFUSED = "disk_refused"
     NOT_RUNNING = "not_running"
     GAP_BEFORE = "gap_before"
-    """A gap of the device between two recordings."""
+    """Samples missing from the device between two segments."""
 
 
 WORDS = {
@@ -41,35 +41,35 @@ WORDS = {
 }
 
 Position = tuple[int, int]
-"""Epoch, and index after the last sample."""
+"""Epoch, and sample index after the last recorded sample."""
 
 
 @dataclass
 class Omission:
-    """Samples of one epoch that were dropped since the last recorded block.
+    """Numbers of samples of one epoch that were dropped since the last recorded block.
 
     Parameters
     ----------
     n_samples
-        Samples per channel, by reason.
+        Number of dropped samples per channel, by reason.
     """
 
     epoch: int = 0
     n_samples: Counter[str] = field(default_factory=Counter)
 
     def add(self, epoch: int, rejected: Iterable[Rejection]) -> None:
-        """Add dropped samples; those of an earlier epoch are forgotten."""
+        """Add dropped samples; a new epoch resets the numbers."""
         if epoch != self.epoch:
             self.epoch, self.n_samples = epoch, Counter()
         for each in rejected:
             self.n_samples[each.reason] += each.n_samples
 
     def add_block(self, block: SampleBlock, reason: str) -> None:
-        """Add a block, and the samples that were rejected before it."""
+        """Add the samples of a dropped block, and the samples rejected before it."""
         self.add(block.epoch, (*block.rejected, Rejection(reason, block.n_samples)))
 
     def before(self, block: SampleBlock) -> SampleBlock:
-        """Return a block that reports the dropped samples as rejected before it."""
+        """Return a copy of a block that lists the dropped samples as rejected before it."""
         if not self.n_samples or self.epoch != block.epoch:
             return block
         total = self.n_samples.copy()
@@ -78,23 +78,23 @@ class Omission:
         return replace(block, rejected=tuple(Rejection(r, n) for r, n in total.items()))
 
     def clear(self) -> None:
-        """Forget samples that a recorded block has reported."""
+        """Reset the numbers, once a recorded block lists them."""
         self.n_samples = Counter()
 
 
 def unseen_part(block: SampleBlock, end: Position | None) -> SampleBlock | None:
-    """Return the part of a block after a position; None if all of it lies before."""
+    """Return the part of a block after a position; None if the whole block lies before it."""
     if end is None or end[0] != block.epoch or block.first_index >= end[1]:
         return block
     return None if block.stop_index <= end[1] else block.from_sample(end[1] - block.first_index)
 
 
 class RecordingError(Exception):
-    """Samples were not recorded; the message states the unit and the reason."""
+    """Error raised if samples are not recorded; the message states the unit and the reason."""
 
 
 class UnitRecorder:
-    """Writes the blocks of one unit into consecutive segments.
+    """Recorder of one unit; writes its blocks to consecutive segments.
 
     Parameters
     ----------
@@ -104,9 +104,10 @@ class UnitRecorder:
     Attributes
     ----------
     ended
-        Segments that are to be joined.
+        Finished segments that are still to be joined.
     n_written, n_refused
-        Samples per channel since the start that were synced, and that the disk refused.
+        Numbers of samples per channel since the start that were synced, and that could not be
+        written.
     """
 
     def __init__(
@@ -125,12 +126,12 @@ class UnitRecorder:
         self.n_written = self.n_refused = 0
 
     def write(self, block: SampleBlock, now_s: float) -> None:
-        """Append a block; start a new segment if it does not fit the open one.
+        """Append a block; start a new segment if the open segment does not cover the block.
 
         Raises
         ------
         RecordingError
-            If the block, or samples before it, cannot be recorded.
+            If the block, or an earlier block, cannot be recorded.
         """
         unseen = unseen_part(block, self._end)
         if unseen is None:
@@ -140,7 +141,7 @@ class UnitRecorder:
         try:
             self._put(unseen, now_s)
         except (ConfigError, OSError):
-            with suppress(RecordingError):  # counted; samples may be of another type now
+            with suppress(RecordingError):  # the error is counted; the sample type may have changed
                 self.end()
             self._retry(unseen, now_s)
         self._omission.clear()
@@ -153,7 +154,7 @@ class UnitRecorder:
         Raises
         ------
         RecordingError
-            If the disk refuses.
+            If the part cannot be written.
         """
         if self._segment is not None and self._segment.is_due(now_s):
             self._finish_part(self._segment)
@@ -164,7 +165,7 @@ class UnitRecorder:
         Raises
         ------
         RecordingError
-            If its last part cannot be recorded.
+            If the last part of the segment cannot be written.
         """
         segment, self._segment = self._segment, None
         if segment is not None:
@@ -200,7 +201,7 @@ class UnitRecorder:
             raise self._error(error) from error
 
     def _after_end(self, block: SampleBlock) -> SampleBlock:
-        """Return the first block of a segment with the samples missing since the last segment."""
+        """Return a copy of a block that lists the samples missing since the last segment."""
         if self._end is None or self._end[0] != block.epoch:
             return block
         n_missing = block.first_index - self._end[1] - sum(r.n_samples for r in block.rejected)
@@ -214,12 +215,12 @@ class UnitRecorder:
 
 
 MAX_TRIED = 3
-"""Number of newest recordings that are tried if the newest is damaged."""
+"""Maximum number of recordings to try, from the newest, if recordings are damaged."""
 
 
 def last_end(root: Path, unit: str) -> Position | None:
-    """Return the position up to which a unit is recorded; None if unknown."""
-    # the identifier of another unit may begin with that of this one
+    """Return the position up to which a unit is recorded on the disk; None if unknown."""
+    # the glob also matches units whose identifier begins with this identifier
     names = (path for path in root.glob(f"{unit}-*-{CONTINUOUS}*") if unit_of(path.name) == unit)
     for folder in sorted(names, reverse=True)[:MAX_TRIED]:
         try:
@@ -239,39 +240,39 @@ log = structlog.get_logger()
 WRITE_EVERY_S = 1.0
 
 MAX_WAIT_S = 20.0
-"""Maximum time in the queue to a slow disk; a kill costs at most the queue and the open part."""
+"""Maximum time in the queue, in seconds; a crash loses at most the queue and the open part."""
 
 MAX_WAITING_SAMPLES = 20_000_000
-"""Maximum of all channels and units in the queue: 80 MB."""
+"""Maximum number of samples in the queue, of all channels and units: 80 MB."""
 
 MAX_BUSY_S = 60.0
-"""Maximum duration of one write."""
+"""Maximum duration of one write, in seconds."""
 
 MAX_END_S = 2.0
-"""Maximum time for joining segments at the end; the next start joins the others."""
+"""Maximum time to join segments on shutdown, in seconds; the next start joins the others."""
 
 REPORTED_S = 60.0
-"""Time after the last dropped sample for which recording counts as failing."""
+"""Time in seconds for which `trouble` reports a dropped sample."""
 
 
 class ContinuousRecorder(WriterThread):
-    """Continuous recordings of all units; receives every block.
+    """Continuous recorder of all units.
 
     Parameters
     ----------
     root
         Folder of the recordings.
     units
-        Units to record; blocks of others are ignored.
+        Units to record; blocks of other units are ignored.
     pressure
-        Returns why recording pauses now, or None.
+        Function that returns the reason to drop samples now, or None.
     owned
-        Further units whose recordings may have been left unfinished.
+        Further units whose unfinished recordings are completed at the start.
 
     Attributes
     ----------
     n_dropped
-        Samples per channel that were not recorded, by reason.
+        Number of samples per channel that were not recorded, by reason.
     """
 
     def __init__(
@@ -304,12 +305,12 @@ class ContinuousRecorder(WriterThread):
 
     @property
     def n_written(self) -> int:
-        """Samples per channel synced to the disk since the start, of all units."""
+        """Number of samples per channel synced to the disk since the start, of all units."""
         return sum(recorder.n_written for recorder in self._recorders.values())
 
     @property
     def trouble(self) -> str | None:
-        """Why samples were not recorded in the last minute."""
+        """Reason why samples were not recorded in the last minute; None if all were recorded."""
         if self.error is not None:
             return self.error
         if self._dropped is None or self._clock.monotonic_s() - self._dropped[0] > REPORTED_S:
@@ -317,7 +318,7 @@ class ContinuousRecorder(WriterThread):
         return WORDS[self._dropped[1]]
 
     def take(self, block: SampleBlock) -> None:
-        """Queue a block, or drop and count it; never waits."""
+        """Queue a block without waiting, or drop and count it."""
         if block.unit not in self._units or self._is_closed:
             return
         unseen = unseen_part(block, self._seen.get(block.unit))
@@ -353,7 +354,7 @@ class ContinuousRecorder(WriterThread):
         self._thread.shutdown(wait=False)
 
     def _slowness(self) -> DropReason | None:
-        """Return `DISK_SLOW` if the disk does not keep up."""
+        """Return `DISK_SLOW` if the disk is too slow for the queue; None otherwise."""
         since = [] if self._busy_since_s is None else [self._busy_since_s]
         since += [self._waiting[0][0]] if self._waiting else []
         is_late = bool(since) and self._clock.monotonic_s() - min(since) > MAX_WAIT_S
@@ -383,7 +384,7 @@ class ContinuousRecorder(WriterThread):
         self._note(self._join_one() or error)
 
     def _try(self, unit: str, do: Callable[[UnitRecorder], None]) -> str | None:
-        """Call a recorder, which is created at its first block; return the error, if any."""
+        """Call a function with the recorder of a unit; return the error message, if any."""
         if unit not in self._recorders:
             self._recorders[unit] = UnitRecorder(
                 self._root, self._units[unit], self._settings, last_end(self._root, unit)
@@ -413,7 +414,7 @@ class ContinuousRecorder(WriterThread):
         return None
 
     def _end(self) -> None:
-        """End all segments, and join them while there is time; runs in the thread."""
+        """End all segments, and join them within the time limit; runs in the thread."""
         for unit in list(self._recorders):
             self._note(self._try(unit, UnitRecorder.end))
         until_s = self._clock.monotonic_s() + MAX_END_S
@@ -422,7 +423,7 @@ class ContinuousRecorder(WriterThread):
                 self._note(self._join_one())
 
     def _recover(self) -> None:
-        """Finish the recordings that a crash left in parts; runs in the thread."""
+        """Join the segments that a crash left unjoined; runs in the thread."""
         try:
             left = unjoined(self._root, self._owned)
             remove_incomplete(self._root, self._owned)

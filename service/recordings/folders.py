@@ -1,4 +1,4 @@
-"""Names and states of recordings in their folders."""
+"""Folder names of recordings, which contain their state, and operations on these folders."""
 
 import os
 import re
@@ -14,45 +14,45 @@ from core.units import NS_PER_S
 from service.runtime.files import write_whole
 
 CONTINUOUS = "continuous"
-"""Last word of the name of a continuous recording; that of a capture is the kind of its alarm."""
+"""Last part of the name of a continuous recording; a capture has the kind of its alarm instead."""
 
 PARTS = ".parts"
 """Suffix of the folder that holds the parts of a segment until they are joined."""
 
 REMOVED = ".removed"
-"""Suffix while a recording is being removed."""
+"""Suffix of the folder of a recording that is being removed."""
 
 LEFT = ".left"
-"""Suffix of what remains of a removed recording: files that padwatch did not write."""
+"""Suffix of the folder of a removed recording that still contains files of other programs."""
 
 DAMAGED = ".damaged"
-"""Suffix of a recording that cannot be read."""
+"""Suffix of the folder of a recording that is damaged."""
 
 UNFINISHED = (INCOMPLETE, PARTS, REMOVED)
 
 ALARM = "alarm.json"
 
 FILES = (ALARM, MANIFEST, BLOCKS, SAMPLES)
-"""Files of a recording. Nothing else is ever removed."""
+"""Names of the files of a recording, in the order of removal; other files are never removed."""
 
 _NAME = re.compile(r"(.+)-\d{8}T\d{6}\.\d{3}Z-")
 
 
 def new_folder(root: Path, unit: str, time_ns: int, kind: str) -> Path:
-    """Return a free folder for a recording of a unit that starts at a time."""
+    """Return an unused folder for a recording of a unit, with its start time in the name."""
     seconds, ns = divmod(time_ns, NS_PER_S)
     moment = f"{datetime.fromtimestamp(seconds, UTC):%Y%m%dT%H%M%S}.{ns // 1_000_000:03d}Z"
     return _free(root / f"{unit}-{moment}-{kind}", "", PARTS, INCOMPLETE)
 
 
 def unit_of(name: str) -> str | None:
-    """Return the unit in the name of a recording; None if it is not such a name."""
+    """Return the unit in the name of a recording; None for other names."""
     found = _NAME.match(name)
     return found[1] if found else None
 
 
 def incomplete_folder(folder: Path) -> Path:
-    """Return the folder of a recording while it is being written."""
+    """Return the temporary folder of a recording that is being written."""
     return folder.with_name(folder.name + INCOMPLETE)
 
 
@@ -62,19 +62,19 @@ def parts_folder(folder: Path) -> Path:
 
 
 def damaged_folder(folder: Path, part: Path) -> Path:
-    """Return a free folder for an unreadable part of a segment."""
+    """Return an unused folder for an unreadable part of a segment."""
     return _suffixed(folder.with_name(f"{folder.name}-{part.name}"), DAMAGED)
 
 
 def remove_incomplete(root: Path, units: Container[str | None]) -> list[Path]:
-    """Remove what was being written for units when the service was killed; it is not readable.
+    """Remove the incomplete recordings of units after a crash of the service; return their folders.
 
     Recordings of other units are kept: another process may be writing them.
 
     Raises
     ------
     OSError
-        If the disk refuses.
+        If the disk cannot be read or written.
     """
     found = [
         path
@@ -90,7 +90,7 @@ def remove_incomplete(root: Path, units: Container[str | None]) -> list[Path]:
 
 
 def remove_recording(folder: Path) -> None:
-    """Remove a recording if it exists, manifest first: without one it is not a recording."""
+    """Remove a recording if it exists, manifest before data, so that no rest looks complete."""
     if folder.is_dir():
         for name in FILES:
             (folder / name).unlink(missing_ok=True)
@@ -98,12 +98,12 @@ def remove_recording(folder: Path) -> None:
 
 
 def finished(root: Path) -> Iterator[str]:
-    """Yield the names of finished recordings in a folder, including damaged ones.
+    """Yield the names of finished recordings in a folder, including damaged recordings.
 
     Raises
     ------
     OSError
-        If the disk refuses.
+        If the folder cannot be read.
     """
     if not root.is_dir():
         return
@@ -113,12 +113,12 @@ def finished(root: Path) -> Iterator[str]:
 
 
 def is_recording(folder: Path) -> bool:
-    """Return whether a folder holds a recording, or the rest of one, and nothing else.
+    """Return whether a folder contains files of a recording, all or some, and no other files.
 
     Raises
     ------
     OSError
-        If the disk refuses. A folder without the name of a recording may be inaccessible.
+        If the folder cannot be read; folders without a recording's name may be inaccessible.
     """
     try:
         names = {path.name for path in folder.iterdir()}
@@ -126,18 +126,18 @@ def is_recording(folder: Path) -> bool:
         return False
     except PermissionError:
         if unit_of(folder.name) is None:
-            return False  # such as lost+found
+            return False  # for example lost+found
         raise
     return bool(names & {MANIFEST, BLOCKS, SAMPLES}) and names <= set(FILES)
 
 
 def being_removed(root: Path) -> list[str]:
-    """Return the names of recordings whose removal has begun."""
+    """Return the names of recordings whose removal has begun but is not finished."""
     return sorted(p.name.removesuffix(REMOVED) for p in root.glob(f"*{REMOVED}") if p.is_dir())
 
 
 def begin_removal(folder: Path) -> None:
-    """Rename a recording that is to be removed: it is no longer listed."""
+    """Rename a recording to mark it as being removed; it is no longer listed."""
     folder.rename(_removed(folder))
 
 
@@ -147,23 +147,23 @@ def delete_files(folder: Path) -> None:
     Raises
     ------
     OSError
-        If the disk refuses.
+        If the disk cannot be read or written.
     """
     for name in FILES:
         (_removed(folder) / name).unlink(missing_ok=True)
 
 
 def finish_removal(folder: Path) -> Path | None:
-    """Remove the folder after `delete_files`.
+    """Remove the folder of a recording after `delete_files`.
 
     Returns
     -------
-    The renamed folder if it holds files that padwatch did not write, else None.
+    The renamed folder if it contains files of other programs, else None.
 
     Raises
     ------
     OSError
-        If the disk refuses.
+        If the folder cannot be removed.
     """
     removed = _removed(folder)
     names = {path.name for path in removed.iterdir()}
@@ -176,14 +176,14 @@ def finish_removal(folder: Path) -> Path | None:
 
 
 def set_aside(folder: Path) -> Path:
-    """Mark a recording as damaged by its name; return its new folder."""
+    """Rename a recording to mark it as damaged; return its new folder."""
     if folder.name.endswith(DAMAGED):
         return folder
     return folder.rename(_suffixed(folder, DAMAGED))
 
 
 def n_bytes_of(folder: Path) -> int:
-    """Return the size of those files of a recording that can be read."""
+    """Return the size in bytes of the readable files of a recording."""
     sizes = 0
     for name in FILES:
         try:
@@ -202,7 +202,7 @@ def place_of(data_folder: Path) -> str:
     Raises
     ------
     OSError
-        If the disk refuses.
+        If the disk cannot be read or written.
     """
     path = data_folder / PLACE_FILE
     try:
@@ -221,13 +221,13 @@ def _removed(folder: Path) -> Path:
 
 
 def _suffixed(folder: Path, suffix: str) -> Path:
-    """Return a free folder with a suffix, numbered before the suffix if necessary."""
+    """Return an unused folder with a suffix; add a number before the suffix if necessary."""
     free = _free(folder, suffix)
     return free.with_name(free.name + suffix)
 
 
 def _free(folder: Path, *suffixes: str) -> Path:
-    """Return a folder, numbered if necessary, that exists with none of the suffixes."""
+    """Return a path that does not exist with any of the suffixes; add a number if necessary."""
     names = (folder.name if n == 1 else f"{folder.name}-{n}" for n in count(1))
     return next(
         found

@@ -1,4 +1,4 @@
-"""Index of recordings, and the inspection of each."""
+"""Index of recordings, and inspection of recordings."""
 
 import errno
 import hashlib
@@ -23,7 +23,7 @@ ON_DISK = (WaveformState.PRESENT, WaveformState.DAMAGED)
 
 
 class Index:
-    """Entries of all recordings but removed ones; used by one thread."""
+    """Index of all recordings except removed recordings; for use in one thread."""
 
     def __init__(self, store: WaveformStore, place: str) -> None:
         self._store, self.place = store, place
@@ -31,7 +31,7 @@ class Index:
         self._removed: dict[Key, WaveformFile] = {}
 
     def get(self, kind: WaveformKind, name: str) -> WaveformFile | None:
-        """Return the entry of a recording."""
+        """Return the entry of a recording; None if it is not in the index."""
         return self._files.get((kind, name))
 
     def names(self, kind: WaveformKind) -> set[str]:
@@ -45,7 +45,7 @@ class Index:
 
     @property
     def whole(self) -> Sequence[WaveformFile]:
-        """Recordings on the disk that are not known to be damaged."""
+        """Recordings on the disk without a known fault."""
         return [f for f in self._files.values() if f.state is WaveformState.PRESENT]
 
     @property
@@ -59,40 +59,40 @@ class Index:
         Raises
         ------
         StoreError
-            If none was written.
+            If the store cannot be written; the index is unchanged.
         """
         found = {(file.kind, file.name): file for file in files}
         if found:
             self._store.put(list(found.values()))
             self._files |= found
             for key in found:
-                self._removed.pop(key, None)  # the name is in use reinspected
+                self._removed.pop(key, None)  # the name is in use again
 
     def remove(self, file: WaveformFile, reason: str, now_ns: int) -> None:
-        """Remove an entry; `store_removals` writes this to the store."""
+        """Remove an entry; `store_removals` writes the removal to the store."""
         gone = replace(file, state=WaveformState.REMOVED, reason=reason, changed_ns=now_ns)
         self._files.pop((file.kind, file.name), None)
         self._removed[file.kind, file.name] = gone
 
     def store_removals(self) -> None:
-        """Write removals to the store; after an error, the next call writes them.
+        """Write pending removals to the store; after an error they stay pending.
 
         Raises
         ------
         StoreError
-            If none was written.
+            If the store cannot be written.
         """
         if self._removed:
             self._store.put(list(self._removed.values()))
             self._removed.clear()
 
     def forget(self, before_ns: int) -> None:
-        """Delete old entries of recordings that are gone.
+        """Delete entries of recordings that were removed or missing before a time.
 
         Raises
         ------
         StoreError
-            If none was deleted.
+            If the store cannot be written; no entry is deleted.
         """
         self._store.forget(self.place, before_ns)
         self._files = {
@@ -106,16 +106,16 @@ DAMAGE_ERRORS = (
     *(errno.ENOENT, errno.EISDIR, errno.ENOTDIR),
     *(errno.ELOOP, errno.EINVAL, errno.EFBIG),
 )
-"""Errors that show damage of a recording; after all others a retry may succeed."""
+"""Error numbers that show damage of a recording; after other errors a retry may succeed."""
 
 
 def inspected(folder: Path, place: str, kind: WaveformKind, now_ns: int) -> WaveformFile:
-    """Read all of a recording and return its entry, with its fault if it is damaged.
+    """Read a recording completely and return its index entry, with the fault if it is damaged.
 
     Raises
     ------
     OSError
-        If the disk or the system refuses to read it now; the recording may be whole.
+        On an error of the disk or the system that does not prove damage of the recording.
     """
     entry = WaveformFile(
         place=place,
@@ -147,12 +147,12 @@ def inspected(folder: Path, place: str, kind: WaveformKind, now_ns: int) -> Wave
 
 
 def reinspected(known: WaveformFile, folder: Path, now_ns: int) -> WaveformFile:
-    """Read all of a known recording again and return its entry; a changed one is damaged.
+    """Read an indexed recording again and return its entry; a changed recording is damaged.
 
     Raises
     ------
     OSError
-        If the disk or the system refuses to read it now.
+        On an error of the disk or the system that does not prove damage of the recording.
     """
     found = inspected(folder, known.place, known.kind, now_ns)
     if found.state is WaveformState.PRESENT and found.checksum == known.checksum:
@@ -163,10 +163,10 @@ def reinspected(known: WaveformFile, folder: Path, now_ns: int) -> WaveformFile:
 
 
 def _raise_refusal(error: BaseException, folder: Path) -> None:
-    """Raise the cause of an error if it is one of the disk or the system, not damage.
+    """Raise the cause of an error if the disk or the system caused it, not damage.
 
-    The reader wraps such errors. An `OSError` without a number is one of the file format, for
-    which libraries use the same class.
+    The reader wraps such errors. An `OSError` without an error number reports a format error;
+    libraries use the same class for both.
     """
     cause: BaseException | None = error
     while cause is not None:
@@ -178,7 +178,7 @@ def _raise_refusal(error: BaseException, folder: Path) -> None:
 
 
 class RecordingState(StrEnum):
-    """Result of the check of one recording."""
+    """State of a recording found by a check."""
 
     SOUND = "sound"
     NOT_ENTERED = "not_entered"
@@ -189,7 +189,7 @@ class RecordingState(StrEnum):
 
 @dataclass(frozen=True)
 class CheckResult:
-    """Result of the check of one recording, with the reason if it is not sound."""
+    """Result of the check of a recording, with the reason if the recording is not sound."""
 
     kind: WaveformKind
     name: str
@@ -198,12 +198,19 @@ class CheckResult:
 
 
 class RecordingCheck:
-    """Check of all recordings in some folders.
+    """Check of all recordings in given folders against the index.
 
     Parameters
     ----------
+    roots
+        Folder of each kind of recordings.
     files
         Entries of the index.
+
+    Attributes
+    ----------
+    n_to_read
+        Number of recordings that the check reads.
     """
 
     def __init__(
@@ -220,12 +227,12 @@ class RecordingCheck:
         self.n_to_read = len(self._there)
 
     def results(self) -> Iterator[CheckResult]:
-        """Read one recording after the other.
+        """Read all recordings and yield the result of each.
 
         Raises
         ------
         OSError
-            If a disk refuses.
+            If a folder cannot be read.
         """
         for kind, name in self._there:
             yield self._read(kind, name)
@@ -245,7 +252,7 @@ class RecordingCheck:
                 found = inspected(folder, "", kind, self._now_ns)
             else:
                 found = reinspected(known, folder, self._now_ns)
-        except OSError as error:  # reported as damaged, so that it is examined
+        except OSError as error:  # reported as damaged, for attention
             reason = f"it cannot be read: {error.strerror}"
             return CheckResult(kind, name, RecordingState.DAMAGED, reason)
         if found.state is WaveformState.DAMAGED:
@@ -257,24 +264,24 @@ class RecordingCheck:
 
 
 RETRY_S = 60.0
-"""Time until a recording is read again after an error of the disk."""
+"""Delay in seconds before a recording is read again after an error of the disk."""
 
 
 class RetryList:
-    """Recordings that the disk or the system refused to read, with the time of the next try."""
+    """Recordings that could not be read because of the disk or the system, for a later retry."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._refused: dict[Key, tuple[float, OSError]] = {}
 
     def is_due(self, kind: WaveformKind, name: str) -> bool:
-        """Return whether a recording may be read now."""
+        """Return whether a recording may be read now: no failure, or the delay has passed."""
         tried = self._refused.get((kind, name))
         return tried is None or self._clock.monotonic_s() - tried[0] >= RETRY_S
 
     @contextmanager
     def noted(self, kind: WaveformKind, name: str) -> Iterator[None]:
-        """Add the recording if the body raises `OSError`, else remove it."""
+        """Add the recording to the list if the context raises `OSError`, else remove it."""
         try:
             yield
         except OSError as error:
@@ -284,10 +291,10 @@ class RetryList:
             self._refused.pop((kind, name), None)
 
     def keep(self, kind: WaveformKind, names: Collection[str]) -> None:
-        """Remove all other recordings of a kind."""
+        """Remove all recordings of a kind except the named recordings from the list."""
         self._refused = {k: v for k, v in self._refused.items() if k[0] != kind or k[1] in names}
 
     def raise_first(self) -> None:
-        """Raise the error of the recording that was refused first, if there is one."""
+        """Raise the error of the first recording in the list; do nothing if the list is empty."""
         for _, refusal in self._refused.values():
             raise refusal.with_traceback(None)

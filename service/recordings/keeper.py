@@ -1,4 +1,4 @@
-"""Loop that maintains the recordings of a data folder, in one process."""
+"""Background task that maintains the recordings of a data folder, in one process at a time."""
 
 import asyncio
 import fcntl
@@ -25,19 +25,19 @@ LOCK = "recordings.lock"
 
 
 class RecordingLock:
-    """File lock of the process that maintains the recordings; ends with the process."""
+    """File lock held by the process that maintains the recordings; released when it ends."""
 
     def __init__(self, data_folder: Path) -> None:
         self._path = data_folder / LOCK
         self._descriptor: int | None = None
 
     def acquire(self) -> bool:
-        """Return whether this process holds the lock; try again if it does not.
+        """Acquire the lock if it is free; return whether this process holds it.
 
         Raises
         ------
         OSError
-            If the folder cannot be written to.
+            If the lock file cannot be created.
         """
         if self._descriptor is not None:
             return True
@@ -61,26 +61,26 @@ class RecordingLock:
 LOOK_EVERY_S = 5.0
 
 SHARE = 0.02
-"""Maximum share of time for a run, however many recordings there are."""
+"""Maximum fraction of time spent in runs, regardless of the number of recordings."""
 
 MAX_LOOK_S = 600.0
-"""Maximum duration of a run: a large recording is read from end to end."""
+"""Maximum duration of a run in seconds; a run may read all of a large recording."""
 
 LASTING_S = 60.0
-"""Time for which runs must fail before an alarm is raised."""
+"""Time in seconds for which runs must fail before an alarm is raised."""
 
 
 class RecordingIndexer:
-    """Maintains the index and the folders of recordings while the service runs.
+    """Background task that maintains the index and the folders of recordings.
 
     Parameters
     ----------
     gauge
-        Measures the free space, in every process.
+        Measurement of the free space, which every process performs.
     open_retention
-        Creates the retention; called in the thread, again after an error.
+        Creates the retention; called in the thread, and called again if it raised an error.
     lock
-        Held by the one process that maintains the recordings.
+        Lock of the process that maintains the recordings.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class RecordingIndexer:
     n_files, n_bytes
         Number and size of the recordings on the disk, by kind.
     trouble
-        First error of the last run; None if there was none.
+        First error of the last run; None if the run succeeded.
     """
 
     def __init__(
@@ -111,17 +111,17 @@ class RecordingIndexer:
 
     @property
     def found(self) -> RetentionCounts:
-        """Counts since the start."""
+        """Counts of processed recordings since the start."""
         return self._retention.found if self._retention else RetentionCounts()
 
     @property
     def n_lost(self) -> int:
-        """Recordings that were found damaged or missing since the start."""
+        """Number of recordings found damaged or missing since the start."""
         return self.found.n_damaged + self.found.n_missing
 
     @property
     def lasting_trouble(self) -> str | None:
-        """Why recordings are not maintained, if that has lasted for a minute."""
+        """Reason why runs have failed for at least a minute; None otherwise."""
         lasts_s = self._clock.monotonic_s() - self._failing_since_s
         if self.trouble is None or lasts_s < LASTING_S:
             return None
@@ -148,10 +148,10 @@ class RecordingIndexer:
         self._lock.release()
 
     def look(self) -> None:
-        """Run once; in the thread."""
+        """Perform one run: measure the free space and maintain the recordings; in the thread."""
         errors = FirstError()
         with errors.deferred():
-            self._gauge.measure()  # first: the rest may take long, or fail
+            self._gauge.measure()  # first, as later steps may take long or fail
         with errors.deferred():
             if self._lock.acquire():
                 self._retention = self._retention or self._open_retention()

@@ -1,4 +1,4 @@
-"""Library of finished recordings, and a time window of one recording."""
+"""Library of finished recordings; reading of a time window of a recording."""
 
 import json
 import re
@@ -30,18 +30,18 @@ MAX_ALARM_BYTES = 1_000_000
 
 @dataclass(frozen=True)
 class RecordingEntry:
-    """A recording of the library.
+    """Entry of a recording in the library.
 
     Parameters
     ----------
     manifest
         Manifest; None if it cannot be read.
     fault
-        Why the recording is not served; None if it is.
+        Reason why the recording cannot be opened; None for a sound recording.
     alarms
-        Alarms that the recording was made for, as its file lists them.
+        Alarms that the recording was made for, as listed in its file ``alarm.json``.
     n_bytes
-        Size of all its files.
+        Size of all files of the recording.
     """
 
     name: str
@@ -53,14 +53,14 @@ class RecordingEntry:
 
 
 class RecordingLibrary:
-    """Finished recordings in some folders. All methods read the disk and belong in a thread.
+    """Library of finished recordings. All methods block on the disk: call them in a thread.
 
     Parameters
     ----------
     roots
-        Folders, which need not exist yet.
+        Folders that contain the recordings; they need not exist yet.
     faults
-        Faults of damaged recordings, by name; these are not opened.
+        Faults of damaged recordings, by name; damaged recordings are not opened.
     """
 
     def __init__(self, roots: Sequence[Path], faults: Mapping[str, str] | None = None) -> None:
@@ -69,7 +69,7 @@ class RecordingLibrary:
     def newest(
         self, limit: int, unit: str | None = None, kind: WaveformKind | None = None
     ) -> list[RecordingEntry]:
-        """Return the newest recordings of one unit or of all, newest first."""
+        """Return the newest recordings, optionally of one unit or one kind, newest first."""
         folders = [
             folder
             for folder in self._folders()
@@ -79,17 +79,17 @@ class RecordingLibrary:
         return [self._entry(folder) for folder in by_age[:limit]]
 
     def one(self, name: str) -> RecordingEntry | None:
-        """Return the recording of a name; None if it does not exist."""
+        """Return the recording with a name; None if it does not exist."""
         folder = self._folder(name)
         return None if folder is None else self._entry(folder)
 
     def opened(self, name: str) -> Recording:
-        """Open a recording after a check of all its files.
+        """Check all files of a recording and open it.
 
         Raises
         ------
         ConfigError
-            If it is damaged or does not exist.
+            If the recording is damaged or does not exist.
         """
         folder = self._folder(name)
         if folder is None:
@@ -121,7 +121,7 @@ class RecordingLibrary:
             yield from sink.taken()
 
     def _folder(self, name: str) -> Path | None:
-        """Return a folder that is in the list, so that no name leads out of the roots."""
+        """Return the listed folder with a name, so that no name leads out of the roots."""
         if _NAME.fullmatch(name) is None:
             return None
         return next((folder for folder in self._folders() if folder.name == name), None)
@@ -141,12 +141,12 @@ class RecordingLibrary:
 
 
 def kind_of(name: str) -> WaveformKind:
-    """Return the kind of a recording by its name."""
+    """Return the kind of a recording, determined from its name."""
     return WaveformKind.CONTINUOUS if _CONTINUOUS_NAME.search(name) else WaveformKind.CAPTURE
 
 
 def _age(folder: Path) -> tuple[str, str]:
-    """Return the time in the name: it needs no access to the disk for thousands of recordings."""
+    """Return the sort key of a recording by age, from its name without access to the disk."""
     found = _TIME.search(folder.name)
     return found[0] if found else "", folder.name
 
@@ -156,7 +156,7 @@ def _alarms(path: Path) -> list[Mapping[str, Any]]:
     try:
         with path.open("rb") as file:
             document = json.loads(file.read(MAX_ALARM_BYTES))
-        if document.get("checksum") not in (None, checksum_of(document)):  # absent in older files
+        if document.get("checksum") not in (None, checksum_of(document)):  # older files have none
             return []
         return [
             {key: each[key] for key in ("alarm", "occurrence", "change", "level", "time")}
@@ -175,9 +175,9 @@ class RecordingWindow:
     start_ns, stop_ns
         Start and end of the whole recording.
     blocks
-        Blocks of the window with the epoch of the first; empty in a gap.
+        Blocks in the window that have the epoch of its first block; empty in a gap.
     n_other
-        Number of blocks of later epochs in the window, which are left out.
+        Number of blocks of later epochs in the window, which are omitted.
     """
 
     start_ns: int

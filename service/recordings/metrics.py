@@ -12,7 +12,7 @@ from service.runtime.metrics import counter, gauge
 def recording_metrics(
     recorder: ContinuousRecorder | None, recordings: RecordingIndexer | None
 ) -> Iterator[Metric]:
-    """Yield the families of recorded and dropped samples, and of stored recordings."""
+    """Yield the metric families of recorded samples, dropped samples and stored recordings."""
     if recorder is not None:
         yield counter(
             "recording_samples",

@@ -1,4 +1,4 @@
-"""Motion of a shaft in its bearing, from newest samples or from a recording."""
+"""Motion of a shaft in its bearing (orbit), from the newest samples or from a recording."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,19 +19,21 @@ from service.live.samples import SampleWindow, sample_window
 from service.recordings.library import RecordingWindow, window_of
 
 MIN_MARKS = 3
-"""Minimum number of key-phase marks that a speed is computed from."""
+"""Minimum number of key-phase marks to compute a speed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Order1:
-    """Motion at running speed.
+    """1x component of the shaft motion.
 
     Parameters
     ----------
+    frequency_hz
+        Running speed in Hz.
     x_um, y_um
-        (n_samples,); NaN where too few neighbouring samples exist.
+        (n_samples,) displacement at running speed; NaN where too few neighbouring samples exist.
     ellipse
-        Orbit in the middle of the window.
+        1x orbit in the middle of the window.
     """
 
     frequency_hz: float
@@ -47,15 +49,15 @@ class ShaftMotion:
     Parameters
     ----------
     x_um, y_um
-        (n_samples,) along the bearing's axes, mean removed; NaN where a sample is missing.
+        (n_samples,) displacement along the bearing's axes, mean removed; NaN for missing samples.
     centre_um
-        Mean position in the clearance circle; None if unknown.
+        Mean (x, y) position of the shaft in the clearance circle; None if unknown.
     speed_rpm
-        Speed from the marks, else from the slow channel; None if unknown.
+        Speed from the key-phase marks, else from the slow channel; None if unknown.
     order1
-        Motion at running speed; None without a speed, or with too few samples.
+        1x component; None if the speed is unknown or the samples are too few.
     marks
-        Passages of the key-phase mark, in samples from the first; None without a key-phase.
+        Positions of the key-phase marks in samples from the first; None without a key phase.
     """
 
     window: SampleWindow
@@ -68,7 +70,7 @@ class ShaftMotion:
 
 
 def channels_for(unit: Unit, bearing: Bearing) -> list[str]:
-    """Return the waveform channels of the unit that the motion is computed from."""
+    """Return the ids of the waveform channels needed to compute the motion in a bearing."""
     wanted = (
         *(bearing.shaft_x, bearing.shaft_y, bearing.opposite_x, bearing.opposite_y),
         unit.key_phase,
@@ -77,7 +79,7 @@ def channels_for(unit: Unit, bearing: Bearing) -> list[str]:
 
 
 def motion_of(window: SampleWindow, unit: Unit, bearing: Bearing) -> ShaftMotion:
-    """Return the motion in a window that contains the shaft channels of the bearing."""
+    """Return the shaft motion in a sample window, which must contain the shaft channels."""
     channels = {channel.id: channel for channel in unit.channels}
     x_um, y_um = (
         _displacement(window, channels[id_]) for id_ in (bearing.shaft_x, bearing.shaft_y)
@@ -171,19 +173,19 @@ def _gap(window: SampleWindow, channel: Channel | None, slow_channel: str | None
 
 
 class NoMotionError(Exception):
-    """A recording lacks a channel or samples; the message states which."""
+    """Error raised if a recording lacks a channel or samples; the message states which."""
 
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """Motion at a time of a recording.
+    """Shaft motion in a time window of a recording.
 
     Parameters
     ----------
     offset_s
-        Start of the motion, from the first sample of the recording.
+        Start of the window, in seconds from the first sample of the recording.
     total_s
-        Duration of the recording including gaps.
+        Duration of the recording in seconds, including gaps.
     """
 
     motion: ShaftMotion
@@ -194,14 +196,14 @@ class RecordedMotion:
 def recorded_motion(
     recording: Recording, unit: Unit, bearing: Bearing, start_s: float, seconds: float
 ) -> RecordedMotion:
-    """Read the motion in a time window of a recording, with its calibration.
+    """Read the shaft motion in a time window of a recording, with the recorded calibration.
 
     Raises
     ------
     NoMotionError
-        If it lacks a shaft channel of the bearing, or samples in the window.
+        If the recording lacks a shaft channel of the bearing, or samples in the window.
     ConfigError
-        If it can no longer be read.
+        If the recording can no longer be read.
     """
     rows = _rows(recording.manifest, unit, bearing)
     window = window_of(recording, start_s, seconds)
@@ -234,7 +236,7 @@ def _rows(manifest: Manifest, unit: Unit, bearing: Bearing) -> Mapping[str, int]
 
 
 def _indices(window: RecordingWindow, start_s: float, seconds: float) -> tuple[int, int]:
-    """Return first index and number of the requested samples that exist."""
+    """Return sample index and number of samples of the window, limited to existing samples."""
     first, last = window.blocks[0], window.blocks[-1]
     from_ns = window.start_ns + ns_from_s(start_s)
     skipped = max(0, round(s_from_ns(from_ns - first.start_ns) * first.rate_hz))

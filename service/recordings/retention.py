@@ -1,4 +1,4 @@
-"""Retention of recordings: age, space, order of removal, and the check of what is stored."""
+"""Retention of recordings: limits of age and space, order of removal, and periodic checks."""
 
 import errno
 import os
@@ -27,24 +27,24 @@ from service.store.port import StoreError
 from service.store.waveforms import WaveformFile, WaveformKind, WaveformState
 
 TRUSTED_NS = DAY_NS
-"""Length of recordings after which the clock that they were made by is trusted."""
+"""Total duration of recordings after which the clock of their unit is trusted."""
 
 MAX_LENGTH_NS = 3600 * NS_PER_S
-"""Maximum length of a recording by the settings; a longer one shows a clock that was set."""
+"""Maximum duration of a recording in the settings; a longer duration indicates a clock step."""
 
 
 class AgeLimit:
     """Age limit of continuous recordings, by the clock of each unit.
 
-    A clock that was set forward must not make recordings old, so the newest time counts that a
-    day of recordings is not older than.
+    Age is counted from the newest time that is followed by a day of recordings, so that a forward
+    step of the clock does not make all recordings too old.
 
     Parameters
     ----------
     files
         All continuous recordings.
     keep_ns
-        Maximum age.
+        Maximum age in nanoseconds.
     """
 
     def __init__(self, files: Iterable[WaveformFile], now_ns: int, keep_ns: int) -> None:
@@ -56,17 +56,17 @@ class AgeLimit:
             for unit, of_unit in by_unit.items()
             if (trusted_ns := _trusted_ns(of_unit)) is not None
         }
-        # a recording whose unit is unreadable was found by the same clock as the others
+        # recordings with an unreadable unit have times by the same clock as the others
         self._newest_ns = max(self._since_ns.values(), default=None)
 
     def is_old(self, file: WaveformFile) -> bool:
-        """Return whether a recording exceeds the limit."""
+        """Return whether a recording exceeds the age limit."""
         since_ns = self._since_ns.get(file.unit) if file.unit else self._newest_ns
         return since_ns is not None and _time_ns(file) < since_ns
 
 
 def _trusted_ns(files: Iterable[WaveformFile]) -> int | None:
-    """Return the newest time that a day of recordings is not older than; None without a day."""
+    """Return the time since which a day of recordings exists; None for less than a day."""
     n_recorded_ns = 0
     for file in sorted(files, key=_time_ns, reverse=True):
         n_recorded_ns += min(max(file.stop_ns - file.start_ns, 0), MAX_LENGTH_NS)
@@ -81,7 +81,7 @@ def _time_ns(file: WaveformFile) -> int:
 
 @dataclass(frozen=True)
 class RoomLimits:
-    """Maximum size of all recordings of each kind, and maximum age of continuous ones."""
+    """Maximum total size of recordings of each kind, and maximum age of continuous recordings."""
 
     continuous_bytes: int = 100_000_000_000
     capture_bytes: int = 10_000_000_000
@@ -89,10 +89,10 @@ class RoomLimits:
 
 
 InUse = Callable[[], frozenset[str]]
-"""Returns the names of captures that evidence of an alarm refers to."""
+"""Function that returns the names of the captures that evidence of alarms refers to."""
 
 Remove = Callable[[WaveformFile, str], bool]
-"""Removes a recording for a reason; returns whether it is gone. If not, the next one follows."""
+"""Function (recording, reason) that removes a recording and returns whether this succeeded."""
 
 
 def make_room(
@@ -108,13 +108,13 @@ def make_room(
     Parameters
     ----------
     short_bytes
-        Space to free for continuous recordings, and the part of it that captures also free,
-        unless evidence refers to them.
+        Disk space to free, by kind. Captures are removed for it only if the removal of continuous
+        recordings frees too little, and never if evidence refers to them.
 
     Raises
     ------
     OSError
-        If captures in use cannot be determined; then only continuous recordings were removed.
+        If the captures in use cannot be determined; only continuous recordings are then removed.
     """
     by_age = sorted(files, key=lambda file: (file.stop_ns or file.changed_ns, file.name))
     continuous = [file for file in by_age if file.kind is WaveformKind.CONTINUOUS]
@@ -141,7 +141,7 @@ def make_room(
 def _remove_captures(
     by_age: Sequence[WaveformFile], over: int, short: int, in_use: frozenset[str], remove: Remove
 ) -> None:
-    """Remove captures but the newest; those in use last, and only because of their own limit."""
+    """Remove captures except the newest; captures in use last, and only beyond their size limit."""
     for file in sorted(by_age[:-1], key=lambda file: file.name in in_use):
         if over > 0:
             why = "captures exceed max_gb"
@@ -154,32 +154,36 @@ def _remove_captures(
 
 
 class FirstError:
-    """First error of several independent steps."""
+    """Collector of the first error of several independent steps."""
 
     def __init__(self) -> None:
         self.first: OSError | StoreError | None = None
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
-        """Catch an error of the disk or the store in the body."""
+        """Catch an error of the disk or the store in the context; keep the first error."""
         try:
             yield
         except (OSError, StoreError) as error:
             self.first = self.first or error
 
     def raise_first(self) -> None:
-        """Raise the first error, if there was one."""
+        """Raise the first error; do nothing if no error was caught."""
         if self.first is not None:
             raise self.first
 
 
 class SpaceGauge:
-    """Measurement of the free space for recordings.
+    """Measurement of the free disk space for recordings.
 
     Parameters
     ----------
     roots
         Folder of each kind of recordings.
+    space
+        Limits of the free space.
+    measure
+        Function that measures the space of the disk of a folder.
 
     Attributes
     ----------
@@ -197,7 +201,7 @@ class SpaceGauge:
         self.short_bytes = dict.fromkeys(WaveformKind, 0)
 
     def measure(self) -> None:
-        """Measure the disks; nothing is freed on a disk that cannot be measured.
+        """Measure the free space of all disks; 0 bytes are to be freed on an unreadable disk.
 
         Raises
         ------
@@ -212,7 +216,7 @@ class SpaceGauge:
                 wanted = limits.danger_below or 0.0
                 if kind is WaveformKind.CONTINUOUS:
                     self.is_full = space.free_share < wanted
-                    # more than the alarm requires, so that recordings never raise it
+                    # more than the disk alarm requires, so that recordings do not raise it
                     wanted = (limits.alert_below or 0.0) + limits.deadband
                 short[kind] = max(round(wanted * space.total_bytes) - space.free_bytes, 0)
         self.short_bytes = short
@@ -222,32 +226,32 @@ class SpaceGauge:
 log = structlog.get_logger()
 
 MAX_LOOK_S = 2.0
-"""Maximum time for new recordings in one run; the next run continues."""
+"""Maximum time in seconds to index new recordings in one run; the next run continues."""
 
 CHECK_SHARE = 0.02
-"""Share of time for reading recordings again."""
+"""Maximum fraction of time spent on checks of indexed recordings."""
 
 CHECK_EVERY_NS = DAY_NS
 
 REMEMBERED_NS = 90 * DAY_NS
-"""Time for which the index keeps entries of recordings that are gone."""
+"""Retention of index entries of removed and missing recordings."""
 
 
 @dataclass
 class RetentionCounts:
-    """Number of recordings by what happened to them since the start."""
+    """Numbers of recordings indexed, damaged, missing, checked and removed since the start."""
 
     n_adopted: int = 0
     n_damaged: int = 0
     n_missing: int = 0
     n_checked: int = 0
     n_removed: Counter[str] = field(default_factory=Counter)
-    """By kind."""
+    """Number of removed recordings by kind."""
 
 
 @dataclass(frozen=True)
 class RetentionRules:
-    """Folders of recordings, by kind, and the rules of their retention."""
+    """Rules of the retention of recordings, and the folder of each kind of recordings."""
 
     roots: Mapping[WaveformKind, Path]
     room: RoomLimits
@@ -256,9 +260,9 @@ class RetentionRules:
 
 
 class RecordingRetention:
-    """Keeps the index equal to the folders, which prevail, and removes recordings by the rules.
+    """Retention of recordings: updates the index from the folders, and removes recordings.
 
-    Each step runs even if others fail: space is made while nothing can be written.
+    Each step runs even if others fail: space is freed even if the index cannot be written.
     """
 
     def __init__(self, rules: RetentionRules, index: Index, clock: Clock) -> None:
@@ -278,12 +282,12 @@ class RecordingRetention:
         return self._index.faults
 
     def look(self) -> None:
-        """Run all steps once.
+        """Run all steps once: update the index, free space, check a recording.
 
         Raises
         ------
         OSError
-            If a disk refuses.
+            If a disk cannot be read or written.
         StoreError
             If the index cannot be written.
         """
@@ -369,7 +373,7 @@ class RecordingRetention:
     def _finish_removals(self, errors: FirstError) -> None:
         """Remove the folders of removed recordings.
 
-        Until the store has recorded the removal, the empty folder shows it to the next start.
+        Until the store has recorded a removal, the empty folder marks it for the next start.
         """
         self._index.store_removals()
         for root in self._rules.roots.values():
@@ -382,7 +386,7 @@ class RecordingRetention:
                             log.warning(words, folder=left.name)
 
     def _check_one(self) -> None:
-        """Read the recording whose check is the longest ago, in a small share of the time."""
+        """Check the recording with the oldest check, within the fraction of time for checks."""
         start_s = self._clock.monotonic_s()
         due = (f for f in self._index.whole if self._retry.is_due(f.kind, f.name))
         file = min(due, key=lambda file: file.checked_ns, default=None)
@@ -396,12 +400,12 @@ class RecordingRetention:
         self._check_from_s = start_s + taken_s / CHECK_SHARE
 
     def check(self, file: WaveformFile) -> WaveformFile:
-        """Read all of a recording again; return its new entry.
+        """Read a recording completely again; return its new index entry.
 
         Raises
         ------
         OSError
-            If the disk refuses, or the folder is absent; the recording may be whole.
+            If the folder is missing, or on an error of the disk that does not prove damage.
         StoreError
             If the index cannot be written.
         """

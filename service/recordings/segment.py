@@ -1,4 +1,4 @@
-"""Recordings on their way to the disk: captures of alarms, and segments in synced parts."""
+"""Writing of recordings: captures of alarms, and segments of continuous recordings."""
 
 import asyncio
 import json
@@ -35,20 +35,24 @@ from service.runtime.files import sync_folder, write_synced
 from service.runtime.times import rfc3339
 
 MakeWriter = Callable[[Path, str], RecordingWriter]
-"""Opens a recording of a unit, given its folder and the program that makes it."""
+"""Function (folder, made_by) that opens a recording of a unit."""
 
 
 class CaptureError(Exception):
-    """A capture cannot be written; the message states which and why."""
+    """Error raised if a capture cannot be written; the message states the alarm and the reason."""
 
 
 class CaptureFile:
-    """A recording with the alarms that it was made for; it exists whole or not at all.
+    """File of a capture: a recording and its alarms, written atomically.
 
     Attributes
     ----------
+    folder
+        Folder of the capture; None until the first write.
     finished
-        Its folder once it is complete.
+        Folder of the capture; None until it is complete.
+    is_closed
+        Whether the capture is finished or abandoned.
     """
 
     def __init__(self, root: Path, event: AlarmEvent, make_writer: MakeWriter) -> None:
@@ -64,7 +68,7 @@ class CaptureFile:
         Raises
         ------
         CaptureError
-            If that fails; then the capture is removed and closed.
+            If writing fails; the capture is then removed and closed.
         """
         if self.is_closed:
             return
@@ -76,12 +80,12 @@ class CaptureFile:
             raise self.abandon(str(error)) from error
 
     def finish(self, alarms: Sequence[AlarmEvent]) -> None:
-        """Sync it to the disk with its alarms, and give it its final name.
+        """Write the alarms, sync the capture to the disk, and rename it to its final name.
 
         Raises
         ------
         CaptureError
-            As `write` does.
+            If writing fails; the capture is then removed and closed.
         """
         writer, folder = self._writer, self.folder
         if writer is None or folder is None or self.is_closed:
@@ -94,7 +98,7 @@ class CaptureFile:
         self.is_closed, self.finished = True, folder
 
     def abandon(self, reason: str) -> CaptureError:
-        """Close it and remove what was written; return the error to raise."""
+        """Close and remove the capture; return the error to raise."""
         self.is_closed = True
         if self._writer is not None and self.folder is not None:
             with suppress(OSError):
@@ -114,7 +118,7 @@ class CaptureFile:
 
 
 def write_alarms(path: Path, alarms: Sequence[AlarmEvent]) -> None:
-    """Write alarms with a checksum, as JSON that is synced to the disk."""
+    """Write alarm events to a JSON file with a checksum, and sync it to the disk."""
     document: dict[str, object] = {"alarms": [_alarm(event) for event in alarms]}
     text = json.dumps(document | {"checksum": checksum_of(document)}, indent=1) + "\n"
     write_synced(path, text.encode())
@@ -136,15 +140,15 @@ def _alarm(event: AlarmEvent) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class SegmentSettings:
-    """Lengths of the pieces of a continuous recording.
+    """Durations of the segments and parts of a continuous recording, in seconds.
 
     Parameters
     ----------
     segment_s
-        Length of a finished recording.
+        Duration of a segment, which becomes one recording.
     part_s
-        Length of a part that is synced to the disk; a kill costs at most the open part and what
-        is queued.
+        Duration of a part, which is synced to the disk; a crash loses at most the open part and
+        the queued blocks.
     """
 
     segment_s: float = 600.0
@@ -155,20 +159,20 @@ MAX_PARTS = 10_000
 
 
 class Segment:
-    """A segment of continuous samples that is being written, in one thread.
+    """Segment of a continuous recording in progress; for use in one thread.
 
-    Each part is a finished recording, synced and renamed into place. The newest part is in memory
-    or incomplete. `join` makes one recording of all parts.
+    A segment consists of parts. Each finished part is a recording, synced and renamed into place.
+    The newest part is open: in memory or incomplete. `join` makes one recording of all parts.
 
     Parameters
     ----------
     first
-        Its first block, whose time determines the end of the segment.
+        First block of the segment; its time determines the end of the segment.
 
     Raises
     ------
     OSError
-        If the disk refuses.
+        If the folder of the parts cannot be created.
     """
 
     def __init__(
@@ -178,7 +182,7 @@ class Segment:
         self._is_decided = False
         self._length_ns = ns_from_s(settings.segment_s)
         self._number = first.start_ns // self._length_ns
-        # a limit in case the time of the device stands still
+        # limit in case the time stamps of the device stop
         self._max_samples = 2 * round(settings.segment_s * unit.rate_hz)
         self._n_samples = self._n_parts = 0
         self._writer: RecordingWriter | None = None
@@ -188,7 +192,7 @@ class Segment:
         sync_folder(root)
 
     def covers(self, block: SampleBlock) -> bool:
-        """Return whether a block belongs to it; all segments end at multiples of their length."""
+        """Return whether a block belongs to the segment, which ends at a multiple of its length."""
         return (
             block.start_ns // self._length_ns == self._number
             and self._n_samples < self._max_samples
@@ -197,7 +201,7 @@ class Segment:
 
     @property
     def n_unsynced(self) -> int:
-        """Samples per channel that a crash would cost."""
+        """Number of samples per channel in the open part, which a crash would lose."""
         return 0 if self._writer is None else self._writer.n_samples
 
     def write(self, block: SampleBlock, now_s: float) -> None:
@@ -206,7 +210,7 @@ class Segment:
         Raises
         ------
         ConfigError
-            If it does not fit, or the disk refuses.
+            If the block does not match the unit, or cannot be written.
         """
         if self._writer is None:
             made_by = f"padwatch {version('padwatch')}, continuous"
@@ -219,7 +223,7 @@ class Segment:
         self._n_samples += block.n_samples
 
     def is_due(self, now_s: float) -> bool:
-        """Return whether the open part is long enough or old enough."""
+        """Return whether the open part is to be finished because of its length or its age."""
         if self._writer is None:
             return False
         long_enough = self._writer.n_samples >= self._settings.part_s * self._unit.rate_hz
@@ -231,7 +235,7 @@ class Segment:
         Raises
         ------
         ConfigError
-            If the disk refuses; then the part is abandoned.
+            If the part cannot be written; it is then abandoned.
         """
         writer, self._writer = self._writer, None
         if writer is None or writer.n_samples == 0:
@@ -252,14 +256,14 @@ log = structlog.get_logger()
 
 
 def join(folder: Path) -> bool:
-    """Make one recording of the parts of a segment; return whether it exists.
+    """Join the parts of a segment to one recording; return whether the recording exists.
 
-    The function may be repeated after an interruption. An unreadable part is set aside.
+    The function can be repeated after an interruption. An unreadable part is marked as damaged.
 
     Raises
     ------
     ConfigError, OSError
-        If the disk refuses; then all parts still exist.
+        If the recording cannot be written; all parts then still exist.
     """
     parts = parts_folder(folder)
     remove_recording(incomplete_folder(folder))
@@ -272,9 +276,9 @@ def join(folder: Path) -> bool:
 
 
 def unjoined(root: Path, units: Container[str | None]) -> list[Path]:
-    """Return the segments of units that a crash left in parts, oldest first per unit.
+    """Return the segments of units that a crash left unjoined, oldest first per unit.
 
-    Segments of other units are left out: another process may be writing them.
+    Segments of other units are omitted: another process may be writing them.
     """
     found = sorted(path for path in root.glob(f"*{PARTS}") if unit_of(path.name) in units)
     return [path.with_name(path.name.removesuffix(PARTS)) for path in found if path.is_dir()]
@@ -311,7 +315,7 @@ def _remove_parts(parts: Path) -> None:
 
 
 class WriterThread:
-    """Base of the recorders: one thread for all writes, and a log entry when they fail or recover.
+    """Base class of recorders: a thread for all writes, and log entries on failure and recovery.
 
     Parameters
     ----------
@@ -321,7 +325,7 @@ class WriterThread:
     Attributes
     ----------
     error
-        Why the last write failed; None after a success.
+        Reason why the last write failed; None after a successful write.
     """
 
     def __init__(self, name: str, what: str, clock: Clock) -> None:

@@ -1,1 +1,1 @@
-"""Evidence of alarms: collected while measuring, kept in bundles, and shown as reports."""
+"""Evidence of alarms: collection during operation, storage in bundles, and reports."""

@@ -1,4 +1,4 @@
-"""Archive of evidence: the bundles of an alarm read back, as a document or as a ZIP file."""
+"""Archive of evidence: reads the bundles of an alarm, as documents or for a ZIP file."""
 
 import hashlib
 import json
@@ -35,7 +35,7 @@ PAGE = 1000
 """Number of events per query."""
 
 Occurrences = frozenset[tuple[str, int]]
-"""By alarm and number."""
+"""Set of occurrences, each as alarm id and number of the occurrence."""
 
 
 class EvidenceState(StrEnum):
@@ -59,7 +59,7 @@ class SamplesState(StrEnum):
 
 
 class DamagedEvidenceError(Exception):
-    """A bundle was changed or damaged; the message says which and how."""
+    """Error raised if a bundle was changed or damaged; the message states bundle and fault."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,10 @@ class Occurrence:
 
     Parameters
     ----------
+    event
+        Event that raised or escalated the alarm.
     place
-        Place of its bundle; None unless complete.
+        Location of the bundle; None unless the bundle is complete.
     """
 
     event: AlarmEvent
@@ -78,14 +80,14 @@ class Occurrence:
 
 
 class EvidenceArchive:
-    """Archive of bundles; its methods block and must be called in a thread."""
+    """Archive of evidence bundles. Its methods block: call them in a thread."""
 
     def __init__(self, folders: EvidenceFolders, store: Store) -> None:
         self.folders, self._store = folders, store
 
     @property
     def films(self) -> FilmStore:
-        """Stored readings of films."""
+        """Store of the readings of films."""
         return self._store.films
 
     def occurrences(self, alarm: str, pending: Occurrences, most: int) -> list[Occurrence]:
@@ -94,7 +96,7 @@ class EvidenceArchive:
         Parameters
         ----------
         pending
-            Occurrences whose bundles are still to be written, read before this call.
+            Occurrences whose bundles are still to be written, determined before this call.
 
         Raises
         ------
@@ -106,7 +108,7 @@ class EvidenceArchive:
         return self._with_bundles(alarm, found, pending)
 
     def occurrence(self, alarm: str, number: int, pending: Occurrences) -> Occurrence | None:
-        """Return one occurrence; None if it does not exist.
+        """Return an occurrence of an alarm; None if it does not exist.
 
         Raises
         ------
@@ -121,19 +123,19 @@ class EvidenceArchive:
         return None
 
     def events(self, alarm: str) -> Iterator[AlarmEvent]:
-        """Yield all events of an alarm, newest first, reading them on demand."""
+        """Yield all events of an alarm, newest first; they are read page by page on demand."""
         before = AlarmQuery().before
         while page := self._store.alarm_events(AlarmQuery(before, PAGE, alarm=alarm)):
             yield from (stored.event for stored in page)
             before = page[-1].id
 
     def document(self, place: Place) -> Evidence:
-        """Return the document of a bundle.
+        """Read the document of a bundle and verify its checksum.
 
         Raises
         ------
         DamagedEvidenceError
-            If it was changed or damaged.
+            If the document was changed or damaged.
         """
         try:
             text = (place.folder / DOCUMENT).read_bytes()
@@ -151,7 +153,7 @@ class EvidenceArchive:
         Parameters
         ----------
         capturing
-            Occurrences that are still being recorded, read before this call.
+            Occurrences whose samples are still being recorded, determined before this call.
         """
         name = (found.event.identity.id, found.event.occurrence)
         capture = None if found.place is None else linked(found.place.folder)
@@ -168,7 +170,7 @@ class EvidenceArchive:
         return SamplesState.LOST if was_kept else SamplesState.NONE
 
     def configuration(self, version: str) -> Path | None:
-        """Return the file of a configuration; None if it does not exist."""
+        """Return the path of the file of a configuration; None if it does not exist."""
         path = self.folders.configurations / f"{version}.json"
         return path if path.is_file() else None
 
@@ -203,7 +205,7 @@ class EvidenceArchive:
 
 
 def capture_folder(place: Place, capture: CapturePart) -> Path | None:
-    """Return the folder of the samples; None if they no longer exist."""
+    """Return the folder of the recording that a bundle links to; None if it no longer exists."""
     if capture.folder is None or capture.manifest is None:
         return None
     folder = place.folder / capture.folder
@@ -211,7 +213,7 @@ def capture_folder(place: Place, capture: CapturePart) -> Path | None:
 
 
 def _of_event(event: AlarmEvent, found: Sequence[Place]) -> Place | None:
-    """Return the bundle of an event: that with its time, if there are several."""
+    """Return the bundle with the time of an event, else the newest bundle; None without bundles."""
     moment = compact(event.time_ns)
     return max(found, key=lambda each: (each.moment == moment, each.moment), default=None)
 
@@ -236,17 +238,19 @@ samples/                that recording: padwatch recording info|verify|export re
 def bundle_files(
     archive: EvidenceArchive, found: Occurrence, page: str, has_configuration: bool
 ) -> Mapping[str, Path | bytes]:
-    """Return the files of a bundle by their names in a ZIP file.
+    """Return the files of a bundle by their names in a ZIP file, as paths or content.
 
     Parameters
     ----------
+    page
+        Report of the occurrence, HTML.
     has_configuration
-        Whether to include the settings of the whole plant.
+        Whether to include the configuration of the whole plant.
 
     Raises
     ------
     DamagedEvidenceError, LookupError
-        If it cannot be read, or does not exist.
+        If the bundle cannot be read, or does not exist.
     """
     if found.place is None:
         raise LookupError("the bundle does not exist")

@@ -1,4 +1,4 @@
-"""Data of a report: a bundle, and later events and readings."""
+"""Data of a report: the bundle of an occurrence, and events and readings after it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,16 +15,18 @@ from service.store.film_readings import FilmQuery
 
 @dataclass(frozen=True)
 class Case:
-    """Occurrence with its bundle, and later data.
+    """Data of a report: the bundle of an occurrence of an alarm, and later data.
 
     Parameters
     ----------
     spectra, orbits, before
-        Tables of the bundle; empty if missing.
+        Tables of spectra, orbits and readings of the film in the bundle; empty if missing.
     after
-        Later readings of the film, from the store.
+        Readings of the film after the alarm, from the store.
     events
         Events of the occurrence, oldest first.
+    samples
+        State of the samples around the alarm.
     """
 
     evidence: Evidence
@@ -37,7 +39,7 @@ class Case:
 
     @property
     def bearing(self) -> BearingPart | None:
-        """Bearing of the alarm."""
+        """Bearing of the alarm; None if the alarm concerns no bearing."""
         found = (b for b in self.evidence.bearings if b.bearing == self.evidence.bearing)
         return next(found, None)
 
@@ -48,7 +50,7 @@ class Case:
 
     @property
     def comparison(self) -> ComparisonPart | None:
-        """Film in that direction."""
+        """Comparison of the film in `direction` with its baseline; None if there is none."""
         found = (c for c in self.evidence.comparisons if c.direction == self.direction)
         return next(found, None)
 
@@ -56,14 +58,14 @@ class Case:
 def read_case(
     archive: EvidenceArchive, found: Occurrence, samples: SamplesState, trend_days: float
 ) -> Case:
-    """Read the data of a report.
+    """Read the data of a report; readings of the film up to `trend_days` after the alarm.
 
     Raises
     ------
     DamagedEvidenceError, TableError
         If the bundle cannot be read.
     LookupError
-        If there is none.
+        If the bundle does not exist.
     StoreError
         If the store cannot be read.
     """

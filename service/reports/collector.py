@@ -1,4 +1,4 @@
-"""Collector of evidence: writes a bundle for every occurrence of an alarm in the background."""
+"""Evidence collector: writes a bundle for each occurrence of an alarm in the background."""
 
 import asyncio
 import os
@@ -36,10 +36,10 @@ log = structlog.get_logger()
 RETRY_S = 10.0
 
 MAX_BUSY_S = 300.0
-"""Maximum time to write one bundle, or to survey all of them."""
+"""Maximum time in seconds to write a bundle, or to survey all bundles."""
 
 MAX_PENDING = 200
-"""Maximum number of waiting snapshots; each keeps a few hundred kilobytes in memory."""
+"""Maximum number of queued snapshots; each takes a few hundred kilobytes of memory."""
 
 STORE_ATTEMPTS = 5
 """Number of attempts after which a bundle is written without data from the store."""
@@ -55,14 +55,14 @@ class EvidenceFolders:
 
 
 class EvidenceCollector:
-    """Takes snapshots on the event loop, and writes them in its own thread, oldest first.
+    """Collector of evidence: takes snapshots on the event loop, and writes them in its thread.
 
     Attributes
     ----------
     error
         Error of the last attempt to write; None if it succeeded.
     n_written, n_failed, n_lost
-        Numbers of bundles written, failed attempts, and occurrences given up since the start.
+        Numbers of written bundles, failed attempts and abandoned occurrences since the start.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class EvidenceCollector:
 
     @property
     def status(self) -> EvidenceStatus:
-        """Status of the evidence, for display."""
+        """Status of the collector, for display."""
         return EvidenceStatus(self.error, self.n_pending, self.n_written, self.n_lost)
 
     @property
@@ -96,31 +96,31 @@ class EvidenceCollector:
         return len(self._pending)
 
     def see(self, news: Sequence[AlarmNews]) -> None:
-        """Take snapshots of alarms that are raised or rise in level."""
+        """Take a snapshot for each alarm that is raised or escalated."""
         for each in news:
             for event in each.events:
                 if event.change in ANNOUNCED:
                     self._take(event)
 
     def captured(self, outcome: Outcome) -> None:
-        """Queue the result of recording samples around alarms."""
+        """Queue the outcome of a capture, to link bundles to it."""
         self._outcomes.append(outcome)
         self._news.set()
 
     @property
     def pending(self) -> frozenset[tuple[str, int]]:
-        """Alarms and occurrences whose bundles are still to be written."""
+        """Alarm id and occurrence of each bundle that is still to be written."""
         return frozenset((s.event.identity.id, s.event.occurrence) for s in self._pending)
 
     @property
     def capturing(self) -> frozenset[tuple[str, int]]:
-        """Alarms and occurrences whose samples are still to be recorded or linked."""
+        """Alarm id and occurrence of each capture that is still to be recorded or linked."""
         ended = (event for outcome in self._outcomes for event in outcome.alarms)
         linking = frozenset((event.identity.id, event.occurrence) for event in ended)
         return self._captures.being_made | linking
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Write bundles forever; call `close` afterwards."""
+        """Write bundles until cancelled; call `close` afterwards."""
         pulse.beat(MAX_BUSY_S)
         await self._trying(self._begin)
         await self._trying(self._make_room)
@@ -136,7 +136,7 @@ class EvidenceCollector:
             await self._trying(self._make_room)
 
     async def close(self) -> None:
-        """Write pending bundles with one attempt each, and end the thread."""
+        """Write pending bundles until the first failure, and stop the thread."""
         while self._pending or self._outcomes:
             if not await self._write_one():
                 break
@@ -154,7 +154,7 @@ class EvidenceCollector:
         self._news.set()
 
     async def _write_one(self) -> bool:
-        """Write the oldest bundle; links to samples follow, since they are written to bundles."""
+        """Write the oldest pending bundle, else the oldest link; return whether it succeeded."""
         if self._pending:
             snapshot = self._pending[0]
             with_history = self._n_store_attempts < STORE_ATTEMPTS
@@ -176,7 +176,7 @@ class EvidenceCollector:
         self.n_written += 1
 
     def _link(self, outcome: Outcome) -> None:
-        """Link all bundles of a capture to it; runs in the thread."""
+        """Write the links from bundles to their capture; runs in the thread."""
         for event in outcome.alarms:
             place = place_of(self._folders.evidence, event)
             if not place.folder.is_dir():
@@ -188,7 +188,7 @@ class EvidenceCollector:
             self._room.note(place)
 
     def _begin(self) -> None:
-        """Write the configuration, remove and link what a crash left; runs in the thread."""
+        """Write the configuration, remove unfinished bundles, add missing links; in the thread."""
         keep_configuration(self._folders.configurations, self.configuration)
         note_beginning(self._folders.evidence, self._clock.now_ns())
         for folder in clear_leftovers(self._folders.evidence):
@@ -200,7 +200,7 @@ class EvidenceCollector:
             log.info("evidence is removed to free space", folder=name)
 
     async def _trying(self, do: Callable[[], None]) -> bool:
-        """Run a function in the thread; return whether the disk and the store permitted it."""
+        """Run a function in the thread; return whether it raised no error of disk or store."""
         try:
             await asyncio.get_running_loop().run_in_executor(self._thread, do)
         except StoreError as error:
@@ -223,12 +223,12 @@ class EvidenceCollector:
 
 
 def keep_configuration(folder: Path, configuration: Configuration) -> None:
-    """Write a configuration to a file named by its version, unless it exists.
+    """Write a configuration to a file named by its version, unless the file exists.
 
     Raises
     ------
     OSError
-        If the disk refuses.
+        If the file cannot be written.
     """
     path = folder / f"{configuration.version}.json"
     if path.exists() and path.read_bytes() == configuration.text:

@@ -1,4 +1,4 @@
-"""Content of a document: results of bearings, and what films were compared with."""
+"""Content of an evidence document: results of bearings, and comparisons with baselines."""
 
 import math
 from collections.abc import Iterator
@@ -57,7 +57,7 @@ LEVEL_WORDS: dict[Level, QualityWord] = {
 
 
 def bearing_part(found: Assessment, film: FilmNews | None, rules: FilmRules | None) -> BearingPart:
-    """Return the state of one bearing."""
+    """Return the part of the document about one bearing."""
     watched = None if rules is None else rules.estimators.get(found.bearing)
     return BearingPart(
         bearing=found.bearing,
@@ -74,7 +74,7 @@ def bearing_part(found: Assessment, film: FilmNews | None, rules: FilmRules | No
 
 
 def reading_part(name: str, reading: Reading) -> ReadingPart:
-    """Return one reading of the catalogue."""
+    """Return the part of the document about one reading of the catalogue."""
     return ReadingPart(
         value=finite(reading.value),
         unit=BY_NAME[name].unit,
@@ -87,7 +87,7 @@ def reading_part(name: str, reading: Reading) -> ReadingPart:
 
 
 def cell_bounds(cell: Cell | None, grid: CellGrid | None) -> list[tuple[float, float]] | None:
-    """Return the limits of a cell along each axis."""
+    """Return the limits of a cell along each axis, (low, high); None if the cell is unknown."""
     if cell is None or grid is None:
         return None
     widths = (grid.eccentricity_width, grid.temperature_width_c, grid.attitude_width_deg)
@@ -176,12 +176,12 @@ MAX_MEMBERS = 2000
 
 @dataclass(frozen=True)
 class Members:
-    """Settled readings of a cell in the learning period, both directions."""
+    """Settled readings of a cell in the learning period of the baseline, in both directions."""
 
     history: StiffnessHistory
 
     def part(self, direction: Direction) -> MembersPart:
-        """Return the readings of one direction, spread evenly if they are many."""
+        """Return the readings of one direction; of many readings, an evenly spaced selection."""
         row, found = AXES.index(direction), self.history
         measured = np.flatnonzero(np.isfinite(found.ln_k[row]))
         step = max(1, -(-measured.size // MAX_MEMBERS))
@@ -208,7 +208,7 @@ class Members:
 def members_of(
     store: FilmStore, cell: Cell, baseline: BearingBaseline, rules: FilmRules
 ) -> Members:
-    """Return the readings of a cell.
+    """Return the settled readings of a cell in the learning period, except those with an alarm.
 
     Raises
     ------
@@ -239,24 +239,24 @@ def members_of(
 
 
 N_EXPECTED = 60
-"""Number of points of the line of expected stiffness."""
+"""Number of points of the curve of expected stiffness."""
 
 
 def comparisons(
     news: FilmNews, baseline: BearingBaseline | None, rules: FilmRules, members: Members | None
 ) -> list[ComparisonPart]:
-    """Return the comparisons of both directions of a bearing's film.
+    """Return the comparisons of the film of a bearing with its baseline, for both directions.
 
     Parameters
     ----------
     members
-        Readings of the cell; None if they are unreadable.
+        Readings of the cell; None if the store is unreadable or the cell is unknown.
     """
     return [_comparison(news, axis, baseline, rules, members) for axis in AXES]
 
 
 def cell_of(news: FilmNews, rules: FilmRules) -> Cell | None:
-    """Return the cell of a reading; None if its condition is unknown."""
+    """Return the cell of a film reading; None if its operating condition is unknown."""
     here = news.reading.conditions
     if not rules.grid.is_known(here)[0]:
         return None
@@ -301,7 +301,7 @@ def _own_cell(learned: QuantityBaseline, cell: Cell) -> CellStatistics | None:
 
 
 def _expected_at(learned: QuantityBaseline, conditions: FilmConditions) -> list[float]:
-    """Return the expected stiffness at each condition; NaN if unknown."""
+    """Return the expected stiffness under each operating condition, in N/m; NaN if unknown."""
     place = learned.table.find(learned.grid.cells(conditions))
     known = learned.is_known(conditions) & (place >= 0)
     nothing = np.full(len(conditions), np.nan)
@@ -311,7 +311,7 @@ def _expected_at(learned: QuantityBaseline, conditions: FilmConditions) -> list[
 
 
 def _line(learned: QuantityBaseline, news: FilmNews) -> ExpectedPart | None:
-    """Return the expected stiffness by eccentricity at the oil temperature of the reading."""
+    """Return expected stiffness against eccentricity at the oil temperature of the reading."""
     seen = [cell.cell[0] for cell in learned.table.cells]
     here, width = news.reading, learned.grid.eccentricity_width
     if not seen or not math.isfinite(here.oil_temperature_c):
@@ -354,7 +354,7 @@ def _time_scales(
     decision: Decision, learned: QuantityBaseline, rules: FilmRules
 ) -> Iterator[TimeScalePart]:
     if len(decision.evidence.scales) != len(learned.time_scatter):
-        return  # the evidence was not gathered with this baseline
+        return  # the averages belong to a baseline with other time scales
     for found in decision.evidence.findings(learned):
         yield TimeScalePart(
             time_scale_h=found.time_scale_h,

@@ -1,4 +1,4 @@
-"""Document of a bundle, strict and versioned, and its composition from a snapshot."""
+"""Evidence document of a bundle, strict and versioned, and its composition from a snapshot."""
 
 import hashlib
 from dataclasses import dataclass
@@ -33,10 +33,10 @@ VERSION = 1
 
 
 class AlarmPart(EvidencePart):
-    """Alarm, and the event that began this occurrence."""
+    """Alarm, and the event that began this occurrence of the alarm."""
 
     id: Annotated[str, Field(examples=["U1:UJB:stiffness_x"])]
-    """Identifier."""
+    """Identifier of the alarm."""
 
     unit: Annotated[str, Field(examples=["U1"])]
     """Unit; "plant" for alarms about the service itself."""
@@ -48,67 +48,67 @@ class AlarmPart(EvidencePart):
     """Kind of alarm."""
 
     occurrence: int
-    """Number of times that the alarm was raised or rose in level."""
+    """Number of the occurrence, which counts how often the alarm was raised or escalated."""
 
     change: Annotated[str, Field(examples=["raised"])]
     """Change of the alarm: raised or escalated."""
 
     level: LevelWord | None
-    """Level after the event."""
+    """Alarm level after the event."""
 
     state: Annotated[str, Field(examples=["unacknowledged"])]
-    """State after the event."""
+    """State of the alarm after the event."""
 
     time: Moment
     """Time of the event."""
 
     time_ns: int
-    """Time of the event, nanoseconds since 1970 UTC."""
+    """Time of the event, in nanoseconds since 1970 UTC."""
 
     value: float | None
-    """Value compared with the limit; of a change of a film, in ln."""
+    """Value compared with the limit; for film alarms the stiffness change, in ln."""
 
     limit: float | None
-    """Limit."""
+    """Limit of the alarm."""
 
     value_unit: str | None
-    """Unit of value and limit."""
+    """Unit of measurement of value and limit."""
 
     reason: Annotated[str, Field(examples=["film"])]
-    """Reason in a word."""
+    """Reason of the event, as a single word."""
 
 
 class UnitPart(EvidencePart):
-    """Unit at the time of the alarm."""
+    """Generating unit at the time of the alarm."""
 
     id: Annotated[str, Field(examples=["U1"])]
-    """Identifier."""
+    """Identifier of the unit."""
 
     name: str
-    """Name, or empty."""
+    """Name of the unit; may be empty."""
 
     link: Annotated[str, Field(examples=["connected"])]
-    """State of the link to the samples."""
+    """State of the link to the source of the samples."""
 
     link_reason: str | None
-    """Reason for that state."""
+    """Reason for the state of the link."""
 
     last_sample: Moment | None
     """Time of the newest sample by the device's clock."""
 
 
 class FilePart(EvidencePart):
-    """File of the bundle."""
+    """Size and checksum of a file."""
 
     size: int
     """Size in bytes."""
 
     sha256: Sha256
-    """SHA-256 of its content."""
+    """SHA-256 of the content of the file."""
 
 
 class Evidence(EvidencePart):
-    """State of a unit when an alarm was raised, or rose in level."""
+    """Evidence document: state of a unit when an alarm was raised or escalated."""
 
     format: Literal["padwatch-evidence"]
     """Name of the format."""
@@ -117,7 +117,7 @@ class Evidence(EvidencePart):
     """Version of the format."""
 
     made_by: Annotated[str, Field(examples=["padwatch 0.1.0"])]
-    """Program and its version."""
+    """Program that wrote the document, with its version."""
 
     origin: Literal["live", "replay"]
     """Origin of the data: a live machine, or a replayed recording."""
@@ -129,44 +129,44 @@ class Evidence(EvidencePart):
     """Host time at which the state was recorded."""
 
     configuration: Sha256
-    """Version of the configuration, which names its file."""
+    """Version of the configuration, a hash that is also the name of its file."""
 
     alarm: AlarmPart
-    """Alarm."""
+    """Alarm, and the event that began this occurrence."""
 
     unit: UnitPart | None
-    """Unit; null for alarms about the service itself."""
+    """Generating unit; null for alarms about the service itself."""
 
     bearing: str | None
-    """Bearing of the alarm, if any."""
+    """Identifier of the bearing of the alarm; null if the alarm concerns no bearing."""
 
     direction: Direction | None
-    """Direction of the alarm, if any."""
+    """Direction of the alarm; null if the alarm has no direction."""
 
     bearings: list[BearingPart]
-    """All bearings of the unit, that of the alarm first."""
+    """All bearings of the unit; the bearing of the alarm comes first."""
 
     comparisons: list[ComparisonPart]
-    """Comparisons of the films of the alarm's bearing."""
+    """Comparisons of the films of the alarm's bearing with their baselines."""
 
     limits: dict[str, Any]
-    """Settings in force, as in the plant file: of alarms, films, analysis and the bearing."""
+    """Settings in force, as in the plant file: alarms, films, analysis and the bearing."""
 
     missing: list[str]
-    """Missing data, in sentences."""
+    """Sentences about missing data."""
 
     samples_expected: bool
-    """Whether the samples around the alarm were going to be kept."""
+    """Whether the samples around the alarm were to be recorded."""
 
     files: dict[str, FilePart]
-    """Other files of the bundle, except those added later."""
+    """Other files of the bundle by name, except files added after the document."""
 
     sha256: Sha256
     """SHA-256 of this document without this key: keys sorted, no spaces, UTF-8."""
 
 
 def file_part(path: Path) -> FilePart:
-    """Return size and hash of a file."""
+    """Return size and checksum of a file."""
     hashed, size = hashlib.sha256(), 0
     with path.open("rb") as file:
         while chunk := file.read(CHUNK):
@@ -177,12 +177,14 @@ def file_part(path: Path) -> FilePart:
 
 @dataclass(frozen=True)
 class Maker:
-    """Origin of bundles.
+    """Origin of a bundle: plant, configuration and program.
 
     Parameters
     ----------
     made_by
-        Program and its version, without the host and its user.
+        Program and its version; for privacy without the host and its user.
+    origin
+        Origin of the data: a live machine or a replayed recording.
     """
 
     plant: PlantFile
@@ -192,7 +194,7 @@ class Maker:
 
 
 def sealed(document: dict[str, Any]) -> bytes:
-    """Return the content of a document file, with the hash of the rest."""
+    """Return the JSON text of a document, with the SHA-256 of its other keys added."""
     blank = Evidence(**document, sha256="0" * 64)
     content = blank.model_dump(mode="json", by_alias=True)
     content.pop("sha256")
@@ -201,7 +203,7 @@ def sealed(document: dict[str, Any]) -> bytes:
 
 
 def composed(snapshot: Snapshot, maker: Maker) -> dict[str, Any]:
-    """Return the fields of a document that need neither store nor disk."""
+    """Return the fields of a document that need neither store nor disk, from a snapshot."""
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -284,7 +286,7 @@ def _limits(snapshot: Snapshot, plant: PlantFile, rules: FilmRules | None) -> di
 
 
 def not_known(snapshot: Snapshot) -> list[str]:
-    """Return sentences about data that were unknown at the time of the alarm."""
+    """Return sentences about data that were not available at the time of the alarm."""
     own: BearingSnapshot | None = snapshot.bearings.get(snapshot.bearing or "")
     found = [
         f"bearing {each} had no result yet"

@@ -1,4 +1,4 @@
-"""Figures of a report."""
+"""Figures of a report: trend, condition, baseline map, spectra and orbit."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -15,20 +15,20 @@ from service.reports.tables import Columns
 
 @dataclass(frozen=True)
 class Figure:
-    """Plot with a caption."""
+    """Figure of a report: a plot with a caption."""
 
     plot: Plot
     sentence: str
 
     @property
     def html(self) -> str:
-        """HTML of both, with a proportional width, so that font sizes are equal in all figures."""
+        """HTML of the figure; its width is relative to the plot's, for equal font sizes."""
         caption = f"<figcaption>{escape(self.sentence)}</figcaption>"
         return f'<figure style="flex:{self.plot.width:g}">{self.plot.svg()}{caption}</figure>'
 
 
 def spectra_figure(case: Case) -> Figure | None:
-    """Return the spectra of shaft and bearing."""
+    """Return the figure of the spectra of shaft and bearing; None without spectra."""
     bearing, axis = case.bearing, case.direction
     rows = _rows(case.spectra, case.evidence.bearing)
     if bearing is None or len(rows) < 3:
@@ -57,7 +57,7 @@ def spectra_figure(case: Case) -> Figure | None:
 
 
 def _decades(amplitudes: Sequence[float]) -> Scale | None:
-    """Return a scale of at most five decades for all amplitudes; None without motion."""
+    """Return a logarithmic scale of up to five decades for amplitudes; None if all are zero."""
     seen = [value for value in amplitudes if value and value > 0.0]
     if not seen:
         return None
@@ -77,7 +77,7 @@ def _mark_orders(plot: Plot, bearing: BearingPart) -> None:
 
 
 def orbit_figure(case: Case) -> Figure | None:
-    """Return the newest revolutions of the shaft."""
+    """Return the figure of the newest shaft orbits; None without samples."""
     rows = _rows(case.orbits, case.evidence.bearing)
     if len(rows) < 2:
         return None
@@ -103,19 +103,19 @@ DAY_S = 86_400.0
 
 
 def finite_of(values: Values) -> list[float | None]:
-    """Replace NaN by None."""
+    """Return a list of numbers with NaN and infinity replaced by None."""
     return [v if v is not None and math.isfinite(v) else None for v in values]
 
 
 EccentricityStiffness = tuple[list[float | None], list[float | None]]
-"""Columns of eccentricity and stiffness."""
+"""Columns of eccentricity ratio and stiffness."""
 
 LOOKS = {"none": "unknown", "borrowed": "borrowed", "own": "known"}
-"""Styles of cells by support."""
+"""CSS classes of cells by support."""
 
 
 def condition_figure(case: Case) -> Figure | None:
-    """Return stiffness by eccentricity: of the cell, of the last day, and as expected."""
+    """Return the figure of stiffness against eccentricity: cell, last day, expected stiffness."""
     found = case.comparison
     if found is None:
         return None
@@ -141,7 +141,7 @@ def condition_figure(case: Case) -> Figure | None:
 
 
 def map_figure(case: Case) -> Figure | None:
-    """Return the conditions of the baseline, and the stiffness in each."""
+    """Return the map of the cells of the baseline, shaded by stiffness; None without a baseline."""
     found = case.comparison
     if found is None or not found.map or found.bounds is None:
         return None
@@ -181,7 +181,7 @@ def _draw_films(
 
 
 def _bounds(found: ComparisonPart, cell: CellPart) -> list[tuple[float, float]]:
-    """Return the limits of a cell; all cells have the width of that of the alarm."""
+    """Return the limits of a cell along both axes; all cells have the widths of the alarm's."""
     widths = [high - low for low, high in (found.bounds or ())[:2]]
     return [(i * w, (i + 1) * w) for i, w in zip(cell.cell, widths, strict=False)]
 
@@ -199,7 +199,7 @@ def _own_point(plot: Plot, found: ComparisonPart) -> None:
 
 
 def _recent(case: Case) -> EccentricityStiffness:
-    """Return eccentricity and stiffness of settled readings on the last day before the alarm."""
+    """Return eccentricity and stiffness of the settled readings within a day before the alarm."""
     table = case.before
     since_ns = case.evidence.alarm.time_ns - DAY_S * NS_PER_S
     times, settled = table.get("time_ns", ()), table.get("is_settled", ())
@@ -212,14 +212,14 @@ def _recent(case: Case) -> EccentricityStiffness:
 
 
 HOLE_S = 6 * 3600.0
-"""Gap across which expected stiffness is not drawn."""
+"""Maximum gap between readings, in seconds, that the expected stiffness is drawn across."""
 
 SHORTEST_S, MARGIN = 3600.0, 0.04
-"""Minimum time before the alarm, and margin after it as a fraction of the time before."""
+"""Minimum time before the alarm, in s, and time after it as a fraction of the time before."""
 
 
 def trend_figure(case: Case) -> Figure | None:
-    """Return stiffness before and after the alarm, with the expected stiffness and the limit."""
+    """Return the figure of stiffness against time, with expected stiffness and alert limits."""
     found = _trend(case)
     room = None if found is None else around(_heights(case, found))
     if found is None or room is None:
@@ -246,7 +246,7 @@ def trend_figure(case: Case) -> Figure | None:
 
 @dataclass(frozen=True)
 class _Trend:
-    """Readings of a film around an alarm, by column; times in seconds since 1970."""
+    """Readings of a film around an alarm, by column; times in seconds since 1970 UTC."""
 
     alarm_s: float
     time: list[float]
@@ -314,7 +314,7 @@ def _joined(before: Columns, after: Columns) -> Columns:
 
 
 def _expected(k: Values, deviation: Values) -> list[float | None]:
-    """Return the stiffness that each reading was compared with."""
+    """Return the expected stiffness of each reading, from its stiffness and its deviation."""
     return [
         None if value is None or by is None else value * math.exp(-by)
         for value, by in zip(k, deviation, strict=True)
@@ -330,7 +330,7 @@ def _where(values: Values, wanted: list[bool]) -> list[float | None]:
 
 
 def figures(case: Case) -> Iterator[str]:
-    """Yield the rows of figures that have data."""
+    """Yield the HTML of each row of figures; figures without data are omitted."""
     for row in (
         (trend_figure,),
         (condition_figure, map_figure),

@@ -1,4 +1,4 @@
-"""Folders of bundles, and the links from bundles to the samples around their alarms."""
+"""Folders of evidence bundles, and links from bundles to the recordings of their samples."""
 
 import json
 import re
@@ -34,7 +34,7 @@ UNIT = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,31}")
 
 @dataclass(frozen=True)
 class Place:
-    """Folder of a bundle."""
+    """Location of a bundle, with unit, subject, kind, occurrence and time of its alarm."""
 
     folder: Path
     unit: str
@@ -50,21 +50,21 @@ class Place:
 
 
 def place_of(root: Path, event: AlarmEvent) -> Place:
-    """Return the place of the bundle of an event."""
+    """Return the location of the bundle of an alarm event."""
     own, moment = event.identity, compact(event.time_ns)
     name = f"{moment}-{own.subject}-{own.kind}-{event.occurrence}"
     return Place(root / own.unit / name, own.unit, own.subject, own.kind, event.occurrence, moment)
 
 
 def places(root: Path, unit: str | None = None) -> list[Place]:
-    """Return the places of all complete bundles, or of those of one unit, oldest first."""
+    """Return the locations of all complete bundles, optionally of one unit, oldest first."""
     units = [root / unit] if unit else sorted(path for path in root.glob("*") if path.is_dir())
     found = (_place(path) for each in units if each.is_dir() for path in each.iterdir())
     return sorted((each for each in found if each), key=lambda each: (each.moment, each.folder))
 
 
 def note_beginning(root: Path, now_ns: int) -> None:
-    """Record the time from which evidence is kept; earlier evidence is not lost."""
+    """Write the time since which evidence is kept, so that older alarms do not count as lost."""
     path = root / KEPT_SINCE
     if not path.exists():
         root.mkdir(parents=True, exist_ok=True)
@@ -72,13 +72,13 @@ def note_beginning(root: Path, now_ns: int) -> None:
 
 
 def kept_since_ns(root: Path) -> int | None:
-    """Return the time from which evidence is kept; None if it never was."""
+    """Return the time since which evidence is kept; None if evidence was never kept."""
     path = root / KEPT_SINCE
     return int(path.read_text(encoding="utf-8")) if path.is_file() else None
 
 
 def clear_leftovers(root: Path) -> list[Path]:
-    """Remove unfinished folders that a crash left, and return them."""
+    """Remove the folders of bundles that a crash left unfinished; return their paths."""
     left = [path for path in root.glob(f"*/*{INCOMPLETE}") if path.is_dir()]
     for path in left:
         shutil.rmtree(path)
@@ -86,13 +86,13 @@ def clear_leftovers(root: Path) -> list[Path]:
 
 
 def removed(root: Path, unit: str) -> list[str]:
-    """Return the names of bundles that were removed to free space."""
+    """Return the folder names of the bundles of a unit that were removed to free space."""
     path = root / unit / REMOVED
     return path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
 
 
 def parsed(name: str) -> tuple[str, str, int] | None:
-    """Return subject, kind and occurrence in the name of a folder."""
+    """Return subject, kind and occurrence in the folder name of a bundle; None for other names."""
     match = NAME.fullmatch(name)
     return None if match is None else (match[2], match[3], int(match[4]))
 
@@ -106,28 +106,28 @@ def _place(path: Path) -> Place | None:
 
 
 class CapturePart(EvidencePart):
-    """Samples around an alarm."""
+    """Link from a bundle to the recording of the samples around its alarm."""
 
     state: Literal["complete", "lost"]
-    """Whether the samples exist."""
+    """State of the samples: recorded completely, or lost."""
 
     folder: str | None
-    """Recording with the samples, relative to the folder of the bundle."""
+    """Folder of the recording, relative to the folder of the bundle; null if lost."""
 
     manifest: FilePart | None
-    """Manifest of the recording, which has the hashes of the samples."""
+    """Manifest of the recording, which contains the checksums of the samples; null if lost."""
 
     reason: str | None
-    """Reason why the samples are lost."""
+    """Reason why the samples are lost; null if complete."""
 
 
 def link(folder: Path, capture: Path) -> None:
-    """Write to a bundle which recording holds its samples.
+    """Write the link from a bundle to the recording of its samples.
 
     Raises
     ------
     OSError
-        If the disk refuses.
+        If the link cannot be written.
     """
     relative = Path("../../..") / capture.parent.name / capture.name
     manifest = file_part(capture / MANIFEST)
@@ -138,18 +138,18 @@ def link(folder: Path, capture: Path) -> None:
 
 
 def note_lost(folder: Path, reason: str) -> None:
-    """Write to a bundle that its samples are lost.
+    """Write the link file of a bundle whose samples are lost, with the reason.
 
     Raises
     ------
     OSError
-        If the disk refuses.
+        If the link cannot be written.
     """
     _write_link(folder, CapturePart(state="lost", folder=None, manifest=None, reason=reason))
 
 
 def linked(folder: Path) -> CapturePart | None:
-    """Return the link of a bundle to its samples; None if there is none yet."""
+    """Return the link from a bundle to its samples; None if it is missing or invalid."""
     try:
         return CapturePart.model_validate_json((folder / CAPTURE).read_bytes())
     except (FileNotFoundError, ValidationError):
@@ -157,18 +157,18 @@ def linked(folder: Path) -> CapturePart | None:
 
 
 def captures_in_use(root: Path) -> frozenset[str]:
-    """Return the names of the recordings that bundles refer to."""
+    """Return the names of the recordings that bundles link to."""
     parts = (linked(each.folder) for each in places(root))
     return frozenset(Path(part.folder).name for part in parts if part and part.folder)
 
 
 def link_all(root: Path, captures: Path) -> int:
-    """Write links that a crash left out; return their number.
+    """Write links that are missing after a crash; return their number.
 
     Raises
     ------
     OSError
-        If the disk refuses.
+        If a recording cannot be read or a link cannot be written.
     """
     bare = [each for each in places(root) if not (each.folder / CAPTURE).exists()]
     if not bare:
@@ -183,7 +183,7 @@ def link_all(root: Path, captures: Path) -> int:
 
 
 def _captures(folder: Path) -> dict[tuple[str, int], Path]:
-    """Return complete recordings by the occurrences of alarms for which they were made."""
+    """Return the folders of complete captures, by alarm and occurrence."""
     found = {}
     for path in sorted(folder.glob(f"*/{ALARM}")):
         if (path.parent / MANIFEST).is_file():
@@ -197,7 +197,7 @@ def _alarms(path: Path) -> list[tuple[str, int]]:
         events = json.loads(path.read_bytes())["alarms"]
         return [(str(event["alarm"]), int(event["occurrence"])) for event in events]
     except (ValueError, KeyError, TypeError):
-        return []  # not written by padwatch
+        return []  # a file of another program
 
 
 def _write_link(folder: Path, part: CapturePart) -> None:

@@ -1,4 +1,4 @@
-"""Report of an alarm: self-contained HTML without scripts, for one sheet of A4."""
+"""Report of an alarm as self-contained HTML without scripts, for one page of A4."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -91,27 +91,27 @@ SAMPLES = {
 CONDITION = ("speed_rpm", "power_mw", "eccentricity_ratio", "oil_temperature_c")
 
 LONGEST = 160
-"""Maximum length of free text in a report."""
+"""Maximum length of free text in a report, in characters."""
 
 
 def plain(name: str) -> str:
-    """Return a name as words."""
+    """Return a name with its underscores replaced by spaces."""
     return name.replace("_", " ")
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
-    """Shorten a text so that the report fits on one page."""
+    """Return a text shortened to a maximum length, so that the report fits on one page."""
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
 def headline(evidence: Evidence) -> str:
-    """Return unit, subject and kind of the alarm."""
+    """Return the title of the report: unit, subject and kind of the alarm."""
     alarm = evidence.alarm
     return f"{alarm.unit} {alarm.subject}: {kind_words(alarm.kind)}"
 
 
 def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
-    """Yield the name and text of each fact."""
+    """Yield name and text of each entry in the list of facts at the top of the report."""
     evidence, alarm = case.evidence, case.evidence.alarm
     unit = evidence.unit
     where = [evidence.plant, unit.name if unit and unit.name else alarm.unit, alarm.subject]
@@ -129,7 +129,7 @@ def facts(case: Case, now: str) -> Iterator[tuple[str, str]]:
 
 
 def value_words(case: Case) -> str:
-    """Return value and limit; of a change of a film, in percent with its interval."""
+    """Return value and limit of the alarm; for film alarms in percent with 95 % interval."""
     alarm, found = case.evidence.alarm, finding(case)
     if alarm.kind in FILM_KINDS and found is not None and found.change is not None:
         limit = (
@@ -146,7 +146,7 @@ def value_words(case: Case) -> str:
 
 
 def change_words(found: FindingPart) -> str:
-    """Return a change in ln as percent, with its interval."""
+    """Return the change of a film, a difference of ln, in percent with its 95 % interval."""
     if found.change is None:
         return "–"
     if found.change_std is None:
@@ -157,12 +157,12 @@ def change_words(found: FindingPart) -> str:
 
 
 def percent(change: float) -> str:
-    """Return a change in ln as percent."""
+    """Return a change, given as a difference of ln, in percent."""
     return f"{100.0 * math.expm1(change):+.1f} %".replace("-", "−")
 
 
 def condition_words(bearing: BearingPart) -> str:
-    """Return the operating condition of the bearing."""
+    """Return the operating condition of the bearing as text."""
     words = []
     if bearing.condition is not None:
         settled = "" if bearing.condition.is_settled else ", not settled"
@@ -176,20 +176,20 @@ def condition_words(bearing: BearingPart) -> str:
 
 
 def number_words(reading: ReadingPart) -> str:
-    """Return a number with its unit."""
+    """Return the value of a reading with its unit, to four significant digits."""
     unit = "" if reading.unit == "1" else f" {reading.unit}"
     return "–" if reading.value is None else f"{reading.value:.4g}{unit}"
 
 
 def state_words(case: Case) -> str:
-    """Return the state after the newest event."""
+    """Return the state of the alarm after the newest event."""
     if not case.events:
         return "its events are not in the store"
     return plain(case.events[-1].state_after.value)
 
 
 def seen_words(case: Case) -> str:
-    """Return who acknowledged the occurrence, and when."""
+    """Return the user who acknowledged the occurrence, and the time of the acknowledgement."""
     seen = [each for each in case.events if each.change is AlarmChange.ACKNOWLEDGED]
     if not seen:
         return "not acknowledged"
@@ -197,7 +197,7 @@ def seen_words(case: Case) -> str:
 
 
 def finding(case: Case) -> FindingPart | None:
-    """Return the finding about the alarm's film."""
+    """Return the finding about the film in the direction of the alarm; None if it is unknown."""
     film = None if case.bearing is None else case.bearing.film
     if film is None:
         return None
@@ -205,7 +205,7 @@ def finding(case: Case) -> FindingPart | None:
 
 
 def story(case: Case) -> str:
-    """Describe the change in one or two sentences."""
+    """Return a description of the stiffness change and its cause; empty for other alarms."""
     found = finding(case)
     if case.evidence.alarm.kind not in FILM_KINDS or found is None or found.change is None:
         return ""
@@ -229,11 +229,11 @@ def story(case: Case) -> str:
 GN_PER_M = 1e9
 
 MAX_EVENTS, MAX_ACTOR, MAX_NOTE = 6, 32, 84
-"""Limits of the table of events: rows, and characters per cell."""
+"""Limits of the table of events: number of rows, and characters in two of its columns."""
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return an HTML table of escaped text."""
+    """Return an HTML table; headings and cells are escaped."""
     head = "".join(f"<th>{escape(each)}</th>" for each in heads)
     body = "".join(
         "<tr>" + "".join(f'<td class="n">{escape(cell)}</td>' for cell in row) + "</tr>"
@@ -243,7 +243,7 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def estimators_table(bearing: BearingPart) -> str:
-    """Return the table of all estimators."""
+    """Return the HTML table of the stiffness estimates of all estimators."""
     heads = ["Estimator"]
     for axis in AXES:
         heads += [f"k {axis}, GN/m (± random ± systematic, std)", f"coherence {axis}"]
@@ -259,7 +259,7 @@ def estimators_table(bearing: BearingPart) -> str:
 
 
 def films_table(evidence: Evidence) -> str:
-    """Return the table of the films of all bearings at the time of the alarm."""
+    """Return the HTML table of the films of all bearings at the time of the alarm."""
     found = [each for each in evidence.bearings if each.film is not None]
     if not found:
         return ""
@@ -269,7 +269,7 @@ def films_table(evidence: Evidence) -> str:
 
 
 def events_table(case: Case) -> str:
-    """Return the table of the events of the occurrence."""
+    """Return the HTML table of the newest events of the occurrence."""
     shown = list(case.events)[-MAX_EVENTS:]
     n_more = len(case.events) - len(shown)
     title = "What has happened" + (f" ({n_more} earlier not shown)" if n_more else "")
@@ -278,7 +278,7 @@ def events_table(case: Case) -> str:
 
 
 def footer(case: Case) -> str:
-    """Return versions and hashes."""
+    """Return the footer of the report: versions, hashes and missing data."""
     evidence, found = case.evidence, case.comparison
     baseline = None if found is None else found.baseline
     words = [f"configuration {evidence.configuration}"]
@@ -339,16 +339,16 @@ def _event(event: AlarmEvent) -> tuple[str, str, str, str]:
 
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; base-uri 'none'; form-action 'none'"
-"""Content security policy of the response, and of the page opened from a bundle."""
+"""Content security policy of the report, as a response header and as a tag in the page."""
 
 
 def report_page(case: Case, now_ns: int) -> str:
-    """Return the report of an occurrence.
+    """Return the report of an occurrence as an HTML page.
 
     Parameters
     ----------
     now_ns
-        Time of the report; later data are shown up to it.
+        Time of the report, as stated in it.
     """
     evidence = case.evidence
     title, level = escape(headline(evidence)), evidence.alarm.level or "alert"

@@ -1,4 +1,4 @@
-"""Parts of the document of a bundle: bearings, and what their films are compared with."""
+"""Models of the evidence document: bearings, and comparisons of their films with baselines."""
 
 import math
 from typing import Annotated, Literal
@@ -8,14 +8,14 @@ from pydantic import BaseModel, ConfigDict, Field
 Sha256 = Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", examples=["9f86d081884c7d65" * 4])]
 
 Moment = Annotated[str, Field(examples=["2026-11-21T09:03:12.400Z"])]
-"""UTC, RFC 3339."""
+"""Time in UTC, as in RFC 3339."""
 
 Numbers = list[float | None]
-"""Column of numbers; null where there is none."""
+"""Column of numbers; null for missing numbers."""
 
 
 class EvidencePart(BaseModel):
-    """Base of all parts: frozen, without unknown keys, NaN or infinity."""
+    """Base of all models of the document: frozen, without unknown keys, NaN or infinity."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
@@ -23,12 +23,12 @@ class EvidencePart(BaseModel):
 
 
 def finite(number: float | None) -> float | None:
-    """Return a finite number; None otherwise, since JSON has no NaN or infinity."""
+    """Return a number if it is finite, else None, as JSON has no NaN or infinity."""
     return None if number is None or not math.isfinite(number) else float(number)
 
 
 def rounded(number: float | None) -> float | None:
-    """Return a number rounded to seven digits, beyond the accuracy of any result."""
+    """Return a number rounded to seven significant digits, or None if it is not finite."""
     found = finite(number)
     return None if found is None else float(f"{found:.7g}")
 
@@ -40,67 +40,67 @@ LevelWord = Literal["alert", "danger"]
 QualityWord = Literal["good", "uncertain", "bad"]
 
 AXES: tuple[Direction, Direction] = ("x", "y")
-"""Order of all pairs."""
+"""Directions, in the order of all pairs of x and y."""
 
 
 class ReadingPart(EvidencePart):
-    """Reading of a quantity of the catalogue."""
+    """Reading of a quantity of the catalogue, with quality and uncertainty."""
 
     value: float | None
-    """Value; null if unknown."""
+    """Value of the quantity; null if unknown."""
 
     unit: Annotated[str, Field(examples=["N/m"])]
-    """Unit and detector."""
+    """Unit of measurement, with the detector if there is one."""
 
     level: QualityWord
-    """Level of quality."""
+    """Quality of the reading."""
 
     reason: Annotated[str, Field(examples=["ok"])]
-    """Reason for the level."""
+    """Reason for the quality."""
 
     u_random: float | None
     """Random standard uncertainty, in the unit of the value."""
 
     u_systematic: float | None
-    """Systematic standard uncertainty."""
+    """Systematic standard uncertainty, in the unit of the value."""
 
     interval_95: tuple[float, float] | None
-    """95 % confidence interval."""
+    """95 % confidence interval, in the unit of the value."""
 
 
 class EstimatorPart(EvidencePart):
-    """Stiffness of a film by one estimator."""
+    """Estimate of the stiffness of a film by one estimator."""
 
     estimator: Annotated[str, Field(examples=["dynamic"])]
     """Name of the estimator."""
 
     direction: Direction
-    """Direction."""
+    """Direction of the stiffness."""
 
     stiffness: ReadingPart
     """Estimated stiffness."""
 
     coherence: float | None
-    """Squared coherence behind the estimate; null without waveforms."""
+    """Magnitude-squared coherence that the estimate is based on; null without waveforms."""
 
     is_preferred: bool
-    """Whether `stiffness` of the bearing is taken from it."""
+    """Whether this estimate is the stiffness among the readings of the bearing."""
 
     is_watched: bool
-    """Whether changes of the film are judged by it."""
+    """Whether film monitoring uses this estimator."""
 
 
 class BudgetLinePart(EvidencePart):
-    """One contribution to the uncertainty of a result."""
+    """Contribution to the uncertainty of a result."""
 
     name: Annotated[str, Field(examples=["bracket stiffness"])]
     """Name of the contribution."""
 
     kind: Literal["random", "systematic"]
-    """Whether the contribution varies between results or is constant."""
+    """Kind of the contribution: random between results, or systematic (constant)."""
 
     distribution: Literal["normal", "uniform"]
-    """Distribution of the contribution."""
+    """Probability distribution of the contribution."""
 
     width: float
     """Standard uncertainty if normal, half-width if uniform, in the unit of the contribution."""
@@ -109,20 +109,20 @@ class BudgetLinePart(EvidencePart):
     """Change of the result per unit of the contribution."""
 
     contribution: float
-    """Standard uncertainty of the result by this contribution alone."""
+    """Standard uncertainty of the result due to this contribution alone."""
 
 
 class WindowPart(EvidencePart):
-    """Samples behind the results."""
+    """Window of samples that the results were computed from."""
 
     epoch: int
     """Epoch of the device's sample counter."""
 
     first_index: int
-    """Index of the first sample."""
+    """Sample index of the first sample."""
 
     stop_index: int
-    """Index after the last sample."""
+    """Sample index after the last sample."""
 
     n_segments: int
     """Number of averaged segments."""
@@ -134,7 +134,7 @@ class WindowPart(EvidencePart):
     """Fraction of the possible segments that was usable."""
 
     duration_s: float
-    """Time from the first to the last sample."""
+    """Time from the first to the last sample, in seconds."""
 
 
 class ConditionPart(EvidencePart):
@@ -150,7 +150,7 @@ class ConditionPart(EvidencePart):
     """Bins of eccentricity, oil temperature and, if used, attitude; null if unknown."""
 
     bounds: list[tuple[float, float]] | None
-    """Limits of the cell along each of these axes."""
+    """Limits of the cell along each of these axes, [low, high]."""
 
 
 class CausePart(EvidencePart):
@@ -166,51 +166,51 @@ class CausePart(EvidencePart):
     """Fraction of the change due to the film if the rest is due to an accelerometer."""
 
     film_share_std: float | None
-    """Its standard uncertainty."""
+    """Standard uncertainty of `film_share`."""
 
     shaft_change: float | None
-    """Motion of the shaft relative to the expected motion, in ln."""
+    """Change of the shaft motion against the expected motion, ln of the ratio."""
 
     bearing_change: float | None
-    """Motion of the bearing relative to the expected motion, in ln."""
+    """Change of the bearing motion against the expected motion, ln of the ratio."""
 
 
 class FindingPart(EvidencePart):
     """Finding about a film in one direction."""
 
     direction: Direction
-    """Direction."""
+    """Direction of the stiffness."""
 
     verdict: Annotated[str, Field(examples=["alert"])]
-    """Verdict: normal, alert, danger, or the reason why there is none."""
+    """Verdict: normal, alert, danger, or the reason why the film was not judged."""
 
     level: LevelWord | None
-    """Alarm level of the film."""
+    """Alarm level of the film; null without an alarm."""
 
     change: float | None
     """Most significant mean deviation from the baseline, in ln."""
 
     change_std: float | None
-    """Its standard uncertainty."""
+    """Standard uncertainty of `change`."""
 
     time_scale_h: float | None
-    """Running hours of the average."""
+    """Time scale over which `change` was averaged, in running hours."""
 
     deviation: float | None
-    """Deviation of the newest reading, in ln; null unless it was compared."""
+    """Deviation of the newest reading from the baseline, in ln; null unless it was compared."""
 
     deviation_std: float | None
-    """Standard uncertainty of that deviation."""
+    """Standard uncertainty of `deviation`."""
 
     baseline_version: int | None
     """Version of the baseline."""
 
     attribution: CausePart | None
-    """Cause of the change, while there is an alarm level."""
+    """Cause of the change; null without an alarm level."""
 
 
 class FilmReadingPart(EvidencePart):
-    """Last judged reading of the films."""
+    """Newest judged reading of the films of a bearing."""
 
     time: Moment
     """Time of the reading."""
@@ -219,10 +219,10 @@ class FilmReadingPart(EvidencePart):
     """Estimator of the stiffness."""
 
     state: Annotated[str, Field(examples=["full_load"])]
-    """Operating state."""
+    """Operating state of the unit."""
 
     is_settled: bool
-    """Whether the unit had settled in it."""
+    """Whether the unit had settled in the operating state."""
 
     findings: list[FindingPart]
     """Findings in x and in y."""
@@ -232,13 +232,13 @@ class BearingPart(EvidencePart):
     """State of one bearing at the time of the alarm."""
 
     bearing: Annotated[str, Field(examples=["UJB"])]
-    """Identifier."""
+    """Identifier of the bearing."""
 
     time: Moment
-    """End of the samples."""
+    """Time of the last sample of the window."""
 
     window: WindowPart
-    """Samples behind the results."""
+    """Window of samples that the results were computed from."""
 
     evidence: Annotated[str, Field(examples=["waveforms"])]
     """Evidence class: waveforms, amplitude_and_phase or amplitude_only."""
@@ -250,32 +250,32 @@ class BearingPart(EvidencePart):
     """Operating condition; null if operation is not monitored."""
 
     readings: dict[str, ReadingPart]
-    """Readings by name in the catalogue."""
+    """Readings by their name in the catalogue."""
 
     estimators: list[EstimatorPart]
-    """Estimates of all estimators."""
+    """Stiffness estimates of all estimators."""
 
     budgets: dict[str, list[BudgetLinePart]]
     """Uncertainty budgets by quantity."""
 
     film: FilmReadingPart | None
-    """Findings about its films; null if they are not monitored, or not judged yet."""
+    """Findings about the films of the bearing; null if not monitored or not judged yet."""
 
 
 class BaselinePart(EvidencePart):
     """Baseline of a bearing."""
 
     version: int
-    """Number of the baseline of the bearing."""
+    """Version number of the baseline."""
 
     author: Annotated[str, Field(examples=["padwatch"])]
-    """Person or program that had it learned."""
+    """Person or program that created the baseline."""
 
     created: Moment
-    """Time of creation."""
+    """Time of creation of the baseline."""
 
     event: str
-    """Event on the machine that required it; may be empty."""
+    """Event on the machine that required a new baseline; may be empty."""
 
     learned_from: Moment
     """Time of the first learned reading."""
@@ -288,19 +288,19 @@ class BaselinePart(EvidencePart):
 
 
 class CellPart(EvidencePart):
-    """Cell of the baseline."""
+    """Cell of the baseline, a bin of operating conditions."""
 
     cell: list[int]
     """Bins of eccentricity, oil temperature and, if used, attitude."""
 
     n_readings: int
-    """Number of readings."""
+    """Number of readings in the cell."""
 
     n_days: int
-    """Number of days with readings."""
+    """Number of days with readings in the cell."""
 
     location_n_per_m: float
-    """Median stiffness."""
+    """Median stiffness of the readings, in N/m."""
 
     scatter: float
     """Scatter of the readings, in ln."""
@@ -309,14 +309,14 @@ class CellPart(EvidencePart):
     """Standard uncertainty of the expected stiffness, in ln."""
 
     support: Literal["none", "borrowed", "own"]
-    """Whether readings in it can be judged."""
+    """Support of the cell: none (not judged), borrowed from neighbouring cells, or own readings."""
 
 
 class TimeScalePart(EvidencePart):
-    """Mean deviation over one time scale."""
+    """Mean deviation from the baseline over one time scale."""
 
     time_scale_h: float
-    """Running hours."""
+    """Time scale, in running hours."""
 
     change: float
     """Mean deviation, in ln."""
@@ -325,49 +325,49 @@ class TimeScalePart(EvidencePart):
     """Standard uncertainty of the mean deviation of a healthy film."""
 
     sure_from: float
-    """Number of standard uncertainties from which the change is significant."""
+    """Number of standard uncertainties above which the change is significant."""
 
 
 class MembersPart(EvidencePart):
-    """Readings of the cell behind the baseline, by column."""
+    """Readings in the cell that the baseline was learned from, by column."""
 
     n_in_all: int
-    """Number of readings; those listed are spread evenly over them."""
+    """Number of readings in the cell; of many readings, an evenly spaced selection is listed."""
 
     time: Numbers
-    """Seconds since 1970 UTC."""
+    """Times of the readings, in seconds since 1970 UTC."""
 
     stiffness_n_per_m: Numbers
-    """Stiffness."""
+    """Stiffness, in N/m."""
 
     u_random: Numbers
-    """Random standard uncertainty of its logarithm."""
+    """Random standard uncertainty of ln stiffness."""
 
     eccentricity_ratio: Numbers
     """Eccentricity ratio."""
 
     oil_temperature_c: Numbers
-    """Oil temperature, °C."""
+    """Oil temperature, in °C."""
 
 
 class ExpectedPart(EvidencePart):
-    """Expected stiffness by eccentricity at the oil temperature of the reading, by column."""
+    """Expected stiffness against eccentricity at the oil temperature of the reading, by column."""
 
     eccentricity_ratio: Numbers
     """Eccentricity ratio."""
 
     stiffness_n_per_m: Numbers
-    """Expected stiffness; null if unknown."""
+    """Expected stiffness, in N/m; null if unknown."""
 
 
 class ComparisonPart(EvidencePart):
-    """Film in one direction, and the baseline that it is compared with."""
+    """Comparison of a film in one direction with its baseline."""
 
     bearing: Annotated[str, Field(examples=["UJB"])]
-    """Bearing."""
+    """Identifier of the bearing."""
 
     direction: Direction
-    """Direction."""
+    """Direction of the stiffness."""
 
     estimator: Annotated[str, Field(examples=["dynamic"])]
     """Estimator of the stiffness."""
@@ -376,28 +376,28 @@ class ComparisonPart(EvidencePart):
     """Time of the reading."""
 
     stiffness_n_per_m: float | None
-    """Measured stiffness."""
+    """Measured stiffness, in N/m."""
 
     u_random: float | None
-    """Random standard uncertainty of its logarithm."""
+    """Random standard uncertainty of ln stiffness."""
 
     eccentricity_ratio: float | None
     """Eccentricity ratio of the reading."""
 
     oil_temperature_c: float | None
-    """Oil temperature of the reading, °C."""
+    """Oil temperature of the reading, in °C."""
 
     attitude_deg: float | None
-    """Attitude angle of the reading."""
+    """Attitude angle of the reading, in degrees."""
 
     expected_n_per_m: float | None
-    """Stiffness expected by the baseline; null if it has none for this condition."""
+    """Expected stiffness by the baseline, in N/m; null if unknown for this condition."""
 
     baseline: BaselinePart | None
-    """Baseline; null if there was none."""
+    """Baseline; null if the bearing had none."""
 
     cell: CellPart | None
-    """Cell of the reading; null if the baseline has no readings in it."""
+    """Cell of the reading; null if the baseline has no readings in this cell."""
 
     bounds: list[tuple[float, float]] | None
     """Limits of the cell in eccentricity, oil temperature and, if used, attitude."""
@@ -406,7 +406,7 @@ class ComparisonPart(EvidencePart):
     """Mean deviations over all time scales."""
 
     members: MembersPart | None
-    """Readings of the cell; null if they are unreadable, or there is no cell."""
+    """Readings in the cell; null if the store was unreadable or the cell is unknown."""
 
     expected: ExpectedPart | None
     """Expected stiffness; null without a baseline."""

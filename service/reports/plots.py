@@ -1,4 +1,4 @@
-"""Plots as SVG: scales, axes and marks."""
+"""Plots in SVG: scales, axes, lines, points and areas."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from html import escape
 
 Tick = tuple[float, str]
-"""Value and label."""
+"""Value and label of a tick of an axis."""
 
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 
@@ -16,12 +16,12 @@ TIME_STEPS_H = (0.25, 0.5, 1, 2, 3, 6, 12, 24, 48, 96, 168, 336, 720, 2160, 8760
 
 @dataclass(frozen=True)
 class Scale:
-    """Linear or logarithmic axis from `low` to `high`.
+    """Linear or logarithmic scale of an axis from `low` to `high`.
 
     Parameters
     ----------
     divisor
-        Divisor of the labels: 1e9 for N/m shown as GN/m.
+        Divisor of values in tick labels; 1e9 shows N/m as GN/m.
     """
 
     low: float
@@ -37,7 +37,7 @@ class Scale:
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self, most: int = 6) -> Sequence[Tick]:
-        """Return ticks at round values."""
+        """Return the ticks of the axis, at round values; `most` applies to linear scales."""
         return self._decades() if self.is_log else self._linear(most)
 
     def _linear(self, most: int) -> list[Tick]:
@@ -55,7 +55,7 @@ class Scale:
 
 @dataclass(frozen=True)
 class TimeScale:
-    """Axis of time, seconds since 1970 UTC."""
+    """Scale of a time axis, in seconds since 1970 UTC."""
 
     low: float
     high: float
@@ -65,7 +65,7 @@ class TimeScale:
         return (value - self.low) / (self.high - self.low)
 
     def ticks(self, most: int = 8) -> Sequence[Tick]:
-        """Return ticks at round hours and days."""
+        """Return at most about `most` ticks, at round hours or days."""
         span_h = (self.high - self.low) / 3600.0
         step_s = 3600.0 * next((s for s in TIME_STEPS_H if span_h / s <= most), TIME_STEPS_H[-1])
         first = math.ceil(self.low / step_s)
@@ -75,7 +75,7 @@ class TimeScale:
 
 
 def around(values: Iterable[float | None], margin: float = 0.06) -> tuple[float, float] | None:
-    """Return the range of values with a margin; None if there are none."""
+    """Return the range of the finite values, widened by a margin; None without finite values."""
     found = [value for value in values if value is not None and math.isfinite(value)]
     if not found:
         return None
@@ -87,26 +87,28 @@ def around(values: Iterable[float | None], margin: float = 0.06) -> tuple[float,
 LEFT, RIGHT, TOP, BOTTOM = 46.0, 8.0, 6.0, 30.0
 
 TIME_ROOM, NUMBER_ROOM = 62.0, 40.0
-"""Space of a tick along x."""
+"""Width reserved for a tick label of a time axis and of a number axis, in SVG user units."""
 
 Values = Sequence[float | None]
-"""Numbers; None where there is none."""
+"""Sequence of numbers; None for missing numbers."""
 
 
 @dataclass
 class Plot:
-    """Plot under construction.
+    """Plot that is built up by adding marks, and returned as SVG.
 
     Parameters
     ----------
     width, height
-        Size in units in which the font size is 9.
+        Size in SVG user units; the font size is 9 units.
+    x, y
+        Scales of the axes.
     x_label, y_label
         Labels of the axes, with units.
     title
-        Text alternative of the picture.
+        Text alternative of the plot.
     name
-        Unique name on the page.
+        Identifier of the plot, unique in the page.
     """
 
     width: float
@@ -120,7 +122,7 @@ class Plot:
     _marks: list[str] = field(default_factory=list)
 
     def line(self, xs: Values, ys: Values, look: str, longest_step: float = math.inf) -> None:
-        """Add a line, interrupted by missing numbers and by long steps along x."""
+        """Add a line, interrupted at missing numbers and at steps along x over `longest_step`."""
         path, last = [], None
         for x, y in zip(xs, ys, strict=True):
             if x is None or y is None:
@@ -133,7 +135,7 @@ class Plot:
             self._marks.append(f'<path class="{look}" d="{"".join(path)}"/>')
 
     def band(self, xs: Values, lows: Values, highs: Values, look: str, longest_step: float) -> None:
-        """Add an area between two lines, interrupted like them."""
+        """Add the area between two lines, interrupted where `line` interrupts a line."""
         piece: list[tuple[float, float, float]] = []
         for x, low, high in zip(xs, lows, highs, strict=True):
             is_known = x is not None and low is not None and high is not None
@@ -147,7 +149,7 @@ class Plot:
     def points(
         self, xs: Values, ys: Values, look: str, radius: float = 1.6, errors: Values | None = None
     ) -> None:
-        """Add points, with error bars of a half-length along y."""
+        """Add points, optionally with error bars; `errors` are their half-lengths along y."""
         for i, (x, y) in enumerate(zip(xs, ys, strict=True)):
             if x is None or y is None:
                 continue
@@ -160,7 +162,7 @@ class Plot:
             )
 
     def dots(self, xs: Values, ys: Values, look: str) -> None:
-        """Add many points as one path."""
+        """Add points as a single SVG path, for large numbers of points."""
         found = (
             f"M{self._x(x)} {self._y(y)}h0"
             for x, y in zip(xs, ys, strict=True)
@@ -171,7 +173,7 @@ class Plot:
     def cell(
         self, x: tuple[float, float], y: tuple[float, float], look: str, opacity: float = 1.0
     ) -> None:
-        """Add a rectangle between two values along each axis."""
+        """Add a rectangle, given by its limits along x and along y."""
         left, right, top, bottom = self._x(x[0]), self._x(x[1]), self._y(y[1]), self._y(y[0])
         self._marks.append(
             f'<path class="{look}" fill-opacity="{opacity:.2f}"'
@@ -179,7 +181,7 @@ class Plot:
         )
 
     def upright(self, x: float, look: str, words: str = "", row: int = 0) -> None:
-        """Add a vertical line with a label in a row from the top."""
+        """Add a vertical line with a label; `row` is the row of the label, counted from the top."""
         place, y = self._x(x), TOP + 8 + 9 * row
         self._marks.append(f'<path class="{look}" d="M{place} {TOP:g}V{self.height - BOTTOM:g}"/>')
         self._marks.append(
@@ -187,7 +189,7 @@ class Plot:
         )
 
     def level(self, y: float, look: str) -> None:
-        """Add a horizontal line."""
+        """Add a horizontal line across the plot."""
         self._marks.append(f'<path class="{look}" d="M{LEFT:g} {self._y(y)}H{self._right:g}"/>')
 
     def svg(self) -> str:

@@ -1,4 +1,4 @@
-"""Retention of bundles: their size on the disk, and removal of the oldest."""
+"""Retention of evidence bundles: limits of their size and number, removal of the oldest."""
 
 import shutil
 from collections.abc import Iterable
@@ -12,28 +12,30 @@ from service.runtime.files import sync_folder, write_whole
 from service.runtime.times import compact
 
 MAX_REMOVED = 10_000
-"""Maximum number of remembered names per unit."""
+"""Maximum number of names of removed bundles per unit that are kept."""
 
 
 SURVEY_S = 3600.0
-"""Interval after which all folders are surveyed again, as some may have been removed by hand."""
+"""Interval in seconds between surveys of all folders; folders may be removed by hand."""
 
 
 @dataclass(frozen=True)
 class EvidenceLimits:
-    """Limits of the space for bundles.
+    """Limits of the evidence bundles.
 
     Parameters
     ----------
     max_bytes
-        Size above which the oldest bundles are removed that are older than `keep_days`.
+        Total size above which bundles older than `keep_days` are removed, oldest first.
     hard_max_bytes
-        Size above which the oldest bundles are removed, whatever their age.
+        Total size above which bundles of any age are removed, oldest first.
+    keep_days
+        Age up to which only `hard_max_bytes` and `max_per_alarm` apply.
     max_per_alarm
-        Number per alarm above which its oldest are removed, so that a chattering alarm does not
-        displace all others.
+        Maximum number of bundles per alarm, so that a chattering alarm does not displace the
+        bundles of other alarms.
     trend_days
-        Time before an alarm for which readings of its film are included.
+        Time before an alarm for which readings of its film are included, in days.
     """
 
     max_bytes: int = 2_000_000_000
@@ -45,29 +47,29 @@ class EvidenceLimits:
 
 @dataclass(frozen=True, order=True)
 class _Held:
-    """Bundle; the name of a folder begins with its time, so that the oldest sort first."""
+    """Bundle on the disk; sorts by age, since the folder name begins with the time."""
 
     name: str
     unit: str
 
 
 class EvidenceRetention:
-    """Removes the oldest bundles; used in the thread that writes them.
+    """Retention of evidence bundles; for use in the thread that writes them.
 
-    The sizes of all bundles are remembered, so that a flood of alarms does not read all folders.
+    The sizes of all bundles are cached, so that an alarm flood does not read all folders.
     """
 
     def __init__(self, root: Path, limits: EvidenceLimits, clock: Clock) -> None:
         self._root, self._limits, self._clock = root, limits, clock
         self._sizes: dict[str, dict[_Held, int]] = {}
-        """Sizes by alarm."""
+        """Sizes of bundles in bytes, by alarm."""
         self._n_bytes = 0
         self._crowded: set[str] = set()
-        """Alarms with too many bundles."""
+        """Alarms with more bundles than `max_per_alarm`."""
         self._surveyed_s: float | None = None
 
     def note(self, place: Place) -> None:
-        """Record that a bundle was written, or has grown."""
+        """Update the cached size of a bundle that was written or has grown."""
         own = self._sizes.setdefault(place.alarm, {})
         held, size = _Held(place.folder.name, place.unit), _size(place.folder)
         self._n_bytes += size - own.get(held, 0)
@@ -76,7 +78,7 @@ class EvidenceRetention:
             self._crowded.add(place.alarm)
 
     def make(self) -> list[str]:
-        """Remove the oldest bundles until the others fit; the newest always stays.
+        """Remove the oldest bundles until the others meet the limits; always keep the newest.
 
         Returns
         -------
@@ -86,7 +88,7 @@ class EvidenceRetention:
         Raises
         ------
         OSError
-            If the disk refuses; all folders are then surveyed the next time.
+            If a folder cannot be read or removed; the next call surveys all folders again.
         """
         surveyed_s, self._surveyed_s = self._surveyed(), None
         going = self._surplus()
@@ -96,7 +98,7 @@ class EvidenceRetention:
         return [held.name for held in sorted(going)]
 
     def _surveyed(self) -> float:
-        """Return the time of the last survey; survey all folders if it is too old."""
+        """Survey all folders if the last survey is too old; return the time of the last survey."""
         now_s = self._clock.monotonic_s()
         if self._surveyed_s is not None and now_s - self._surveyed_s <= SURVEY_S:
             return self._surveyed_s
@@ -107,14 +109,14 @@ class EvidenceRetention:
         return now_s
 
     def _surplus(self) -> dict[_Held, str]:
-        """Return the surplus bundles of alarms, with their alarms."""
+        """Return the bundles in excess of `max_per_alarm`, with their alarms."""
         most = self._limits.max_per_alarm
         return {
             held: alarm for alarm in self._crowded for held in sorted(self._sizes[alarm])[:-most]
         }
 
     def _beyond_the_limits(self, going: dict[_Held, str]) -> dict[_Held, str]:
-        """Return further bundles to remove so that the others fit."""
+        """Return further bundles to remove because of their total size, with their alarms."""
         n_bytes = self._n_bytes - sum(self._sizes[alarm][held] for held, alarm in going.items())
         if n_bytes <= min(self._limits.max_bytes, self._limits.hard_max_bytes):
             return {}
@@ -143,14 +145,14 @@ class EvidenceRetention:
 
 
 def _remember(root: Path, unit: str, names: Iterable[str]) -> None:
-    """Write the names of bundles before they are removed; existing bundles take precedence."""
+    """Add names to the list of removed bundles before removal; a bundle that exists is not lost."""
     all_names = list(dict.fromkeys((*removed(root, unit), *names)))[-MAX_REMOVED:]
     write_whole(root / unit / REMOVED, "".join(f"{name}\n" for name in all_names).encode())
 
 
 def _remove(folder: Path) -> None:
     aside = folder.with_name(folder.name + INCOMPLETE)
-    folder.rename(aside)  # so that no partial bundle has a final name
+    folder.rename(aside)  # no partial bundle may have a final name
     shutil.rmtree(aside)
 
 

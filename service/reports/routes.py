@@ -1,4 +1,4 @@
-"""Routes to the evidence of alarms."""
+"""HTTP routes of the evidence of alarms."""
 
 import asyncio
 import re
@@ -44,33 +44,34 @@ class OccurrenceModel(ApiModel):
     """Occurrence of an alarm with the state of its evidence."""
 
     occurrence: int
-    """Number of times that the alarm was raised or rose in level."""
+    """Number of the occurrence, which counts how often the alarm was raised or escalated."""
 
     change: Annotated[str, Field(examples=["raised"])]
     """Change of the alarm: raised or escalated."""
 
     level: Literal["alert", "danger"] | None
-    """Level after the event."""
+    """Alarm level after the event."""
 
     time: Time
     """Time of the event."""
 
     state: Literal["complete", "waiting", "lost", "removed", "not_kept"]
-    """State of the evidence: complete, waiting for the disk, lost (by a crash, or a disk that
-    refused for long), removed to free space, or never kept."""
+    """State of the evidence: complete, waiting to be written, lost (by a crash, or as the disk
+    could not be written for long), removed to free space, or never kept."""
 
     samples: Literal["complete", "being_made", "lost", "removed", "none"]
     """State of the samples around the alarm: complete, being recorded, lost, removed to free space,
-    or none for this alarm."""
+    or not recorded for this alarm."""
 
     evidence: Annotated[
         str | None, Field(examples=["/api/v1/alarms/U1:UJB:stiffness_x/evidence/3"])
     ]
-    """Path of the document; null unless complete. Append /report or /bundle.zip."""
+    """URL path of the evidence document; null unless complete. Append /report or /bundle.zip for
+    report and bundle."""
 
 
 class OccurrencesModel(ApiModel):
-    """Occurrences of an alarm."""
+    """List of the occurrences of an alarm."""
 
     alarm: Annotated[str, Field(examples=["U1:UJB:stiffness_x"])]
     """Identifier of the alarm."""
@@ -79,7 +80,7 @@ class OccurrencesModel(ApiModel):
     """Origin of the data: a live machine, or a replayed recording."""
 
     occurrences: list[OccurrenceModel]
-    """Occurrences, newest first."""
+    """Occurrences of the alarm, newest first."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ class Found:
 
 
 class EvidenceService:
-    """Lists evidence, and creates reports and bundles."""
+    """Service of the evidence routes: lists evidence, and creates reports and bundles."""
 
     def __init__(
         self,
@@ -116,12 +117,12 @@ class EvidenceService:
         return await self._downloads.worked(look)
 
     async def occurrence(self, alarm: str, number: int) -> Occurrence | None:
-        """Return one occurrence; None if it does not exist."""
+        """Return an occurrence of an alarm; None if it does not exist."""
         pending = self.keeper.pending
         return await self._downloads.worked(lambda: self.archive.occurrence(alarm, number, pending))
 
     async def report(self, found: Occurrence) -> str:
-        """Return the report of an occurrence whose bundle is complete.
+        """Return the report of an occurrence as HTML.
 
         Raises
         ------
@@ -132,12 +133,12 @@ class EvidenceService:
         return await self._downloads.worked(lambda: self._report(found, capturing))
 
     async def bundle(self, found: Occurrence, has_configuration: bool) -> AsyncIterator[bytes]:
-        """Return a bundle as a ZIP file, in pieces.
+        """Return the bundle of an occurrence as the chunks of a ZIP file.
 
         Parameters
         ----------
         has_configuration
-            Whether to include the settings of the whole plant.
+            Whether to include the configuration of the whole plant.
 
         Raises
         ------
@@ -160,7 +161,7 @@ class EvidenceService:
 
 
 def is_there(found: Occurrence) -> bool:
-    """Return whether there is a bundle."""
+    """Return whether an occurrence has a complete bundle."""
     return found.state is EvidenceState.COMPLETE
 
 
@@ -191,7 +192,7 @@ log = structlog.get_logger()
 
 
 def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter:
-    """Return the routes to evidence, if any is kept; they change nothing."""
+    """Return the read-only routes of evidence; they respond with 404 if no evidence is kept."""
     router = APIRouter(
         prefix="/api/v1/alarms/{alarm}/evidence",
         tags=["alarms"],
@@ -215,7 +216,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
 
     @router.get("/{occurrence}", summary="All that was known", responses=PROBLEMS)
     async def document(alarm: AlarmId, occurrence: Number) -> Evidence:
-        """Return the state of the unit when the alarm was raised, as recorded then."""
+        """Return the evidence document: the state of the unit when the alarm was raised."""
         held = _there(desk)
         found = await _complete(context, held, alarm, occurrence)
         place = found.place
@@ -233,7 +234,7 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         responses=PROBLEMS,
     )
     async def report(alarm: AlarmId, occurrence: Number) -> Response:
-        """Return HTML for one sheet of A4, without scripts, to read or to print."""
+        """Return the report as an HTML page without scripts, to read or to print on one A4 page."""
         held = _there(desk)
         found = await _complete(context, held, alarm, occurrence)
         try:
@@ -249,9 +250,9 @@ def evidence_router(context: Context, desk: EvidenceService | None) -> APIRouter
         responses={**PROBLEMS, 200: _zip_content()},
     )
     async def bundle(request: Request, alarm: AlarmId, occurrence: Number) -> StreamingResponse:
-        """Return document, tables, report, and the samples once they are complete.
+        """Return a ZIP file with document, tables, report, and the samples once they are complete.
 
-        The bundle includes the plant's configuration, except for a key that is limited to units.
+        The file includes the configuration of the plant, unless the API key is limited to units.
         """
         held = _there(desk)
         found = await _complete(context, held, alarm, occurrence)
@@ -275,7 +276,7 @@ def _there(desk: EvidenceService | None) -> EvidenceService:
 
 
 def _known(context: Context, alarm: str) -> str:
-    """Refuse an invalid alarm; alarms of an older plant file keep their evidence."""
+    """Return a valid alarm id, also of an older plant file; raise problem 404 for other ids."""
     match = ID.fullmatch(alarm)
     if match is None or match[3] not in ALARM_KINDS:
         try:
@@ -288,7 +289,7 @@ def _known(context: Context, alarm: str) -> str:
 async def _complete(
     context: Context, desk: EvidenceService, alarm: str, occurrence: int
 ) -> Occurrence:
-    """Return an occurrence with complete evidence; otherwise raise the problem."""
+    """Return an occurrence with complete evidence; raise problem 404 or 409 otherwise."""
     found = await desk.occurrence(_known(context, alarm), occurrence)
     if found is None:
         detail = f"alarm {alarm} has no occurrence {occurrence}"

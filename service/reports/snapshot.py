@@ -1,4 +1,4 @@
-"""Snapshot of a unit when an alarm is raised, held by reference until it is written."""
+"""Snapshot of the state of a unit when an alarm is raised, kept in memory until it is written."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from service.settings.units import UnitSettings
 
 @dataclass(frozen=True)
 class BearingSnapshot:
-    """State of one bearing; None for missing parts."""
+    """State of a bearing: newest assessment, film reading and baseline; None if missing."""
 
     assessment: Assessment | None
     film: FilmNews | None
@@ -24,22 +24,24 @@ class BearingSnapshot:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """State of a unit at one time; immutable values that are not copied.
+    """State of a unit at the time of an alarm; references to immutable values, without copies.
 
     Parameters
     ----------
+    event
+        Event that raised or escalated the alarm.
     taken_ns
-        Host time.
+        Host time of the snapshot, in nanoseconds since 1970 UTC.
     status
-        State of the samples of the unit; None for alarms about the service itself.
+        State of the link and of the samples of the unit; None for alarms about the service.
     bearings
-        All bearings of the unit, that of the alarm first.
+        State of all bearings of the unit; the bearing of the alarm comes first.
     bearing
-        Bearing of the alarm, if any.
+        Identifier of the bearing of the alarm; None if the alarm concerns no bearing.
     rules
-        Rules of film monitoring; None if it is off.
+        Rules of film monitoring; None if film monitoring is off.
     samples_expected
-        Whether samples around the alarm are going to be kept.
+        Whether the samples around the alarm are to be recorded.
     """
 
     event: AlarmEvent
@@ -52,12 +54,12 @@ class Snapshot:
 
     @property
     def name(self) -> str:
-        """Alarm and occurrence, for messages."""
+        """Alarm id and occurrence, for messages."""
         return f"{self.event.identity.id} occurrence {self.event.occurrence}"
 
 
 class SnapshotTaker:
-    """Takes snapshots on the event loop, without delay since it only takes references."""
+    """Takes snapshots on the event loop without blocking, as only references are copied."""
 
     def __init__(
         self, units: Mapping[str, UnitSettings], live: LiveView, films: FilmMonitor
@@ -65,7 +67,7 @@ class SnapshotTaker:
         self._units, self._live, self._films = units, live, films
 
     def take(self, event: AlarmEvent, now_ns: int, samples_expected: bool) -> Snapshot:
-        """Return a snapshot of an alarm's unit."""
+        """Return a snapshot of the unit of an alarm event."""
         id_, unit = event.identity.unit, self._units.get(event.identity.unit)
         bearing = None if unit is None else bearing_of(unit, event.identity.subject)
         ids = [] if unit is None else [each.id for each in unit.bearing]
@@ -89,7 +91,7 @@ class SnapshotTaker:
 
 
 def bearing_of(unit: UnitSettings, subject: str) -> str | None:
-    """Return the bearing that a subject is, or to which the channel belongs."""
+    """Return the bearing of an alarm subject, a bearing or one of its channels; None if unknown."""
     for bearing in unit.bearing:
         channels = {bearing.shaft_x, bearing.shaft_y, bearing.bearing_x, bearing.bearing_y}
         if subject == bearing.id or subject in channels:

@@ -1,4 +1,4 @@
-"""Tables of a bundle as Parquet: spectra, orbits, and readings around the alarm."""
+"""Parquet tables of a bundle: spectra, orbits, and readings of the film before the alarm."""
 
 from collections.abc import Iterable
 from io import BytesIO
@@ -19,7 +19,7 @@ from service.store.film_readings import FilmHistory
 SPECTRA, ORBITS, TREND = "spectra.parquet", "orbits.parquet", "trend.parquet"
 
 CHANNELS = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
-"""Order of the channels of a cross-spectrum."""
+"""Names of the channels of a cross-spectrum, in order."""
 
 PAIRS = [(i, j) for i in range(len(CHANNELS)) for j in range(i + 1, len(CHANNELS))]
 
@@ -28,21 +28,21 @@ WORDS = np.array([verdict.name.lower() for verdict in Verdict])
 AnyArray = npt.NDArray[Any]
 
 Columns = dict[str, list[Any]]
-"""Table as lists by column."""
+"""Table as lists of values by column name."""
 
 
 class TableError(Exception):
-    """A table of a bundle cannot be read; the message says which and why."""
+    """Error raised if a table of a bundle cannot be read; the message states file and reason."""
 
 
 def spectra_table(found: Iterable[Assessment]) -> bytes:
-    """Return the cross-spectra of bearings, the basis of all results in the frequency domain."""
+    """Return the Parquet table of the cross-spectra of bearings, with amplitudes and coherence."""
     tables = [_spectrum(each.bearing, each.spectrum) for each in found]
     return _written(pa.concat_tables(tables))
 
 
 def orbits_table(found: Iterable[Assessment]) -> bytes | None:
-    """Return the newest revolutions of the shaft in each bearing; None without samples."""
+    """Return the Parquet table of the newest shaft orbits of bearings; None without samples."""
     tables = []
     for each in found:
         orbit = each.orbit
@@ -60,7 +60,7 @@ def orbits_table(found: Iterable[Assessment]) -> bytes | None:
 
 
 def trend_table(found: FilmHistory) -> bytes:
-    """Return readings of a film, oldest first."""
+    """Return the Parquet table of readings of a film, oldest first."""
     return _written(_trend(found))
 
 
@@ -104,12 +104,12 @@ def trend_columns(found: FilmHistory) -> Columns:
 
 
 def read_table(path: Path) -> Columns:
-    """Return a table of a bundle.
+    """Read a Parquet table of a bundle.
 
     Raises
     ------
     TableError
-        If it cannot be read.
+        If the table cannot be read.
     """
     try:
         columns: Columns = pq.read_table(path, memory_map=False).to_pydict()

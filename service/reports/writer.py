@@ -1,4 +1,4 @@
-"""Writer of bundles, which runs in the thread of the collector."""
+"""Writer of evidence bundles; it runs in the thread of the collector."""
 
 import shutil
 from contextlib import suppress
@@ -19,24 +19,23 @@ from service.store.films import FilmStore
 
 
 class EvidenceWriter:
-    """Writes bundles atomically: each is complete under its name, or does not exist."""
+    """Writer of evidence bundles; a bundle exists under its name only if it is complete."""
 
     def __init__(self, root: Path, maker: Maker, store: FilmStore, limits: EvidenceLimits) -> None:
         self._root, self._maker, self._store, self._limits = root, maker, store, limits
 
     def write(self, snapshot: Snapshot, *, with_history: bool = True) -> Place:
-        """Write a bundle and return its place; an existing bundle stays.
+        """Write the bundle of a snapshot and return its location; keep an existing bundle.
 
         Parameters
         ----------
         with_history
-            Whether to include readings from the store; otherwise the document says that they are
-            missing.
+            Whether to include readings from the store; if not, the document lists them as missing.
 
         Raises
         ------
         OSError
-            If the disk refuses; nothing is left then.
+            If the disk cannot be written; no files remain.
         StoreError
             If the store cannot be read.
         """

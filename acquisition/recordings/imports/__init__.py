@@ -1,1 +1,1 @@
-"""Files of other tools, each by its library."""
+"""Import of measurement files of other tools: CSV, HDF5, TDMS, MDF 4 and CAN logs."""

@@ -1,4 +1,4 @@
-"""CAN logs of candump and BLF, read by python-can, in batches of frames."""
+"""Reader of CAN logs in candump and BLF format, by python-can, in batches of frames."""
 
 import logging
 import re
@@ -23,26 +23,26 @@ _CANDUMP_LINE = re.compile(
     r"(?:(?P<error>[23][0-9A-Fa-f]{7})|[0-9A-Fa-f]{3}|[01][0-9A-Fa-f]{7})#"
     r"(?:R[0-9]?|(?:#[0-9])?(?:[0-9A-Fa-f]{2})*)(?: [RT])?\s*"
 )
-"""python-can takes an id of more than 29 bits for another one, and most error frames for data."""
+"""Pattern of a candump line; python-can misreads identifiers over 29 bits and error frames."""
 
 
 def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[Frames, float]]:
-    """Data frames of a log and the share of it that has been read.
+    """Yield batches of data frames of a log, each with the fraction of the log read so far.
 
-    candump writes seconds since 1970 in UTC. BLF has the local time of its writer, in the
-    time zone of the mapping.
+    candump writes UTC seconds since 1970. BLF contains the local time of its writer; the time zone
+    is that of the mapping.
 
     Raises
     ------
     ConfigError
-        If a frame cannot have been on a bus, anything is missing, or frames were on several buses
-        and the mapping does not say which is meant.
+        If a frame is invalid, the log is incomplete, or the log has frames of several buses and the
+        mapping selects none.
     """
     size = max(path.stat().st_size, 1)
     with path.open("rb") as stream:
         frames = _of_one_bus(_data_frames(stream, job), job)
         while batch := list(islice(frames, _BATCH)):
-            done = 1.0 if stream.closed else min(stream.tell() / size, 1.0)  # by python-can
+            done = 1.0 if stream.closed else min(stream.tell() / size, 1.0)  # python-can closes it
             yield _batch(batch, job), done
 
 
@@ -56,7 +56,7 @@ def _data_frames(stream: BinaryIO, job: ImportJob) -> Iterator[can.Message]:
 
 
 def _candump_lines(stream: BinaryIO) -> Iterator[str]:
-    """Lines with a frame, without error frames."""
+    """Yield the lines that contain a frame, except error frames."""
     for number, content in enumerate(iter(stream.readline, b""), start=1):
         line = content.decode("ascii", "replace")
         if not line.endswith("\n"):
@@ -69,7 +69,7 @@ def _candump_lines(stream: BinaryIO) -> Iterator[str]:
 
 
 def _blf_frames(stream: BinaryIO) -> Iterator[can.Message]:
-    """All frames, error frames included; python-can passes over what it cannot read."""
+    """Yield all frames, including error frames; raise ConfigError for data python-can skips."""
     size = stream.seek(0, 2)
     stream.seek(0)
     warnings = logging.getLogger("can.io.blf")
@@ -90,14 +90,14 @@ def _blf_frames(stream: BinaryIO) -> Iterator[can.Message]:
 
 
 class _Refusal(logging.Handler):
-    """Refuses what python-can only warns of: an object or a container that it leaves out."""
+    """Log handler that raises ConfigError for warnings of python-can about skipped objects."""
 
     def emit(self, record: logging.LogRecord) -> None:
         raise ConfigError(record.getMessage())
 
 
 class _CountingBlfReader(can.BLFReader):
-    """Counts objects: python-can takes a log that breaks off for one that ends."""
+    """BLF reader that counts objects; python-can does not detect a truncated log."""
 
     n_objects = 0
 
@@ -110,7 +110,7 @@ class _CountingBlfReader(can.BLFReader):
     def _parse_container(self, data: bytes) -> Iterator[can.Message]:
         known, at = self._tail + data, -1
         for frame in super()._parse_container(data):
-            if self._pos == at:  # python-can would read it for ever
+            if self._pos == at:  # python-can would loop endlessly
                 raise ConfigError("damaged: an object of no length")
             at = self._pos
             yield frame
@@ -118,10 +118,10 @@ class _CountingBlfReader(can.BLFReader):
 
 
 def _of_one_bus(frames: Iterator[can.Message], job: ImportJob) -> Iterator[can.Message]:
-    """Frames of the same id on two buses come from two devices."""
+    """Yield the frames of a single bus; the same identifier on two buses means two devices."""
     bus, other, n_taken = job.bus, "", 0
     for frame in frames:
-        # candump has names, BLF counts from 1 and python-can from 0
+        # candump names buses; BLF numbers them from 1, python-can from 0
         is_counted = job.format == "blf" and isinstance(frame.channel, int)
         found = str(frame.channel + 1 if is_counted else frame.channel)  # type: ignore[operator]
         bus = bus or found
@@ -154,7 +154,7 @@ def _require_possible(frame: can.Message, number: int) -> None:
 
 def _batch(frames: list[can.Message], job: ImportJob) -> Frames:
     found = np.zeros(len(frames), FRAME)
-    # a double of seconds since 1970 is good to a fourth of a microsecond
+    # the resolution of a double of seconds since 1970 is a quarter of a microsecond
     us = np.rint(np.array([frame.timestamp for frame in frames]) * 1e6).astype(np.int64)
     offset_s = job.time.utc_offset_s if job.format == "blf" else 0
     found["time_ns"] = us * 1000 - offset_s * 1_000_000_000

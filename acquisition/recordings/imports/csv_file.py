@@ -1,4 +1,4 @@
-"""CSV files, read line by line with limits on lines and columns."""
+"""Reader of CSV files, line by line, with limits on line length and number of columns."""
 
 import csv
 import math
@@ -24,18 +24,18 @@ MAX_LINE_BYTES = 1_000_000
 MAX_COLUMNS = 4096
 _ROWS = 4096
 _CELLS = 2**20
-"""Rows and cells that are held at once."""
+"""Maximum number of rows and of cells in memory."""
 
 _Columns: TypeAlias = Sequence[tuple[str, ...]]
 
 
 def csv_rows(path: Path, job: ImportJob) -> Iterator[Rows]:
-    """All rows behind the header; an empty cell of a slow channel repeats the value before it.
+    """Yield the rows after the header; an empty cell of a slow channel repeats the previous value.
 
     Raises
     ------
     ConfigError
-        If the file is not what the job describes; the message names the line.
+        If the file does not match the job; the message names the line.
     """
     with path.open("rb") as stream:
         yield from _CsvFile(stream, job).rows(max(path.stat().st_size, 1))
@@ -65,7 +65,7 @@ class _CsvFile:
         self._keeps_counts = counts_are_kept(job, [None] * len(job.channels))
 
     def rows(self, n_bytes: int) -> Iterator[Rows]:
-        """All rows of a file of this size."""
+        """Yield all rows; `n_bytes` is the size of the file, to compute the fraction read."""
         n_at_once = max(1, min(_ROWS, _CELLS // max(1, len(self._headings))))
         cells = self._complete()
         while table := list(islice(cells, n_at_once)):
@@ -99,7 +99,7 @@ class _CsvFile:
             raise self._wrong(str(error)) from error
 
     def _complete(self) -> Iterator[list[str]]:
-        for row in filter(None, self._cells):  # without empty lines
+        for row in filter(None, self._cells):  # skips empty lines
             if len(row) != len(self._headings):
                 raise self._wrong(f"{len(row)} columns where the header has {len(self._headings)}")
             yield row
@@ -139,7 +139,7 @@ class _CsvFile:
     def _numbers(
         self, texts: Sequence[str], of: Callable[[str], Any] = _number, noun: str = "number"
     ) -> npt.NDArray[Any]:
-        """Numbers without groups of thousands, which are taken for decimals or left out."""
+        """Return the numbers of a column; thousands separators are refused as ambiguous."""
         decimal, found, text = self._job.csv.decimal, [], ""
         for mark in {"_", "."} - {decimal}:
             if mark in "".join(texts):

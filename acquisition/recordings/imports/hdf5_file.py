@@ -1,4 +1,4 @@
-"""HDF5 files: datasets of one dimension, in this very file."""
+"""Reader of HDF5 files: one-dimensional datasets stored in the file itself."""
 
 import math
 from pathlib import Path
@@ -15,11 +15,11 @@ UNIT_ATTRIBUTES = ("unit", "units")
 PER_COUNT_ATTRIBUTE = "unit_per_count"
 
 _MAX_CHUNK_BYTES = 2**26
-"""HDF5 unpacks whole chunks, however few of their values are asked for."""
+"""Maximum size of a chunk; HDF5 decompresses whole chunks to read any of their values."""
 
 
 def hdf5_file(path: Path) -> SeriesFile:
-    """Open a file: a name is the path of a dataset, whose attributes may state its unit."""
+    """Open an HDF5 file; columns are named by dataset path, with units in dataset attributes."""
     h5py = library("h5py", "HDF5")
     file = h5py.File(path, "r")
 
@@ -58,7 +58,7 @@ def _require_plain(dataset: Any, place: ColumnName) -> None:
 
 
 def _is_written(dataset: Any) -> bool:
-    """Whether all values were written; HDF5 returns a fill value for the others."""
+    """Return whether all values were written; HDF5 returns a fill value for unwritten ones."""
     if dataset.chunks is None:
         return bool(dataset.size == 0 or dataset.id.get_storage_size())
     return bool(dataset.id.get_num_chunks() * dataset.chunks[0] >= dataset.shape[0])

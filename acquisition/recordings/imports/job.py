@@ -1,4 +1,4 @@
-"""`ImportJob`: columns of the channels of a file, and its time axis."""
+"""`ImportJob`: mapping of the columns of a file to channels, and time axis of the file."""
 
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
@@ -31,22 +31,24 @@ class ColumnName:
 
 @dataclass(frozen=True)
 class TimeAxis:
-    """Times of the samples of a file.
+    """Time axis of a file.
 
     Parameters
     ----------
     kind
-        "file": times of the format itself. "column": a time column. "start": from a given time on
-        at the unit's rate, without a gap.
+        Source of the times. "file": provided by the file format. "column": a time column. "start":
+        a start time and the sampling rate of the unit, without gaps.
+    place
+        Time column, for kind "column".
     form
-        What a column has: text ("iso8601"), the format's own stamps ("timestamp"), or numbers since
-        1970 ("epoch_s") or since the start ("elapsed_s"), in s, ms, us or ns.
+        Content of a time column: text ("iso8601"), time stamps of the file format ("timestamp"), or
+        numbers since 1970 ("epoch_s") or since the start ("elapsed_s"), in s, ms, us or ns.
     start_ns
-        Start in UTC; None if the file has it.
+        Start time, UTC in ns; None if the file states it.
     utc_offset_s
         Local time minus UTC, for times without a time zone.
     tolerance
-        How far a stamp may be from its place at the unit's rate, in samples.
+        Maximum deviation of a stamp from a constant sampling rate, in samples.
     """
 
     kind: TimeKind
@@ -59,19 +61,19 @@ class TimeAxis:
 
 @dataclass(frozen=True)
 class ChannelColumn:
-    """A waveform channel.
+    """Column of a waveform channel.
 
     Parameters
     ----------
     unit
-        Of the values in the file.
+        Unit of the values in the file.
     factor
-        Engineering unit of the channel per unit of the file.
+        Engineering units of the channel per unit of the file.
     calibrated_per_count
-        Engineering units per count by the channel's calibration: only counts of just this scale
-        are taken over as counts.
+        Engineering units per count in the calibration of the channel; only counts with this scale
+        are imported as counts.
     per_count
-        The file's unit per count, if the column has counts and the file does not state it.
+        Value of one count in the unit of the file, for counts whose scale the file does not state.
     """
 
     id: str
@@ -84,12 +86,12 @@ class ChannelColumn:
 
 @dataclass(frozen=True)
 class SlowColumn:
-    """A slow channel: value = factor × what the file has + offset.
+    """Column of a slow channel: value = factor × value in the file + offset.
 
     Parameters
     ----------
     time
-        Its own time column, of the same form as that of the waveforms; None for their time.
+        Time column of the slow channel, in the form of the time axis; None for the waveform times.
     """
 
     id: str
@@ -107,7 +109,7 @@ class CsvLayout:
     Parameters
     ----------
     header_line
-        Number of the line with the headings, counted from 1; what is before it is skipped.
+        Number of the line with the headings, counted from 1; earlier lines are skipped.
     """
 
     delimiter: str = ","
@@ -117,16 +119,16 @@ class CsvLayout:
 
 @dataclass(frozen=True)
 class ImportJob:
-    """Description of a file for its reader.
+    """Description of a file to import: format, time axis and columns of the channels.
 
     Parameters
     ----------
     rate_hz, block_samples
-        Of the unit: see :class:`core.samples.calibration.UnitCalibration`.
+        Values of the unit; see :class:`core.samples.calibration.UnitCalibration`.
     channels, slow
-        In the order of the unit.
+        Columns in the order of the channels of the unit.
     bus
-        Bus to read from a CAN log of several; empty if the log must be of one.
+        Bus to read from a CAN log; empty for a log of a single bus.
     """
 
     format: Format

@@ -1,4 +1,4 @@
-"""MDF version 4, the measurement format of ASAM."""
+"""Reader of MDF 4 files, the measurement data format of ASAM."""
 
 from pathlib import Path
 from typing import Any
@@ -16,13 +16,13 @@ _MAGIC = b"MDF     4"
 _LOCAL_TIME = 1
 _NO_CONVERSION, _LINEAR = 0, 1
 _INVALID = 0b11
-"""Flags of a channel whose samples are all invalid, or invalid where a bit is set."""
+"""Channel flags: all samples are invalid, or samples have invalidation bits."""
 
 
 def mdf_file(path: Path, job: ImportJob) -> SeriesFile:
-    """Open a file: a name is that of a channel and, where needed, name or number of its group."""
+    """Open an MDF file; columns are named by channel and, if ambiguous, by group name or number."""
     with path.open("rb") as stream:
-        if stream.read(len(_MAGIC)) != _MAGIC:  # asammdf would unpack archives to the disk
+        if stream.read(len(_MAGIC)) != _MAGIC:  # asammdf extracts archives to the disk
             raise ConfigError("not an MDF file of version 4, or not finished")
     mdf = library("asammdf", "MDF4").MDF(path)
     is_local = bool(mdf.header.time_flags & _LOCAL_TIME)
@@ -59,7 +59,7 @@ def _series(mdf: Any, group: int, index: int, place: ColumnName, start_ns: int) 
             index=index,
             samples_only=True,
             raw=True,
-            ignore_invalidation_bits=True,  # else what is invalid is left out, and the rest moves
+            ignore_invalidation_bits=True,  # else invalid samples are removed, which shifts others
             record_offset=start,
             record_count=stop - start,
         )

@@ -1,4 +1,4 @@
-"""Rows of a file to blocks: time stamps to uniform stretches, exact gaps and restarts."""
+"""Conversion of file rows to blocks: detects gaps and device restarts in the time stamps."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -13,33 +13,34 @@ from core.arrays import FloatArray, RawArray
 from core.units import NS_PER_S
 
 _PIECE = 512
-"""Rows that are compared with one straight line: short against the drift of a clock."""
+"""Rows compared with one straight line of times; few enough to neglect clock drift."""
 
 _FIRST_ROWS = 64
 _FOLLOWED_ROWS = 256
-"""Over how many rows the line follows the stamps: longer than their jitter, shorter than drift."""
+"""Rows over which the line is averaged: enough to smooth jitter, few enough to follow drift."""
 
 _GAP_STEP = 1.5
 
 _MEDIAN_STEP = (0.6, 1.4)
-"""Median step in samples at the right rate, even with coarse stamps."""
+"""Range of the median time step in samples if the rate is correct, even with coarse stamps."""
 
 _MIN_STEPS = 16
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Samples of all channels at the same times, in the order of the file.
+    """Consecutive rows of a file: simultaneous samples of all channels.
 
     Parameters
     ----------
     times_ns : (n_rows,)
+        Times of the rows, UTC in nanoseconds.
     samples : (n_channels, n_rows)
         int16 counts or float32 engineering units.
     slow
-        (n_rows,) of each slow channel: the value that is valid at the time of the row.
+        (n_rows,) values of each slow channel, valid at the time of the row.
     done
-        Share of the file that has been read.
+        Fraction of the file that has been read.
     """
 
     times_ns: TimeArray
@@ -50,7 +51,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Consecutive rows without a gap, and the sample index of the first one."""
+    """Range of rows without a gap, with epoch and sample index of its first row."""
 
     start: int
     stop: int
@@ -59,17 +60,17 @@ class Stretch:
 
 
 class Indexer:
-    """Assigns sample indices to rows by their time stamps, at the rate of the unit.
+    """Assigns sample indices to rows by their time stamps, at the sampling rate of the unit.
 
     A line of constant rate is fitted to the stamps and follows the drift of their clock. A step off
-    the line by a whole number of samples is a gap of that number; a step by a fraction of a sample
-    after a pause is a restart of the device, a new epoch. Everything else, another rate included,
-    is refused. Nothing is interpolated.
+    the line by a whole number of samples is a gap of that number. A step by a fraction of a sample
+    after a pause is a restart of the device and starts a new epoch. All other steps, and a
+    different rate, raise an error. Nothing is interpolated.
 
     Parameters
     ----------
     tolerance
-        How far a stamp may be from its place on the line, in samples.
+        Maximum deviation of a stamp from the line, in samples.
     """
 
     def __init__(self, rate_hz: float, tolerance: float) -> None:
@@ -84,12 +85,12 @@ class Indexer:
         self._last_ns = 0
 
     def stretches(self, times_ns: TimeArray) -> Iterator[Stretch]:
-        """Divide the next rows into stretches, whose rows are counted from the first of these.
+        """Divide the next rows into ranges without a gap, counted from the first of these rows.
 
         Raises
         ------
         ConfigError
-            If time goes back, is irregular or of another rate; the message names the row.
+            If times decrease, are irregular or have a wrong rate; the message names the row.
         """
         start = 0
         while start < len(times_ns):
@@ -105,13 +106,13 @@ class Indexer:
                 self._step(int(times_ns[start]), piece)
 
     def _lay_line(self, piece: TimeArray) -> None:
-        """Fit the phase of the line to the first stamps; gaps of whole samples do not matter."""
+        """Fit the phase of the line to the first stamps, unaffected by gaps of whole samples."""
         self._origin_ns, self._expected_ns = int(piece[0]), 0.0
         turns = np.exp(2j * np.pi * self._deviations(piece))
         self._expected_ns = float(np.angle(turns.mean())) / (2 * np.pi) * self._period_ns
 
     def _deviations(self, piece: TimeArray) -> np.ndarray:
-        """In samples, from the line."""
+        """Return the deviations of the stamps from the line, in samples."""
         since_ns = (piece - self._origin_ns).astype(np.float64) - (self._expected_ns or 0.0)
         return np.asarray(since_ns / self._period_ns - np.arange(len(piece)))
 
@@ -131,7 +132,7 @@ class Indexer:
         self._row += len(piece)
 
     def _step(self, time_ns: int, piece: TimeArray) -> None:
-        """Pass a gap or a restart before the row at this time."""
+        """Update index or epoch for a gap or a device restart before the row at this time."""
         step = (time_ns - self._last_ns) / self._period_ns
         if step <= 0:
             raise ConfigError(f"row {self._row + 1}: time goes back by {-step:.3f} samples")
@@ -149,7 +150,7 @@ class Indexer:
             self._expected_ns = None
 
     def _require_rate(self, piece: TimeArray) -> None:
-        """Refuse stamps at another rate: each step between them would look like a gap."""
+        """Raise ConfigError if the rate of the stamps is wrong; each step would look like a gap."""
         steps = np.diff(piece) / self._period_ns
         if len(steps) >= _MIN_STEPS or (self._row == 0 and len(steps) > 1):
             low, high = _MEDIAN_STEP
@@ -167,15 +168,15 @@ class Indexer:
 
 
 def raw_blocks(table: Iterable[Rows], job: ImportJob) -> Iterator[tuple[RawBlock, float]]:
-    """Samples in the order of the file, each block with the share of it that has been read.
+    """Yield the blocks of a file in order, each with the fraction of the file read so far.
 
-    They end at multiples of the unit's block length and wherever the file was read in parts. A slow
-    channel has in each the value that was valid at its first sample.
+    Blocks end at multiples of the unit's block length and at the end of each piece read. The slow
+    values of a block are those valid at its first sample.
 
     Raises
     ------
     ConfigError
-        If the times cannot be those of samples at the unit's rate.
+        If the times are inconsistent with the sampling rate of the unit.
     """
     indexer = Indexer(job.rate_hz, job.time.tolerance)
     for rows in table:
@@ -185,7 +186,7 @@ def raw_blocks(table: Iterable[Rows], job: ImportJob) -> Iterator[tuple[RawBlock
 
 
 def _pieces(rows: Rows, stretch: Stretch, job: ImportJob) -> Iterator[RawBlock]:
-    """Parts of a stretch, cut at multiples of the block length, where slow values are taken."""
+    """Yield blocks of a range of rows, split at multiples of the block length."""
     to_grid = -stretch.first_index % job.block_samples or job.block_samples
     starts = [stretch.start, *range(stretch.start + to_grid, stretch.stop, job.block_samples)]
     for start, stop in zip(starts, [*starts[1:], stretch.stop], strict=True):

@@ -1,4 +1,4 @@
-"""Files whose columns can be read from anywhere: one way to rows for HDF5, TDMS and MDF."""
+"""Conversion to rows of files with random access to columns: HDF5, TDMS and MDF."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -16,35 +16,35 @@ from acquisition.recordings.imports.times import TimeArray, from_start, numbers_
 from core.arrays import FloatArray, SampleArray
 
 MAX_SAMPLES = 2**29
-"""Per channel, as in a recording."""
+"""Maximum number of samples per channel, as in a recording."""
 
 _SAME_GAIN = 1e-6
-"""Gains that differ by less come from rounding in files; 24 bits cannot tell them apart."""
+"""Relative tolerance for equal gains; smaller differences are rounding errors in files."""
 
 _ROWS = 65_536
-"""Rows of a column that are read at once."""
+"""Number of rows per read of a column."""
 
 
 Read: TypeAlias = Callable[[int, int], npt.NDArray[Any]]
-"""Returns the part of a column from one row up to before another."""
+"""Function (start, stop) that returns the rows of a column from `start` to `stop` (excluded)."""
 
 
 @dataclass(frozen=True)
 class Series:
-    """A column of a file.
+    """Column of a measurement file.
 
     Parameters
     ----------
     unit
-        As the file has it.
+        Unit of measurement as stated in the file; None if the file states none.
     values
-        Counts where `per_count` is given, else values in the file's unit.
+        Reads counts if `per_count` is given, else values in the unit of the file.
     per_count
-        Unit of the file per count, for a column of int16 counts with a linear scale.
+        Value of one count in the unit of the file, for int16 counts with a linear scale.
     times_ns
-        Times by what the format itself has; None where it has nothing.
+        Reads the times that the file format provides for the column; None if it provides none.
     time_key
-        Columns of the same key have the same times.
+        Identifier of the time base; columns with the same key have the same times.
     """
 
     n_samples: int
@@ -57,14 +57,14 @@ class Series:
 
 @dataclass(frozen=True)
 class SeriesFile:
-    """An opened file.
+    """Columns of an opened measurement file.
 
     Parameters
     ----------
     find
-        Returns a column; raises ConfigError if it is not there, or there twice.
+        Returns a column by name; raises ConfigError if the column is missing or ambiguous.
     start_ns
-        What its times count from, if the file has that.
+        Start time of the file's time column, UTC in ns; None if the file states none.
     """
 
     find: Callable[[ColumnName], Series]
@@ -72,12 +72,12 @@ class SeriesFile:
 
 
 def series_rows(file: SeriesFile, job: ImportJob) -> Iterator[Rows]:
-    """The columns of a job as rows.
+    """Yield the rows of the columns that an import job selects.
 
     Raises
     ------
     ConfigError
-        If the file is not what the job describes.
+        If the file does not match the job.
     """
     found = [_column(file, column) for column in job.channels]
     channels = list(zip(job.channels, found, strict=True))
@@ -140,14 +140,14 @@ def _common_times_ns(
 
 
 class _SlowFeed:
-    """Values of a slow channel at the times of the waveforms."""
+    """Reader of a slow channel; returns its values at the times of the waveforms."""
 
     def __init__(self, file: SeriesFile, job: ImportJob, column: SlowColumn, n_rows: int) -> None:
         self._series, self._slow = _column(file, column), column
         self._read_times_ns = _times_of(file, job, column, self._series)
         self._n_read = 0
         self._times_ns = np.empty(0, np.int64)
-        self._values = np.full(1, np.nan)  # valid before the first time, then from each on
+        self._values = np.full(1, np.nan)  # one more than times: [0] is valid before the first
         own_time = column.time is not None or job.time.kind == "file"
         if not own_time and self._series.n_samples != n_rows:
             raise ConfigError(
@@ -156,7 +156,7 @@ class _SlowFeed:
             )
 
     def at(self, times_ns: TimeArray) -> FloatArray:
-        """Values that are valid at some times, later than those of the last call."""
+        """Return the values valid at the given times; later calls must pass later times."""
         n_samples = self._series.n_samples
         while self._n_read < n_samples and not np.any(self._times_ns[-1:] > times_ns[-1]):
             self._read(self._n_read, min(self._n_read + _ROWS, n_samples))
@@ -178,7 +178,7 @@ class _SlowFeed:
 def _times_of(
     file: SeriesFile, job: ImportJob, column: ChannelColumn | SlowColumn, series: Series
 ) -> Read:
-    """The times of a column: by a time column of its own, or as the job describes them."""
+    """Return a reader of the times of a column: its own time column, else the job's time axis."""
     own, axis = column.time if isinstance(column, SlowColumn) else None, job.time
     place = own or axis.place
     if own is None and axis.kind == "start":
@@ -212,12 +212,12 @@ def _numbers(read: Read, start: int, stop: int, place: ColumnName) -> npt.NDArra
 
 
 def require_one(found: Sequence[Any], place: ColumnName, known: Sequence[str]) -> Any:
-    """The only one of what was found.
+    """Return the only column in a list of matching columns.
 
     Raises
     ------
     ConfigError
-        If there is none, or more than one.
+        If no column or more than one column matches.
     """
     if len(found) != 1:
         words = f"there {len(found)} times: name its group" if found else "not there"
@@ -227,12 +227,12 @@ def require_one(found: Sequence[Any], place: ColumnName, known: Sequence[str]) -
 
 
 def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
-    """Whether all columns have counts, with just the gain of their channel's calibration.
+    """Return whether all columns hold counts with the gain of the calibration of their channel.
 
     Parameters
     ----------
     per_count
-        Unit of the file per count of each column, as stated in the file; None if it states none.
+        Value of one count of each column, as stated in the file; None if the file states none.
     """
     gains = [found or c.per_count for c, found in zip(job.channels, per_count, strict=True)]
     return all(
@@ -245,13 +245,13 @@ def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
 def engineering_units(
     values: npt.NDArray[np.generic], channel: ChannelColumn, per_count: float | None
 ) -> SampleArray:
-    """Values of a column in the unit of its channel; integers that are counts are scaled.
+    """Return the values of a column in the unit of its channel; counts are scaled.
 
     Parameters
     ----------
     per_count
-        As in :func:`counts_are_kept`.
+        Value of one count as stated in the file; None if the file states none.
     """
     gain = channel.factor * (per_count or channel.per_count or 1.0)
-    with np.errstate(over="ignore"):  # beyond float32 is infinite, and so not finite
+    with np.errstate(over="ignore"):  # overflow to infinity marks the sample as unusable
         return (values.astype(np.float64) * gain).astype(np.float32)

@@ -1,4 +1,4 @@
-"""TDMS files of LabVIEW and its relatives: channels in groups."""
+"""Reader of TDMS files (National Instruments, LabVIEW): channels in groups."""
 
 import struct
 from pathlib import Path
@@ -19,14 +19,14 @@ _WAVEFORM_PROPERTIES = ("wf_start_time", "wf_increment", "wf_start_offset")
 _SCALE = "NI_Scale[0]_"
 
 _LEAD = struct.Struct("<4sL4xQ8x")
-"""Of a segment: magic, table of contents; bytes that follow. Source: NI, TDMS file format."""
+"""Lead-in of a segment: tag, table of contents, next segment offset. Source: NI, TDMS format."""
 
 _BIG_ENDIAN = 1 << 6
 _UNFINISHED = 2**64 - 1
 
 
 def tdms_file(path: Path) -> SeriesFile:
-    """Open a file: a name is group and channel; its own time is that of the waveform properties."""
+    """Open a TDMS file; columns are named by group and channel, times are waveform properties."""
     stream = path.open("rb")  # not a path: npTDMS would use an index file beside it
     _require_whole(stream)
     file = library("nptdms", "TDMS").TdmsFile.open(stream, raw_timestamps=True)
@@ -70,7 +70,7 @@ def _series(channel: Any) -> Series:
 
 
 def _per_count(channel: Any) -> float | None:
-    """Of counts with one linear scale through zero, which is all that a converter needs."""
+    """Return the value of one count of an int16 channel with a linear scale through 0, or None."""
     get = channel.properties.get
     linear = get("NI_Number_Of_Scales") == 1 and get(_SCALE + "Scale_Type") == "Linear"
     if not linear or get(_SCALE + "Linear_Y_Intercept") != 0.0:
@@ -81,7 +81,7 @@ def _per_count(channel: Any) -> float | None:
 
 
 def _require_whole(stream: BinaryIO) -> None:
-    """Refuse a file that does not end where its last segment does; npTDMS would read the rest."""
+    """Raise ConfigError if the file is truncated, which npTDMS does not report."""
     size = stream.seek(0, 2)
     at = 0
     while at < size:
@@ -90,7 +90,7 @@ def _require_whole(stream: BinaryIO) -> None:
         if len(lead) < _LEAD.size:
             raise ConfigError(f"cut off within the segment at {at}")
         magic, contents, n_bytes = _LEAD.unpack(lead)
-        if contents & _BIG_ENDIAN:  # of all but the table of contents itself
+        if contents & _BIG_ENDIAN:  # applies to all fields except the table of contents
             n_bytes = int.from_bytes(n_bytes.to_bytes(8, "little"), "big")
         if magic != b"TDSm":
             raise ConfigError(f"no TDMS file, or damaged: there is no segment at {at}")
@@ -106,7 +106,7 @@ def _stamps_ns(stamps: Any) -> npt.NDArray[np.int64]:
     seconds: npt.NDArray[np.int64] = np.asarray(stamps["seconds"]).astype(np.int64) + _EPOCH_1904_S
     if np.any(np.abs(seconds) > 2**33):
         raise ConfigError("a time stamp beyond the year 2242")
-    # the upper 53 bits of 64 are exact in a double, and a thousand times finer than is needed
+    # the upper 53 of 64 bits are exact in a double, a resolution far below the microsecond needed
     us = np.rint((np.asarray(stamps["second_fractions"]) >> np.uint64(11)) * 2.0**-53 * 1e6)
     found: npt.NDArray[np.int64] = seconds * NS_PER_S + us.astype(np.int64) * 1000
     return found

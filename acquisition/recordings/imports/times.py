@@ -1,4 +1,4 @@
-"""Times of files to UTC nanoseconds in whole microseconds; libraries that are optional."""
+"""Conversion of file times to UTC in ns, rounded to whole µs; import of optional libraries."""
 
 import importlib
 from collections.abc import Sequence
@@ -15,25 +15,25 @@ TimeArray = npt.NDArray[np.int64]
 
 _US_PER = {"s": 1e6, "ms": 1e3, "us": 1.0, "ns": 1e-3}
 _MAX_US = 2**53
-"""285 years; beyond it seconds in a double are not exact to a microsecond, and nanoseconds since
-1970 do not fit 64 bits."""
+"""Maximum time, 285 years: beyond it a double of seconds is not exact to 1 µs, and nanoseconds
+since 1970 overflow 64 bits."""
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 _MICROSECOND = timedelta(microseconds=1)
 
 
 def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None) -> TimeArray:
-    """Turn the numbers of a time column into UTC.
+    """Convert the numbers of a time column to UTC in nanoseconds.
 
     Parameters
     ----------
     start_ns
-        Origin of "elapsed" times, in UTC.
+        Origin of "elapsed" times, UTC in nanoseconds.
 
     Raises
     ------
     ConfigError
-        If a value is not a time, or a start is missing.
+        If a value is not a valid time, or the start of "elapsed" times is missing.
     """
     origin, _, unit = axis.form.partition("_")
     if unit not in _US_PER:
@@ -48,12 +48,12 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
 
 
 def utc_ns(us: TimeArray, start_ns: int) -> TimeArray:
-    """Turn whole microseconds since a start into UTC.
+    """Convert whole microseconds since a start to UTC in nanoseconds.
 
     Raises
     ------
     ConfigError
-        If one is further from 1970 than nanoseconds can count.
+        If a time is too far from 1970 for nanoseconds in 64 bits.
     """
     found = us + np.int64(start_ns // 1000)
     wrong = np.abs(found) >= _MAX_US
@@ -63,22 +63,22 @@ def utc_ns(us: TimeArray, start_ns: int) -> TimeArray:
 
 
 def _whole_us(values: npt.NDArray[Any], us_per_unit: float) -> TimeArray:
-    if values.dtype.kind in "iu" and us_per_unit < 1.0:  # nanoseconds are beyond a double
+    if values.dtype.kind in "iu" and us_per_unit < 1.0:  # a double cannot hold epoch nanoseconds
         return np.asarray(values // 1000 + (values % 1000 >= 500)).astype(np.int64)
     exact = np.rint(values.astype(np.float64) * us_per_unit)
-    wrong = ~(np.abs(exact) < _MAX_US)  # written so that NaN is wrong, too
+    wrong = ~(np.abs(exact) < _MAX_US)  # NaN is wrong, too
     if wrong.any():
         raise ConfigError(f"{values[wrong][0]} in the time column is no time")
     return exact.astype(np.int64)
 
 
 def text_to_ns(texts: Sequence[str], axis: TimeAxis) -> TimeArray:
-    """Turn ISO 8601 texts into UTC; one without a time zone has that of the mapping.
+    """Convert ISO 8601 texts to UTC in nanoseconds; the default time zone is that of `axis`.
 
     Raises
     ------
     ConfigError
-        If one is not a time.
+        If a text is not a valid time.
     """
     zone = timezone(timedelta(seconds=axis.utc_offset_s))
     return utc_ns(np.array([_text_to_us(text, zone) for text in texts], dtype=np.int64), 0)
@@ -95,7 +95,7 @@ def _text_to_us(text: str, zone: timezone) -> int:
 
 
 def from_start(start_ns: int, first: int, stop: int, rate_hz: float) -> TimeArray:
-    """Times of the samples from one index to another, without a gap."""
+    """Return the times of samples `first` to `stop` (excluded) at a constant sampling rate."""
     number = np.arange(first, stop, dtype=np.float64)
     return utc_ns(np.floor(number * (1e6 / rate_hz)).astype(np.int64), start_ns)
 
@@ -106,7 +106,7 @@ def library(name: str, what: str) -> Any:
     Raises
     ------
     ConfigError
-        If it is not installed.
+        If the library is not installed.
     """
     try:
         return importlib.import_module(name)
