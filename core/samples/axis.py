@@ -115,7 +115,7 @@ class SampleAxis:
         return (counter - (self.index or 0)) % modulus
 
     def jump(self, counter: int, modulus: int, at_ns: int) -> int:
-        """Return the samples to a counter value, with the whole wraps that the elapsed time shows."""
+        """Return the samples to a counter value, with whole wraps according to the elapsed time."""
         forward = self.forward(counter, modulus)
         return forward + modulus * max(0, round((self.elapsed(at_ns) - forward) / modulus))
 

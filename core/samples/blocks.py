@@ -267,7 +267,7 @@ class SampleBlock:
         return {c.id: c.reading(value) for c, value in newest} | dict(self.elsewhere)
 
     def from_sample(self, start: int, stop: int | None = None) -> "SampleBlock":
-        """Return the samples `start` to `stop - 1` of the block; only the first part keeps rejects.
+        """Return samples `start` to `stop - 1` as a block; `rejected` is kept if `start` is 0.
 
         Raises `ValueError` if the part begins outside the block.
         """
