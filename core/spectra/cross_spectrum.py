@@ -192,7 +192,7 @@ def correlated_sum(
 
 @lru_cache(maxsize=8)
 def leakage_kernel(n_lines: int) -> FloatArray:
-    """Return the largest fraction of a line's power that leaks to each other line, (n_lines, n_lines).
+    """Return the largest fraction of line power that leaks to other lines, (n_lines, n_lines).
 
     It is zero within Hann's main lobe; the envelope of the side lobes at a distance of d bins is
     ``1 / (π d (d² - 1))``.

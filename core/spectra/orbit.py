@@ -12,8 +12,8 @@ from core.arrays import ComplexArray, FloatArray
 from core.spectra.speed import ODD_TURN, rising_edges
 
 FILTER_TURNS = 8.0
-"""Width of the taper of the 1× filter in turns. Its first zeros are 0.25 orders from 1×; the zeros
-beyond suppress a vortex at 0.25×."""
+"""Width of the taper of the 1× filter in turns. Its zeros are 0.25 orders from 1× and every 1/8
+order beyond; a vortex at 0.25× falls on one."""
 
 MIN_WEIGHT = 0.5
 """Fraction of the taper's weight that must fall on existing samples."""

@@ -40,8 +40,7 @@ LINE_SEARCH = (0.85, 1.15)
 
 
 KEY_PHASE_TOLERANCE = 0.02
-"""Largest relative difference of key-phase and speed channel; speed channels are often no better.
-"""
+"""Largest relative difference of key-phase and speed channel, often no better than 2 %."""
 
 LINE_SPREAD = 0.35
 """Standard uncertainty of an interpolated line frequency in bins, at a noise floor as strong as the
