@@ -12,7 +12,7 @@ DEVICE_EPOCHS = 1 << 32
 """Epochs reported by a device are below this number; epochs counted by an adapter start here."""
 
 RECOUNTED_EPOCHS = 1 << 33
-"""Epochs from here on are sample counts that restarted within an epoch; numbered by start second."""
+"""Epochs from here on number sample counts that restarted within an epoch, by start second."""
 
 
 @dataclass(frozen=True)

@@ -136,7 +136,7 @@ def roundness_budget(
 def frequency_budget(
     frequency_hz: float, each_hz: FloatArray, speed: Speed | None
 ) -> Budget | None:
-    """Return the uncertainty budget of the mean frequency of a line, from its scatter and the speed.
+    """Return the uncertainty budget of the mean frequency of a line, from its scatter and speed.
 
     Parameters
     ----------

@@ -34,8 +34,8 @@ MAX_MASS_STD = 0.5
 bracket. Beyond it the lines do not determine the mass, and there is no result."""
 
 STIFFNESS, MASS, DAMPING, DELAY = range(4)
-"""Changes of the bracket's dynamic stiffness: relative stiffness, kg of mass, N·s/m of damping, s of
-delay of the bearing channels."""
+"""Changes of the bracket's dynamic stiffness: relative stiffness, mass in kg, damping in N·s/m, and
+delay of the bearing channels in s."""
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from core.spectra.cross_spectrum import (
 )
 
 MAX_LEAKAGE = 0.005
-"""Largest fraction of a line's shaft power that may be leakage from stronger lines. Leakage contains
-runout, and it is integrated with the wrong frequency."""
+"""Largest fraction of a line's shaft power that may be leakage from stronger lines. Leakage
+contains runout, and it is integrated with the wrong frequency."""
 
 N_BLOCKS = 4
 """Number of parts of the quiet band; the shaft may move in some of them."""

@@ -36,9 +36,9 @@ MAX_LACK_OF_FIT = 3.0
 directly."""
 
 RESOLUTION = 0.001
-"""Half-width of the error of `dynamic` from tapering, relative to a row's direct coefficient. A line
-contains motion of neighbouring lines, which is integrated with the wrong frequency. Simulations
-without noise show 0.03 % at 0.07 Hz per bin."""
+"""Half-width of the error of `dynamic` from tapering, relative to a row's direct coefficient. A
+line contains motion of neighbouring lines, which is integrated with the wrong frequency.
+Simulations without noise show 0.03 % at 0.07 Hz per bin."""
 
 NAMES = (
     *(name for row in DYNAMIC_COEFFICIENTS for name in row),

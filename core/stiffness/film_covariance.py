@@ -189,7 +189,7 @@ class FilmFit:
         return np.concatenate(parts, axis=-1)
 
     def _smoothed(self, power: FloatArray) -> FloatArray:
-        """Return the power smoothed by straight lines through its logarithm, along the first axis."""
+        """Return the power smoothed by local regression of its logarithm, along the first axis."""
         smooth: FloatArray = np.exp(self.smoothing @ np.log(power))
         return smooth
 

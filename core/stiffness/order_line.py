@@ -127,7 +127,7 @@ class OrderLine:
         return found
 
     def phases(self, quality_of: QualityOf) -> dict[str, Budgeted]:
-        """Return the phases of the mean 1× vectors relative to the mark, deg, positive if leading."""
+        """Return the phases of the mean 1× vectors from the mark, deg, positive if leading."""
         return {
             f"{name}_phase_deg": self._phase(place, quality_of(place))
             for name, place in AMPLITUDES.items()
