@@ -17,7 +17,7 @@ from core.spectra.cross_spectrum import BEARING_X
 from core.stiffness.dynamic_lines import conditional_power
 
 MIN_SHARE = 0.05
-"""Smallest fraction of motion in the shaft spectra; below, their noise-free part may be singular."""
+"""Smallest fraction of motion in the shaft spectra; below, the noise-free part may be singular."""
 
 ROUNDING = 1e-12
 """Relative residual power of noise-free signals, from rounding."""

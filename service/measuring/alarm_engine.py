@@ -225,7 +225,7 @@ class AlarmEngine:
         return self._chatter.is_chattering(alarm.identity.id, self._clock.now_ns())
 
     def set_reference(self, reference: VectorReference) -> None:
-        """Set the reference of a bearing's 1× vectors; a reference of an unknown unit is ignored."""
+        """Set the reference of a bearing's 1× vectors; references of unknown units are ignored."""
         if reference.unit in self._units:
             self._units[reference.unit].refer_to(reference)
 

@@ -157,7 +157,7 @@ class Analyser:
 
 
 async def _yield() -> None:
-    """Let other tasks run between two bearings, each of which takes milliseconds."""
+    """Let other tasks run between two bearings; one bearing takes milliseconds."""
     for _ in range(TURNS):
         await asyncio.sleep(0)
 
