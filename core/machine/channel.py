@@ -10,7 +10,7 @@ from core.arrays import ComplexArray, FloatArray
 from core.machine.response import Response
 
 MAX_SLOW_ROLL_FRACTION = 0.25
-"""Largest speed at slow roll, as a fraction of rated speed: unbalance force is at most 1/16."""
+"""Largest slow-roll speed as a fraction of rated speed; unbalance force is then at most 1/16."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Measurand(StrEnum):
 
 @dataclass(frozen=True)
 class Channel:
-    """A waveform channel.
+    """Waveform channel: measured quantity, direction, frequency response and limits.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ class HighPass:
     damping: float = BUTTERWORTH_DAMPING
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Complex factor at frequencies above zero, (n_lines,)."""
+        """Return the complex response at positive frequencies, (n_lines,)."""
         ratio = frequency_hz / self.corner_hz
         if self.order == 1:
             return np.asarray(1j * ratio / (1.0 + 1j * ratio))
@@ -46,7 +46,7 @@ class Resonance:
     damping: float
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Complex factor at frequencies above zero, (n_lines,)."""
+        """Return the complex response at positive frequencies, (n_lines,)."""
         ratio = frequency_hz / self.natural_hz
         return np.asarray(1.0 / (1.0 - ratio**2 + 2j * self.damping * ratio))
 
@@ -75,7 +75,7 @@ class ResponseTable:
     phase_deg: tuple[float, ...]
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Complex factor at frequencies above zero, (n_lines,)."""
+        """Return the complex response at positive frequencies, (n_lines,)."""
         from scipy.interpolate import PchipInterpolator  # slow import, not needed at start
 
         points = np.log(self.frequency_hz)
@@ -97,7 +97,7 @@ class ResponseChain:
     parts: tuple["Response", ...]
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Complex factor at frequencies above zero, (n_lines,)."""
+        """Return the complex response at positive frequencies, (n_lines,)."""
         factor = np.ones(np.shape(frequency_hz), dtype=np.complex128)
         for part in self.parts:
             factor *= part.at(frequency_hz)

@@ -28,12 +28,12 @@ PREFERENCE = (
     Estimator.RATIO_ORDER1,
 )
 """Estimators in the default order of preference. `dynamic` needs no line and is free of runout; the
-vortex is off the harmonics of runout; equation (5) includes damping and grows with bearing
+vortex line is free of runout; equation (5) includes damping and is biased upwards by bearing
 noise."""
 
 
 MIN_NATURAL_HZ = 15.0
-"""Lowest natural frequency of a bracket; the brackets of Brito et al., Table 1: 24 to 26 Hz."""
+"""Lowest natural frequency of a bracket; it is 24 to 26 Hz in Brito et al., Table 1."""
 
 
 @dataclass(frozen=True)
@@ -80,11 +80,11 @@ class GapAccuracy:
     reference_um
         Error of a reference gap.
     growth_um
-        Thermal growth, if it was never measured.
+        Error of thermal growth that was never measured.
     growth_change_um
-        Change of thermal growth since its last measurement.
+        Largest change of thermal growth since its last measurement.
     growth_asymmetry_um
-        Difference of thermal growth between the two axes.
+        Largest difference of thermal growth between the two axes.
     clearance
         Relative error of the radial clearance.
     """
@@ -136,7 +136,7 @@ class BearingAccuracy:
 
 @dataclass(frozen=True)
 class Bearing:
-    """A guide bearing with two shaft and two bearing channels, named by channel id.
+    """Guide bearing with two shaft and two bearing channels, which are given by channel id.
 
     Parameters
     ----------

@@ -177,7 +177,7 @@ class _Bearing:
         budgets: Mapping[str, Budget],
         film: DynamicStiffness | None,
     ) -> dict[str, Reading]:
-        """Return, marked uncertain, the readings of estimators that disagree or see a delay."""
+        """Return, marked uncertain, the readings that disagree or are affected by a delay."""
         names: dict[str, Reason] = {}
         if readings["dynamic_k_xx_n_per_m"].quality.reason is Reason.CHANNEL_DELAY:
             delayed = (name for name in budgets if "_transfer_" in name)
@@ -193,9 +193,9 @@ class _Bearing:
         }
 
     def _order_lines(self) -> tuple[OrderLine, OrderLine]:
-        """Return the lines of 1× and of the vortex.
+        """Return the spectral lines of 1× and of the vortex.
 
-        Both are averaged over the same segments; of polls, each line is averaged separately.
+        Both are averaged over the same segments; with polls, each line is averaged separately.
         """
         marked = [segment.at_mark_um_pk for segment in self._segments]
         nothing = np.zeros(len(self._unit.channels), dtype=np.complex128)
@@ -240,7 +240,7 @@ class _Bearing:
         return all(s.runout[channel] is RunoutVerdict.APPLIED for s, usable in counted if usable)
 
     def _steadiness(self) -> Quality:
-        """Return the quality of the stationarity of speed and load over the averaging window."""
+        """Return whether speed and load are steady over the averaging window, as a quality."""
         power = self._unit.power_channel
         speeds = [segment.speed.rpm for segment in self._segments]
         powers = (
@@ -332,7 +332,7 @@ class _Bearing:
         return other_line_hz(self.spectrum, turn_hz, band_hz, self._settings.min_line_to_floor)
 
     def _line_quality(self, *places: int, line: int = ORDER1) -> Quality | Reading:
-        """Return the quality of a line of these channels, or a missing reading with the reason."""
+        """Return the quality of a line for these channels, or a missing reading with a reason."""
         newest, few = self._segments[-1], uncertain(Reason.FEW_SEGMENTS)
         own = [newest.line_quality(self._rows[place], line) for place in places]
         now = worst([newest.speed.rpm.quality, self._doubts, *own])

@@ -50,7 +50,7 @@ class UnitMonitor:
     Parameters
     ----------
     transform
-        Transform of sample windows to segments; default: of waveforms.
+        Transform of sample windows to segments; by default a `SegmentTransform` for waveforms.
     """
 
     def __init__(
@@ -126,7 +126,7 @@ class UnitMonitor:
         self.unit = unit
 
     def go_on(self, reach: Reach | None) -> None:
-        """Set the end of the stored samples before the first block; later losses become gaps."""
+        """Resume after a stop, before the first block; samples missing since `reach` are gaps."""
         self._reach = reach
 
     def drain_gaps(self) -> list[Gap]:

@@ -57,9 +57,9 @@ def overall_readings(
 def recent_readings(
     segment: Segment, rows: Sequence[int], rate_hz: float
 ) -> tuple[RecentReadings, ...]:
-    """Return the shaft vibration of each recent part of a segment; the newest has also velocities.
+    """Return the shaft vibration of the newest parts of a segment, oldest first.
 
-    Bearing velocities are those of the whole segment.
+    The newest entry also contains the bearing velocities of the whole segment.
     """
     recent, overall, found = segment.recent, segment.overall, []
     if recent is None or overall is None:

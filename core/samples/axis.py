@@ -38,7 +38,7 @@ class ClockTolerance:
 
 
 class Epochs:
-    """Epoch numbers of one device's sample counts, across restarts of the adapter that reads it.
+    """Epoch numbers of one device's sample counts, across restarts of its adapter.
 
     The adapter loses its own state (wraps of a narrow counter, restarts that the device did not
     report) when its process ends. It therefore numbers such sample counts itself: its start time in
@@ -78,7 +78,7 @@ class Epochs:
 
 
 def signed_distance(counter: int, reference: int, modulus: int) -> int:
-    """Return the shortest distance from a reference to a counter value, modulo; may be negative."""
+    """Return the signed distance from a reference to a counter value, at most half a modulus."""
     half = modulus // 2
     return (counter - reference + half) % modulus - half
 

@@ -26,7 +26,7 @@ UNCOUNTED_LOSS = "uncounted_loss"
 
 @dataclass(frozen=True)
 class Rejection:
-    """Samples per channel that an adapter rejected directly before a block.
+    """Number of samples per channel that an adapter rejected directly before a block.
 
     The reason is in snake case and is used as the label of a counter.
     """

@@ -40,7 +40,9 @@ class Gap:
 
 @dataclass(frozen=True)
 class SampleAccount:
-    """Samples per channel since the first block: offered = stored + flagged + gap + rejected.
+    """Account of samples per channel: offered = stored + flagged + gap + rejected.
+
+    It starts with the first block.
 
     Parameters
     ----------
@@ -222,7 +224,7 @@ class Count:
 
 
 class Counts:
-    """Assigns a new epoch to a sample count that restarts within the same epoch.
+    """Assignment of a new epoch to a sample count that restarts within the same epoch.
 
     A device or a program that reads it may restart the count without reporting it. The index alone
     then looks like repeated samples; the time shows that they are new. `count` is None before the

@@ -64,7 +64,7 @@ class SegmentSettings:
 
 
 FINE_STEPS = 64
-"""Samples of one run of the fine table in `turning_factors`."""
+"""Number of samples covered by the fine table in `turning_factors`."""
 
 
 @lru_cache(maxsize=8)

@@ -2,7 +2,7 @@
 
 The standards of the ISO 20816 family evaluate broad-band displacement of shafts and velocity of
 bearings. Limits for fast changes use the newest parts of a segment: they show a step and its
-duration within seconds, averages over minutes only minutes later.
+duration within seconds; averages over minutes would show it minutes later.
 """
 
 import math

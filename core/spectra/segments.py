@@ -240,9 +240,9 @@ class SegmentTransform(KeptSegments):
         self._bearing_rows = [[ids.index(i) for i in b.channels] for b in unit.bearings]
 
     def add(self, window: Window) -> Segment:
-        """Transform a window to a segment, keep it and drop those outside the averaging window.
+        """Transform a window to a segment, keep it, and drop segments outside the averaging window.
 
-        Old segments are dropped before the vortex search: after a gap they may be arbitrarily old.
+        They are dropped before the vortex search: after a gap they may be arbitrarily old.
         """
         self.drop_before(window.first_index - self.n_segments * self.hop_samples)
         samples: FloatArray = window.samples.astype(np.float64)
@@ -306,7 +306,7 @@ class SegmentTransform(KeptSegments):
         mean: FloatArray,
         speed: Speed,
     ) -> tuple[Quality, ...]:
-        """Return the qualities; channels without signal on a turning machine or contact are bad."""
+        """Return the qualities after checks of signal and level; failed transducers are bad."""
         turning, limits = speed.rpm.value is not None, self._settings.sensors
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
         turn_samples = round(self._unit.rate_hz / turn_hz)
@@ -375,7 +375,7 @@ class SegmentTransform(KeptSegments):
     def _vortex_hz(
         self, turn_hz: float, bins: ComplexArray, usable: npt.NDArray[np.bool_]
     ) -> float | None:
-        """Return the vortex frequency, averaged over all segments: one resolves a rope poorly."""
+        """Return the vortex frequency, or None; averaged, as one segment resolves it poorly."""
         low, high = self._settings.vortex_band
         band_hz = (low * turn_hz, high * turn_hz)
         # one more bin on each side, to distinguish a peak from the flank of a line outside

@@ -40,7 +40,7 @@ LINE_SEARCH = (0.85, 1.15)
 
 
 KEY_PHASE_TOLERANCE = 0.02
-"""Largest relative difference of key-phase and speed channel, often no better than 2 %."""
+"""Largest relative difference of key-phase and speed channel; the latter is often no better."""
 
 LINE_SPREAD = 0.35
 """Standard uncertainty of an interpolated line frequency in bins, at a noise floor as strong as the
@@ -170,7 +170,7 @@ def _budget(
 ) -> Budget | None:
     """Return the uncertainty budget of a speed measured by key-phase or speed channel.
 
-    The uncertainty of a speed channel is its agreement with the 1× line, if there is a line.
+    The uncertainty of a speed channel follows from its agreement with the 1× line, if available.
     """
     if speed.value is None or speed.quality != GOOD:
         return None

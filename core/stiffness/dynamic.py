@@ -27,7 +27,7 @@ MIN_LINES = 12
 """Smallest number of usable lines for a result."""
 
 MAX_INERTIA_SHARE = 0.8
-"""Limit of a fitted mass: inertia over stiffness of the bracket at the highest line."""
+"""Largest ratio of inertia to stiffness of a bracket with fitted mass, at the highest line."""
 
 MAX_MASS_STD = 0.5
 """Largest standard uncertainty of a fitted mass as a fraction of the largest plausible mass of the

@@ -59,7 +59,7 @@ def line_excitation(
         Smallest squared coherence of shaft and bearing motion.
     runout_um_pk
         Largest shaft runout contained in this line; zero off the harmonics of the running speed.
-        Runout is as coherent as motion, so only the amplitudes are compared.
+        Coherence does not reveal runout, so its amplitude is compared with the shaft's.
 
     Returns
     -------

@@ -109,7 +109,7 @@ class OrderLine:
         return float(self.orders.frequency_hz[self.at])
 
     def n_segments(self, first: int, last: int) -> int:
-        """Return the number of segments, or changed polls, in which two channels are usable."""
+        """Return the number of segments with two channels usable; for polls, of changed polls."""
         if self.bins is not None:
             return int(self.orders.n_segments[first, last])
         both = self.usable[:, first] & self.usable[:, last]
@@ -134,7 +134,7 @@ class OrderLine:
         }
 
     def axes_quality(self, rotation_sense: int) -> Quality:
-        """Return a quality that is good unless shaft or bearing whirl against the rotation.
+        """Return the quality of the axes: good unless shaft or bearing whirl against the rotation.
 
         Only lines above the noise floor are checked.
         """

@@ -30,7 +30,7 @@ COHERENCE = "coherence not known"
 
 
 def gain_lines(value: float, accuracy: BearingAccuracy) -> tuple[BudgetLine, BudgetLine]:
-    """Return the contributions of the gains of shaft and bearing transducers.
+    """Return the uncertainty contributions of the gains of shaft and bearing transducers.
 
     Stiffness and damping are proportional to bearing motion over shaft motion.
     """
@@ -84,7 +84,7 @@ def ratio_budget(
     n_segments: float | None = None,
     runout_um_pk: float = 0.0,
 ) -> Budget | None:
-    """Return the result and the uncertainty budget of equation (5), ``|X_b| / |U| k_b``.
+    """Return the stiffness by equation (5), ``|X_b| / |U| k_b``, with its uncertainty budget.
 
     The incoherent part may be in either amplitude: the ratio may be high or low by 1/γ - 1.
     Equation (5) neglects the bracket's inertia; the budget contains its largest effect.
@@ -130,7 +130,7 @@ def polls_ratio_budget(
     runout_um_pk: float = 0.0,
     across: float = 1.0,
 ) -> Budget | None:
-    """Return the result and the uncertainty budget of equation (5) over the polls of a rack.
+    """Return the stiffness by equation (5) over the polls of a rack, with its uncertainty budget.
 
     A rack may be polled faster than it measures, or average over several poll periods. The scatter
     of the polls is therefore divided by the root of their effective number.

@@ -243,7 +243,7 @@ class AlarmEngine:
         return alarm.condition.is_known and self.is_connected(alarm.identity.unit)
 
     def count(self) -> AlarmCount:
-        """Return the numbers of alarms by kind of state."""
+        """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""
         return count_of(self.alarms, self.is_judged)
 
     def _host_ns(self) -> int:

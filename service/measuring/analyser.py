@@ -125,7 +125,7 @@ class Analyser:
         return self._monitors[unit].state
 
     def memory(self, unit: str) -> UnitMemory:
-        """Return the state of a unit, from which another process continues with newest samples."""
+        """Return the state of a unit for another process, which also needs the newest samples."""
         return UnitMemory(
             self.state(unit),
             self._alarms.memory(unit),

@@ -12,10 +12,10 @@ from service.measuring.recorder import NotStoredError, Recorder
 from service.store.port import StoreError
 
 STORED_WITHIN_S = 10.0
-"""Maximum wait until an action is on the disk."""
+"""Maximum wait until an action is on the disk, s."""
 
 ANSWERS_WITHIN_S = 10.0
-"""Maximum wait for the empty transaction before an action."""
+"""Maximum wait for the empty transaction before an action, s."""
 
 
 class LocalCommands:

@@ -30,7 +30,7 @@ from service.store.port import StoreError
 log = structlog.get_logger()
 
 MAX_LEARN_S = 900.0
-"""Maximum duration of learning one bearing from its whole history."""
+"""Maximum duration of learning one bearing's baseline from its whole history, s."""
 
 
 @dataclass(frozen=True)

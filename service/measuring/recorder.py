@@ -78,7 +78,7 @@ log = structlog.get_logger()
 RETRY_S = 1.0
 
 MAX_NEWS = 100_000
-"""Maximum number of alarm news in the queue; about 100 MB."""
+"""Maximum number of queued `AlarmNews`; about 100 MB."""
 
 GIVEN_UP = "given_up"
 

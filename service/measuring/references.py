@@ -27,7 +27,7 @@ log = structlog.get_logger()
 LOOK_EVERY_S = 2.0
 
 Key = tuple[str, str]
-"""Unit and bearing."""
+"""Unit id and bearing id."""
 
 
 def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:

@@ -1,4 +1,4 @@
-"""Alarms whose conditions are reported by other components than the monitors."""
+"""Alarms whose conditions are reported by components other than the monitors."""
 
 from collections.abc import Iterable, Sequence
 
@@ -55,7 +55,7 @@ def gone_alarms(units: Iterable[str]) -> ReportedAlarms:
 def report_silence(
     alarms: ReportedAlarms, silent: Sequence[str], alive: Sequence[str], after_s: float
 ) -> None:
-    """Report the units that are analysed, and those without a sign of life for `after_s`."""
+    """Update the alarms of units that are analysed, and of units not analysed for `after_s` s."""
     reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
     gone = Judgement(AlarmLevel.DANGER, reason=reason)
     for units, condition in ((silent, gone), (alive, WITHIN)):
@@ -69,7 +69,7 @@ def identity_of(unit: str) -> AlarmIdentity:
 
 
 REFUSED_FOR_S = 600.0
-"""Duration of the alarm after the last refused message."""
+"""Duration of the alarm after the last refused message, s."""
 
 MAX_REASON = 200
 """Maximum length of a reason, which may contain arbitrary text of a refused message."""

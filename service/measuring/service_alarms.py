@@ -128,7 +128,7 @@ class ServiceRules:
     loss
         Limit of the fraction of lost samples of a unit in ten minutes.
     at_once, steady, lasting
-        Rules without limits: without delay, with delays, and lasting for ten minutes.
+        Rules without limits: no delays, delays of 5 s and 30 s, and an off-delay of ten minutes.
     """
 
     store_behind: LimitRule = field(default_factory=lambda: LimitRule(Limits(10.0), AT_ONCE))

@@ -132,7 +132,7 @@ def watched_units(
 
 
 def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
-    """Return the monitor of a unit of a plant file."""
+    """Return the monitor of a unit from its settings in the plant file."""
     return monitor_for(unit.source, machine_of(unit), analysis_of(analysis))
 
 

@@ -1,4 +1,4 @@
-"""Durations of evaluations and commits."""
+"""Measured durations of assessments and commits."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
