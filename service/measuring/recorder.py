@@ -33,7 +33,7 @@ MAX_BYTES = 16_000_000
 
 
 class ParkedRows:
-    """File of rows refused by the database, one JSON object per line; mode 0600."""
+    """File of refused rows with the reasons, one JSON object per line; readable by the owner."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -167,7 +167,7 @@ class Recorder:
 
     @property
     def behind_s(self) -> float:
-        """Time that the queue has waited since the last write, s; 0 if it is empty."""
+        """Time that queued findings have waited without any write, s; 0 if the queue is empty."""
         if not (self._waiting or self._alarms):
             return 0.0
         return self._clock.monotonic_s() - self._waits_since_s

@@ -38,7 +38,7 @@ class ServiceHealth:
     store_error
         Reason why the store refused the newest write; None if it was accepted.
     store_behind_s
-        Time that findings have waited since the last write.
+        Time that queued findings have waited without any write.
     n_unstored, unstored_reason
         Number of findings since the start that were not stored, and the newest reason.
     n_recordings_damaged
