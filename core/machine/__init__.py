@@ -1,1 +1,1 @@
-"""The unit as an engineer describes it: bearings, channels, transducers, brackets."""
+"""Description of a generating unit: bearings, channels, transducers, brackets."""

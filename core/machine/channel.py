@@ -1,4 +1,4 @@
-"""Waveform channels: what one measures, and what its spectrum says about displacement."""
+"""Waveform channels, and the conversion of their spectra to displacement."""
 
 import math
 from dataclasses import dataclass
@@ -10,20 +10,20 @@ from core.arrays import ComplexArray, FloatArray
 from core.machine.response import Response
 
 MAX_SLOW_ROLL_FRACTION = 0.25
-"""Share of the rated speed up to which unbalance forces (under 1/16) leave the surface alone."""
+"""Largest slow-roll speed as a fraction of rated speed; unbalance force is then at most 1/16."""
 
 
 @dataclass(frozen=True)
 class SlowRollVector:
-    """Reading of one probe at 1× at slow roll: the runout of the shaft.
+    """1× vector of one probe at slow roll: the runout of the shaft.
 
     Parameters
     ----------
     probe
-        Serial number or mark of the probe; another probe, or this one moved, sees another surface.
+        Serial number or mark of the probe. A replaced or moved probe reads another surface.
     phasor_um_pk
-        Displacement along the axis, relative to the mark on the shaft: its phase is that of the
-        reading when the mark passes the key-phase pick-up.
+        Displacement along the axis, relative to the mark on the shaft: its phase is the phase of
+        the signal at the moment when the mark passes the key-phase pick-up.
     """
 
     channel: str
@@ -34,7 +34,7 @@ class SlowRollVector:
 
 
 class Measurand(StrEnum):
-    """What a waveform channel measures, and therefore its engineering unit."""
+    """Measured quantity of a waveform channel; it determines the engineering unit."""
 
     GAP_UM = "gap_um"
     DISPLACEMENT_UM = "displacement_um"
@@ -44,32 +44,32 @@ class Measurand(StrEnum):
 
     @property
     def n_integrations(self) -> int:
-        """How many integrations turn it into displacement: 2 for acceleration, 1 for velocity."""
+        """Number of integrations to displacement: 2 for acceleration, 1 for velocity."""
         return {Measurand.ACCELERATION_M_S2: 2, Measurand.VELOCITY_MM_S: 1}.get(self, 0)
 
 
 @dataclass(frozen=True)
 class Channel:
-    """A waveform channel.
+    """Waveform channel: measured quantity, direction, frequency response and limits.
 
     Parameters
     ----------
     direction
-        +1 if a growing reading means motion along the positive bearing axis, -1 if against it. A
-        probe mounted on the positive axis sees its gap shrink as the shaft approaches: -1. Of a
-        key-phase, -1 if its pulses fall.
+        +1 if a growing reading means motion along the positive bearing axis, -1 if against it. The
+        gap of a probe on the positive axis shrinks as the shaft approaches: -1. For a key-phase
+        channel, -1 if its pulses fall.
     delay_s
-        By how much the channel is read later than the others, s.
+        Time by which the channel is sampled later than the others, s.
     line_floor
-        Amplitude of a line of the transducer's own noise, zero-to-peak in the channel's unit.
+        Line amplitude of the transducer's own noise, zero-to-peak in the channel's unit.
     unit_per_count
-        The channel's unit per count of its converter; zero where it is not known.
+        Engineering units per count of the converter; zero if unknown.
     ok_limits
         Lowest and highest mean of a healthy transducer, in the channel's unit.
     probe
-        Serial number or mark of the probe that is there; empty where it is not known.
+        Serial number or mark of the installed probe; empty if unknown.
     slow_roll
-        Runout of the shaft under it, where it was measured.
+        Runout of the shaft under the probe, if it was measured.
     """
 
     id: str
@@ -85,15 +85,15 @@ class Channel:
 
 
 def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexArray:
-    """Displacement phasor (n_lines,) in µm per phasor of the channel's own engineering unit.
+    """Return the factors (n_lines,) from phasors in the channel's unit to displacement in µm.
 
     Velocity is integrated once, acceleration twice, by division by iω and (iω)²; the transducer's
-    response and the channel's delay are compensated. A key-phase shows no displacement: zero.
+    response and the channel's delay are compensated. The factor of a key-phase channel is zero.
 
     Raises
     ------
     ValueError
-        If a frequency is not above zero: a constant velocity has no displacement phasor.
+        If a frequency is not positive: a constant velocity has no displacement phasor.
     """
     if np.any(frequency_hz <= 0.0):
         raise ValueError(f"frequencies must be positive, got {frequency_hz.min()} Hz")
@@ -109,9 +109,9 @@ def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexAr
 
 
 def line_floor_um_pk(channel: Channel, frequency_hz: float) -> float:
-    """Displacement that a line of the transducer's own noise is read as, µm zero-to-peak.
+    """Return the line amplitude of the transducer's own noise as displacement, µm zero-to-peak.
 
-    It grows with falling frequency where the signal is integrated or the response falls off.
+    It grows with falling frequency if the signal is integrated or the response falls off.
     """
     factor = displacement_factor(channel, np.array([frequency_hz]))[0]
     return float(abs(factor)) * channel.line_floor

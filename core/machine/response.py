@@ -18,12 +18,12 @@ class HighPass:
     Parameters
     ----------
     corner_hz
-        Of order 1 the frequency of 0.707 and +45°; of order 2 the natural frequency, at which the
-        phase is +90° and the magnitude 1 / (2 damping).
+        For order 1, the frequency with magnitude 0.707 and phase +45°; for order 2, the natural
+        frequency, with phase +90° and magnitude 1 / (2 damping).
     order
         1 for an electrical time constant; 2 for a pickup's seismic mass or a double time constant.
     damping
-        Share of critical damping; counts for order 2 alone.
+        Fraction of critical damping; used for order 2 only.
     """
 
     corner_hz: float
@@ -31,7 +31,7 @@ class HighPass:
     damping: float = BUTTERWORTH_DAMPING
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Complex factor at frequencies above zero, (n_lines,)."""
+        """Return the complex response at positive frequencies, (n_lines,)."""
         ratio = frequency_hz / self.corner_hz
         if self.order == 1:
             return np.asarray(1j * ratio / (1.0 + 1j * ratio))
@@ -40,34 +40,34 @@ class HighPass:
 
 @dataclass(frozen=True)
 class Resonance:
-    """Mounted resonance, or any second-order upper limit."""
+    """Mounted resonance of a transducer, or another second-order upper frequency limit."""
 
     natural_hz: float
     damping: float
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Complex factor at frequencies above zero, (n_lines,)."""
+        """Return the complex response at positive frequencies, (n_lines,)."""
         ratio = frequency_hz / self.natural_hz
         return np.asarray(1.0 / (1.0 - ratio**2 + 2j * self.damping * ratio))
 
 
 @dataclass(frozen=True)
 class ResponseTable:
-    """Response from a calibration sheet.
+    """Tabulated response from a calibration sheet.
 
-    Between its points, the logarithm of the magnitude and the phase run smoothly over the logarithm
-    of frequency and never beyond their neighbours (Fritsch and Butland, 1984): ten points a decade
-    give a first-order corner to 2e-4, where straight lines would be 3e-3 off. A phase that jumps by
-    more than half a turn is taken the short way round. Outside the table its end values hold.
+    The logarithm of the magnitude and the phase are interpolated over the logarithm of frequency by
+    monotone cubics (Fritsch and Butland, 1984). Ten points a decade reproduce a first-order corner
+    to 2e-4; linear interpolation would err by 3e-3. The phase is unwrapped: jumps of more than half
+    a turn are taken the short way round. Outside the table, its end values apply.
 
     Parameters
     ----------
     frequency_hz
-        Rising, above zero; two points or more.
+        Frequencies, positive and ascending; at least two.
     magnitude
-        Above zero; 1 where the nominal sensitivity is exact.
+        Positive magnitudes; 1 means exactly the nominal sensitivity.
     phase_deg
-        Positive where the reading leads the motion.
+        Phases; positive if the reading leads the motion.
     """
 
     frequency_hz: tuple[float, ...]
@@ -75,8 +75,8 @@ class ResponseTable:
     phase_deg: tuple[float, ...]
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Complex factor at frequencies above zero, (n_lines,)."""
-        from scipy.interpolate import PchipInterpolator  # slow to load, and not needed to begin
+        """Return the complex response at positive frequencies, (n_lines,)."""
+        from scipy.interpolate import PchipInterpolator  # slow import, not needed at start
 
         points = np.log(self.frequency_hz)
         phase_rad = np.unwrap(np.radians(self.phase_deg))
@@ -86,18 +86,18 @@ class ResponseTable:
         return np.asarray(np.exp(log_magnitude + 1j * phase_rad))
 
     def covers(self, low_hz: float, high_hz: float) -> bool:
-        """Whether the whole band lies within the table."""
+        """Whether the whole frequency band lies within the table."""
         return self.frequency_hz[0] <= low_hz and high_hz <= self.frequency_hz[-1]
 
 
 @dataclass(frozen=True)
 class ResponseChain:
-    """Several responses one after the other, as transducer and amplifier are; none is flat."""
+    """Responses in series, such as transducer and amplifier; an empty chain is flat."""
 
     parts: tuple["Response", ...]
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Complex factor at frequencies above zero, (n_lines,)."""
+        """Return the complex response at positive frequencies, (n_lines,)."""
         factor = np.ones(np.shape(frequency_hz), dtype=np.complex128)
         for part in self.parts:
             factor *= part.at(frequency_hz)
@@ -105,4 +105,4 @@ class ResponseChain:
 
 
 Response: TypeAlias = HighPass | Resonance | ResponseTable | ResponseChain
-"""Any of the above: complex reading per unit of motion at given frequencies."""
+"""Any frequency response: `at` returns the complex reading per unit of motion."""

@@ -1,4 +1,4 @@
-"""The unit as the numerics see it: which channel measures what, on which bearing."""
+"""Generating unit in numbers: channels, bearings, brackets and their accuracies."""
 
 import math
 from dataclasses import dataclass, field, fields
@@ -11,7 +11,7 @@ from core.machine.channel import Channel
 
 
 class Estimator(StrEnum):
-    """Estimators of stiffness. The names appear in settings, API and store."""
+    """Stiffness estimators. The names appear in settings, API and store."""
 
     DYNAMIC = "dynamic"
     TRANSFER_ORDER1 = "transfer_order1"
@@ -27,19 +27,20 @@ PREFERENCE = (
     Estimator.RATIO_VORTEX,
     Estimator.RATIO_ORDER1,
 )
-"""`dynamic` needs no line and is blind to runout; the vortex is off the harmonics, where runout is;
-equation (5) includes damping and grows with bearing noise."""
+"""Estimators in the default order of preference. `dynamic` needs no line and is free of runout; the
+vortex line is free of runout; equation (5) includes damping and is biased upwards by bearing
+noise."""
 
 
 MIN_NATURAL_HZ = 15.0
-"""Lowest natural frequency of a bracket; those of Brito et al., Table 1, have 24 to 26 Hz."""
+"""Lowest natural frequency of a bracket; it is 24 to 26 Hz in Brito et al., Table 1."""
 
 
 @dataclass(frozen=True)
 class BracketDynamics:
     """Isotropic spring, effective mass and damper between bearing and foundation.
 
-    An unknown mass leaves the inertia out; structural damping is usually not known and zero.
+    The inertia of an unknown mass is neglected. Structural damping is usually unknown and zero.
     """
 
     stiffness_n_per_m: float
@@ -48,16 +49,16 @@ class BracketDynamics:
 
     @property
     def max_mass_kg(self) -> float:
-        """The mass, or the largest that a bracket of that stiffness can have."""
+        """Bracket mass or, if unknown, the largest mass possible with the bracket's stiffness."""
         if self.mass_kg is not None:
             return self.mass_kg
         return self.stiffness_n_per_m / (2.0 * math.pi * MIN_NATURAL_HZ) ** 2
 
     def dynamic_stiffness_n_per_m(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Force that the film exerts per absolute displacement of the bracket, (n_lines,).
+        """Return the film force per absolute displacement of the bracket, (n_lines,).
 
-        ``k_b - m_b ω² + iω c_b``: the bracket's row of Brito et al., equation (6), in which the
-        forces on the rotor do not appear.
+        ``k_b - m_b ω² + iω c_b``: the bracket's row of Brito et al., equation (6), which does not
+        contain the forces on the rotor.
         """
         omega = 2.0 * np.pi * frequency_hz
         stiffness: ComplexArray = (
@@ -70,22 +71,22 @@ class BracketDynamics:
 
 @dataclass(frozen=True)
 class GapAccuracy:
-    """How well gaps are known: half-widths of uniform distributions (GUM, 4.3.7).
+    """Accuracy of the probe gaps: half-widths of uniform distributions (GUM, 4.3.7).
 
     Parameters
     ----------
     gain
-        Relative, of the change of a gap since its reference was read.
+        Relative error of a gap change since the reference was read.
     reference_um
-        Of a reference gap.
+        Error of a reference gap.
     growth_um
-        Of thermal growth that was never measured.
+        Error of thermal growth that was never measured.
     growth_change_um
-        By which growth may have changed since it was last measured.
+        Largest change of thermal growth since its last measurement.
     growth_asymmetry_um
-        By which growth along one axis may differ from that along the other.
+        Largest difference of thermal growth between the two axes.
     clearance
-        Relative, of the radial clearance.
+        Relative error of the radial clearance.
     """
 
     gain: float = 0.05
@@ -98,29 +99,29 @@ class GapAccuracy:
 
 @dataclass(frozen=True)
 class BearingAccuracy:
-    """How well a bearing's transducers and bracket are known: half-widths, uniform, as shares.
+    """Accuracy of a bearing's transducers and bracket: half-widths of uniform distributions.
 
     Parameters
     ----------
     shaft_gain
-        Class of the proximity probes, target material and mounting included.
+        Relative gain error of the proximity probes, including target material and mounting.
     bearing_gain
-        Class of the accelerometers or velocity transducers.
+        Relative gain error of the accelerometers or velocity transducers.
     bracket_stiffness
-        Of the k_b that was measured or calculated.
+        Relative error of the measured or calculated stiffness k_b.
     bracket_mass
-        Of the mass, where one is given.
+        Relative error of the mass, if it is given.
     bracket_damping
-        Of the bracket, as a share of critical damping. Bolted and welded steel at working stress
-        has 0.02 to 0.03 (Newmark and Hall 1982, table 1).
+        Error of the bracket's damping, as a fraction of critical damping. Bolted and welded steel
+        at working stress has 0.02 to 0.03 (Newmark and Hall 1982, table 1).
     delay_s
-        Of the delay between shaft and bearing channels, in s. Converters that sample together and
-        have the same filters stay within a tenth of a sample at 600 Hz.
+        Error of the delay between shaft and bearing channels, s. Simultaneously sampling converters
+        with the same filters stay within a tenth of a sample at 600 Hz.
     cross_coupling
-        Cross-coupled over direct dynamic stiffness of the film, where it is not known: 0.33 to 1.11
-        in Brito et al., Table 4.
+        Cross-coupled over direct dynamic stiffness of the film, if unknown: 0.33 to 1.11 in Brito
+        et al., Table 4.
     probe_noise
-        Of the noise density that is taken off the shaft spectra.
+        Relative error of the noise density that is subtracted from the shaft spectra.
     """
 
     shaft_gain: float = 0.05
@@ -135,28 +136,28 @@ class BearingAccuracy:
 
 @dataclass(frozen=True)
 class Bearing:
-    """A guide bearing with two shaft and two bearing channels, named by channel id.
+    """Guide bearing with two shaft and two bearing channels, which are given by channel id.
 
     Parameters
     ----------
     bracket_stiffness_n_per_m
         Radial stiffness k_b of the bracket that holds the bearing.
     clearance_um
-        Radial assembled clearance in operation: the radius in which the shaft centre can move.
+        Radial assembled clearance in operation: the radius within which the shaft centre moves.
     gap_reference_um, opposite_reference_um
         Gaps (x, y) of the probes and of the opposite probes with the shaft centred.
     oil_temperature, gap_x, gap_y, opposite_gap_x, opposite_gap_y
-        Slow channel ids, where measured. Without slow gap channels the mean of the shaft channels
-        is the gap.
+        Ids of the slow channels; None if not measured. Without slow gap channels, the mean of the
+        shaft channels is the gap.
     opposite_x, opposite_y
-        Probes across the shaft from `shaft_x` and `shaft_y`, by channel id, where there are any.
+        Channel ids of the probes opposite `shaft_x` and `shaft_y`, if installed.
     bracket_mass_kg
-        Effective mass of the bracket; None if not known: `dynamic` then fits it with the film.
-        Equation (5) leaves it out, the other estimators take it in.
+        Effective mass of the bracket; None if unknown, `dynamic` then fits it with the film.
+        Equation (5) neglects it; the other estimators include it.
     runout_um_pk
-        Largest runout of the shaft's surface at 1×, as far as it is not taken off.
+        Largest shaft runout at 1× that is not subtracted as a slow-roll vector.
     preference
-        Which estimators `stiffness` is taken from, best first.
+        Estimators from which `stiffness` is chosen, in order of preference.
     """
 
     id: str
@@ -184,7 +185,7 @@ class Bearing:
 
     @property
     def bracket(self) -> BracketDynamics:
-        """The bracket as a spring that force is read from."""
+        """Dynamics of the bracket, from which the film force is derived."""
         return BracketDynamics(
             self.bracket_stiffness_n_per_m, self.bracket_mass_kg, self.bracket_damping_n_s_per_m
         )
@@ -197,7 +198,7 @@ class Bearing:
 
 @dataclass(frozen=True)
 class Unit:
-    """A generating unit: its waveform channels in wire order and its bearings.
+    """Generating unit: its waveform channels in wire order and its bearings.
 
     Parameters
     ----------
@@ -206,9 +207,9 @@ class Unit:
     has_vortex
         Whether a part-load vortex can occur: in Francis turbines, not in Kaplan turbines.
     key_phase
-        Waveform channel with one pulse a turn, where there is one.
+        Id of the waveform channel with one pulse per turn, if installed.
     rated_power_mw
-        Rated power, which changes of load are compared with; None if not known.
+        Rated power, to which changes of load are related; None if unknown.
     """
 
     id: str
@@ -225,12 +226,12 @@ class Unit:
 
 
 def require_same_machine(here: Unit, there: Unit) -> None:
-    """Refuse a description that differs in more than references, clearances and brackets.
+    """Check that two descriptions differ only in gap references, clearances and brackets.
 
     Raises
     ------
     ValueError
-        With the name of the first field that differs, and both values.
+        If another field differs; the message gives its name and both values.
     """
     before, after = _fixed_parts(here), _fixed_parts(there)
     for name, value in before.items():
@@ -239,7 +240,7 @@ def require_same_machine(here: Unit, there: Unit) -> None:
 
 
 def bearings_with_new_references(here: Unit, there: Unit) -> list[str]:
-    """Ids of the bearings whose gap references differ."""
+    """Return the ids of the bearings whose gap references differ."""
     pairs = zip(here.bearings, there.bearings, strict=True)
     return [
         b.id
@@ -250,6 +251,6 @@ def bearings_with_new_references(here: Unit, there: Unit) -> list[str]:
 
 
 def _fixed_parts(unit: Unit) -> dict[str, object]:
-    """The fields that cannot change while the unit is monitored, by name."""
+    """Return, by name, the fields that cannot change while the unit is monitored."""
     fixed: dict[str, object] = {field.name: getattr(unit, field.name) for field in fields(unit)}
     return fixed | {"bearings": tuple((b.id, b.channels) for b in unit.bearings)}

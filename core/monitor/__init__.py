@@ -1,1 +1,1 @@
-"""Blocks of one unit in, assessments of its bearings out."""
+"""Monitoring of one unit: assessments of its bearings from sample blocks."""

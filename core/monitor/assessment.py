@@ -1,4 +1,4 @@
-"""What one evaluation of a bearing found, and the settings that it was made with."""
+"""Results of one evaluation of a bearing, and the settings of the analysis."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,27 +19,27 @@ from core.uncertainty import Budget
 
 @dataclass(frozen=True)
 class AnalysisSettings(EvidenceSettings):
-    """Segments, averaging, what counts as evidence, and how all eight coefficients are sought."""
+    """Settings of segments, averaging, evidence and the fit of all eight film coefficients."""
 
     dynamic: DynamicSettings = field(default_factory=DynamicSettings)
 
 
 @dataclass(frozen=True)
 class AveragingWindow:
-    """Which samples a result stands on.
+    """Range of the samples that a result averages.
 
     Parameters
     ----------
     first_index, stop_index
-        Of the samples in this epoch; the last sample is ``stop_index - 1``.
+        Sample indices in this epoch; the last sample is ``stop_index - 1``.
     n_segments
-        Segments in which all four channels were usable.
+        Number of segments in which all four channels were usable.
     n_segments_wanted
-        Segments of a full average.
+        Number of segments of a full average.
     n_voided
-        Segments begun and lost to gaps or restarts since the service started.
+        Number of segments interrupted by gaps or restarts since the service started.
     coverage
-        Share of the segments that could have been in the window and are, 0 to 1.
+        `n_segments` over the largest number possible in the window so far, 0 to 1.
     """
 
     epoch: int
@@ -54,12 +54,12 @@ class AveragingWindow:
 
 @dataclass(frozen=True)
 class OrbitTrace:
-    """The newest turns of the shaft in its bearing, means removed.
+    """Shaft orbit of the newest turns, means removed.
 
     Parameters
     ----------
     shaft_x_um, shaft_y_um
-        (n_samples,) each.
+        Displacement samples, (n_samples,) each.
     """
 
     start_ns: int
@@ -70,36 +70,35 @@ class OrbitTrace:
 
 @dataclass(frozen=True)
 class Assessment:
-    """Everything about one bearing at one refresh.
+    """Results of one evaluation of a bearing.
 
     Parameters
     ----------
     time_ns
         End of the newest segment, UTC.
     readings
-        One for each quantity of :data:`core.monitor.catalogue.CATALOGUE`.
+        One reading for each quantity of :data:`core.monitor.catalogue.CATALOGUE`.
     quality
-        Of the bearing as a whole: the worst of its 1× amplitudes and its preferred stiffness.
+        Quality of the bearing: the worst of its 1× amplitudes and its preferred stiffness.
     budgets
-        Where the uncertainty of a reading comes from, by quantity, where it is known.
+        Uncertainty budgets of the readings, by quantity, if known.
     estimators
-        Where `stiffness` came from, by axes "xx" and "yy"; None if there is none.
+        Estimator that `stiffness` was taken from, by axes "xx" and "yy"; None without a value.
     spectrum
-        At the bins; displacement, µm.
+        Cross-spectrum at the bins; displacement, µm.
     runout
-        Whether the slow-roll vector was taken off 1× of the newest segment, by "shaft_x" and
+        Whether the slow-roll vector was subtracted from 1× of the newest segment, by "shaft_x" and
         "shaft_y".
     clipped_share
-        Share of the newest segment's samples at an end of the converter's range, by "shaft_x" to
+        Fraction of the newest segment's samples at an end of the converter's range, by "shaft_x" to
         "bearing_y"; empty without waveforms.
     recent
-        Vibration just now, oldest first: of the newest parts of what `readings` average; empty if
-        it is not known apart.
+        Vibration of the newest parts of the averaging window, oldest first; empty if unavailable.
     evidence
-        Waveforms, or what a rack has made of them: then there is no coherence, and equation (5)
-        cannot tell noise from motion.
+        Kind of the input: waveforms, or vectors of a rack. Vectors have no coherence; with them,
+        equation (5) does not distinguish noise from motion.
     condition
-        Under which condition it was found; None until the unit's operation has been looked at.
+        Operating condition of the bearing; None until the unit's operation was evaluated.
     """
 
     unit: str

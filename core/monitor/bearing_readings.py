@@ -1,4 +1,4 @@
-"""From the segments or polls of a unit to the readings of one bearing."""
+"""Readings of one bearing from the segments or polls of its unit."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -48,18 +48,18 @@ from core.uncertainty import Budget, Budgeted, Found, with_budgets
 
 @dataclass(frozen=True)
 class BearingReadings:
-    """What some segments show of a bearing.
+    """Readings of one bearing, averaged over segments or polls.
 
     Parameters
     ----------
     readings
-        One for each quantity of the catalogue.
+        One reading for each quantity of the catalogue.
     budgets
-        Of the readings whose uncertainty is known, by quantity.
+        Uncertainty budgets, by quantity; only of readings with known uncertainty.
     estimators
-        Where `stiffness` came from, by axes "xx" and "yy".
+        Estimator that `stiffness` was taken from, by axes "xx" and "yy".
     spectrum
-        At the bins; empty of polls.
+        Cross-spectrum at the bins; empty for polls.
     """
 
     readings: Mapping[str, Reading]
@@ -77,16 +77,16 @@ def bearing_readings(
     coverage: float,
     position: Found,
 ) -> BearingReadings:
-    """Evaluate one bearing over some segments or polls.
+    """Evaluate one bearing over the kept segments or polls.
 
     Parameters
     ----------
     kept
-        The segments, at least one.
+        Segments or polls to average, at least one.
     coverage
-        Share of the segments that there could have been in which all four channels were usable.
+        Segments in which all four channels were usable, as a fraction of the possible segments.
     position
-        From `core.condition.shaft_readings.position_results`.
+        Shaft position from `core.condition.shaft_readings.position_results`.
     """
     found = _Bearing(unit, bearing, settings, kept, coverage)
     readings, budgets, dynamic = found.readings(position)
@@ -105,7 +105,7 @@ def bearing_readings(
 
 
 class _Bearing:
-    """One bearing over some segments; holds nothing between evaluations."""
+    """One evaluation of one bearing; keeps no state for the next evaluation."""
 
     def __init__(
         self,
@@ -137,7 +137,7 @@ class _Bearing:
 
     @property
     def evidence(self) -> Evidence:
-        """What the results are made of."""
+        """Kind of the input: waveforms, vectors with phase, or amplitudes only."""
         if self.spectrum is not None:
             return Evidence.WAVEFORMS
         phased = self._lines[ORDER1].phases_known
@@ -146,7 +146,7 @@ class _Bearing:
     def readings(
         self, position: Found
     ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """All readings but the preferred stiffness, their budgets, and the film of `dynamic`."""
+        """Return all readings but the preferred stiffness, their budgets, and the fitted film."""
         unit, segments = self._unit, self._segments
         speed = segments[-1].speed
         dynamic, dynamic_budgets, film = self._dynamic()
@@ -177,7 +177,7 @@ class _Bearing:
         budgets: Mapping[str, Budget],
         film: DynamicStiffness | None,
     ) -> dict[str, Reading]:
-        """Readings of estimators that do not agree, and those that a delay reaches."""
+        """Return, marked uncertain, the readings that disagree or are affected by a delay."""
         names: dict[str, Reason] = {}
         if readings["dynamic_k_xx_n_per_m"].quality.reason is Reason.CHANNEL_DELAY:
             delayed = (name for name in budgets if "_transfer_" in name)
@@ -193,7 +193,10 @@ class _Bearing:
         }
 
     def _order_lines(self) -> tuple[OrderLine, OrderLine]:
-        """1× and vortex; what is averaged at one is at the other, but for polls."""
+        """Return the spectral lines of 1× and of the vortex.
+
+        Both are averaged over the same segments; with polls, each line is averaged separately.
+        """
         marked = [segment.at_mark_um_pk for segment in self._segments]
         nothing = np.zeros(len(self._unit.channels), dtype=np.complex128)
         at_mark = np.array([nothing if m is None else m for m in marked])[:, self._rows]
@@ -231,13 +234,13 @@ class _Bearing:
         return lines[0], lines[1]
 
     def _is_round(self, place: int) -> bool:
-        """Whether runout was taken off all that is averaged; one segment with it is too much."""
+        """Whether runout was subtracted from every averaged segment of a shaft channel."""
         channel = self._bearing.channels[place]
         counted = zip(self._segments, self._usable[:, ORDER1, place], strict=True)
         return all(s.runout[channel] is RunoutVerdict.APPLIED for s, usable in counted if usable)
 
     def _steadiness(self) -> Quality:
-        """Whether speed and load stood still over the averaging window."""
+        """Return whether speed and load are steady over the averaging window, as a quality."""
         power = self._unit.power_channel
         speeds = [segment.speed.rpm for segment in self._segments]
         powers = (
@@ -253,7 +256,7 @@ class _Bearing:
         return with_budgets({**found, "frequency_hz": self._frequency(line)}, prefix)
 
     def _dynamic(self) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """All eight coefficients from the segments in which every channel was usable."""
+        """Fit all eight coefficients to the segments in which all four channels were usable."""
         if self.spectrum is None:
             return dict.fromkeys(DYNAMIC_NAMES, missing(Reason.NOT_MEASURED)), {}, None
         settings, quality = self._settings.dynamic, self._line_quality(*range(len(self._rows)))
@@ -302,7 +305,7 @@ class _Bearing:
         return Reading(frequency_hz, speed.rpm.quality), budget
 
     def _vortex_quality(self, *places: int) -> Quality | Reading:
-        """As `_line_quality`, at the vortex: nothing is read where there is none."""
+        """Return the quality as `_line_quality`, or a missing reading if there is no vortex."""
         if not self._unit.has_vortex:
             return missing(Reason.SWITCHED_OFF)
         quality = self._line_quality(*places, line=VORTEX)
@@ -314,7 +317,7 @@ class _Bearing:
 
     @cached_property
     def _no_vortex(self) -> Reading | None:
-        """Why no vortex shows in this bearing; None if one does."""
+        """Missing reading with the reason why this bearing shows no vortex; None if it does."""
         if self._segments[-1].has_vortex_peak and self._lines[VORTEX].is_of_shaft:
             return None
         found = self._other_line_hz
@@ -329,7 +332,7 @@ class _Bearing:
         return other_line_hz(self.spectrum, turn_hz, band_hz, self._settings.min_line_to_floor)
 
     def _line_quality(self, *places: int, line: int = ORDER1) -> Quality | Reading:
-        """Quality of what is read off a line of these channels, or the reason why nothing is."""
+        """Return the quality of a line for these channels, or a missing reading with a reason."""
         newest, few = self._segments[-1], uncertain(Reason.FEW_SEGMENTS)
         own = [newest.line_quality(self._rows[place], line) for place in places]
         now = worst([newest.speed.rpm.quality, self._doubts, *own])

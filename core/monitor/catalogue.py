@@ -1,4 +1,4 @@
-"""The catalogue of everything padwatch reports about a bearing: name, unit and words for people."""
+"""Catalogue of all reported quantities of a bearing: name, unit and label."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -8,20 +8,20 @@ from core.quality import AXES
 
 @dataclass(frozen=True)
 class Quantity:
-    """A reported quantity.
+    """Reported quantity of a bearing.
 
     Parameters
     ----------
     name
-        As in the API and the store: quantity, kind, unit, detector.
+        Name in the API and in the store: quantity, kind, unit, detector.
     unit
-        UCUM-like, as shown to people.
+        Displayed unit, UCUM-like.
     label
-        What it is, in a few words.
+        Short description for the user.
     has_uncertainty
-        Whether its readings state a random and a systematic standard uncertainty.
+        Whether its readings have a random and a systematic standard uncertainty.
     keeps_uncertainty
-        Whether these are stored as well, for trends: of results, not of what they come from.
+        Whether the uncertainties are also stored, for trends: those of results, not of inputs.
     """
 
     name: str
@@ -36,7 +36,7 @@ STORED = (True, True)
 
 
 def _each(name: str, unit: str, label: str, kept: Iterable[bool] = LIVE) -> tuple[Quantity, ...]:
-    """A quantity for x and y, which stand for the braces in name and label."""
+    """Return a quantity for x and one for y; the axis replaces the braces in name and label."""
     return tuple(Quantity(name.format(axis), unit, label.format(axis), *kept) for axis in "xy")
 
 

@@ -1,4 +1,4 @@
-"""`UnitMonitor`: sample blocks of one unit in, assessments of its bearings out."""
+"""Monitor of one unit: assessments of its bearings from its sample blocks."""
 
 from collections import deque
 from collections.abc import Iterator, Mapping
@@ -17,20 +17,20 @@ from core.spectra.segments import Segment, SegmentTransform
 
 @dataclass(frozen=True)
 class MonitorState:
-    """State of a monitor that cannot be rebuilt from its samples since `start`.
+    """State of a monitor that cannot be recomputed from its samples since `start`.
 
     Parameters
     ----------
     epoch
-        In which its samples are counted; None before the first.
+        Epoch of the samples; None before the first sample.
     start
-        First sample that it has to see once more.
+        Index of the first sample to replay.
     first_start
-        First sample of what it counts as possible in this epoch.
+        Index of the first sample from which the possible segments of this epoch are counted.
     n_voided
-        Segments that gaps have voided.
+        Number of segments interrupted by gaps or restarts.
     growth
-        By bearing.
+        Last measured thermal growth, by bearing.
     """
 
     epoch: int | None
@@ -42,16 +42,15 @@ class MonitorState:
 
 
 class UnitMonitor:
-    """Watches one unit. All state of its analysis is here and nowhere else.
+    """Monitor of one unit; it holds the whole state of the unit's analysis.
 
-    What comes from the samples depends on them and their indices alone, not on how they were cut
-    into blocks or when they arrived. Slow readings count for the samples of the block they came
-    with.
+    Results depend only on the samples and their indices, not on the boundaries of blocks or their
+    arrival times. Slow readings apply to the samples of their block.
 
     Parameters
     ----------
     transform
-        Makes segments of windows of samples; by default of waveforms.
+        Transform of sample windows to segments; by default a `SegmentTransform` for waveforms.
     """
 
     def __init__(
@@ -76,15 +75,15 @@ class UnitMonitor:
 
     @property
     def account(self) -> SampleAccount:
-        """Where every sample went that the unit's device offered."""
+        """Account of all samples that the unit's device offered."""
         return self._ring.account
 
     @property
     def state(self) -> MonitorState:
-        """What must be known beside its newest samples to go on from here elsewhere.
+        """State from which another monitor continues, together with the newest samples.
 
-        The samples begin with the segments by which those were read that are averaged now: where a
-        vortex is looked for depends on the segments before.
+        The samples to replay begin up to two averaging times back: the vortex frequency of an
+        averaged segment depends on the segments before it.
         """
         start = self._starts[0] if self._starts else self._next_start or 0
         return MonitorState(
@@ -97,71 +96,71 @@ class UnitMonitor:
         )
 
     def rewind(self, state: MonitorState) -> None:
-        """Expect the samples since `state.start` once more, in a monitor that has seen none."""
+        """Prepare a new monitor for the replay of the samples since `state.start`."""
         self._rewound_to = state.start
 
     def settle(self, state: MonitorState) -> None:
-        """Take over a state, after the samples since `state.start` were shown again."""
+        """Restore a state, after the samples since `state.start` were replayed."""
         self._growth = dict(state.growth)
         self._ring.account = state.account
         self._gaps.clear()
         self._first_start, self._n_voided = state.first_start, state.n_voided
 
     def replace_description(self, unit: Unit) -> None:
-        """Take a new description of the same unit, from the next assessment on.
+        """Replace the description of the unit, from the next assessment on.
 
         Parameters
         ----------
         unit
-            The bearings' references, clearances and brackets may differ; what the results that
-            are being averaged were made with may not.
+            New description. Only the bearings' references, clearances and brackets may differ;
+            the averaged segments depend on all other fields.
 
         Raises
         ------
         ValueError
-            If it does; the message says where, and gives both.
+            If another field differs; the message gives its name and both values.
         """
         require_same_machine(self.unit, unit)
         for bearing in bearings_with_new_references(self.unit, unit):
-            self._growth.pop(bearing, None)  # it counts from a reference
+            self._growth.pop(bearing, None)  # growth is relative to the reference
         self.unit = unit
 
     def go_on(self, reach: Reach | None) -> None:
-        """Go on after a stop, before the first block: what is missing since then is a gap."""
+        """Resume after a stop, before the first block; samples missing since `reach` are gaps."""
         self._reach = reach
 
     def drain_gaps(self) -> list[Gap]:
-        """Hand over the gaps found since the last call, to be recorded."""
+        """Return and clear the gaps found since the last call."""
         gaps, self._gaps = self._gaps, []
         return gaps
 
     def ingest(self, block: SampleBlock) -> list[Assessment]:
-        """Take a block in and return all assessments that it completes; as `steps`."""
+        """Process a block and return the assessments that it completes."""
         return list(self.steps(block))
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
-        """Take a block in and hand over the assessments that it completes, as `refreshes`."""
+        """Process a block and yield the assessments that it completes; see `refreshes`."""
         for refresh in self.refreshes(block):
             yield refresh.assessment()
 
     def refreshes(self, block: SampleBlock) -> Iterator[Refresh]:
-        """Take a block in and hand over what it completes, one bearing at a time.
+        """Process a block and yield the refreshes that it completes, one bearing at a time.
 
         Parameters
         ----------
         block
-            Must follow its predecessors in index order; what is repeated is dropped.
+            Next block in index order; repeated samples are dropped.
 
         Yields
         ------
-        One assessment for each bearing and each hop that the block completes, not yet evaluated;
-        mostly none. They must all be taken before the next block.
+        One refresh, not yet evaluated, for each bearing and each hop that the block completes;
+        most blocks complete none. The iterator must be exhausted before the next block.
 
         Raises
         ------
         BlockMisfitError
-            If the block is not of this unit, or has another rate or number of channels; the
-            message gives both.
+            If the block belongs to another unit, or differs in rate or number of channels; the
+            message gives both values.
         """
         self.require(block)
         for piece in _pieces(block, self._transform.segment_samples):
@@ -169,12 +168,12 @@ class UnitMonitor:
             yield from self._complete_segments()
 
     def require(self, block: SampleBlock) -> None:
-        """Refuse a block that does not fit the unit, before anything has changed.
+        """Check that a block fits the unit; the state is unchanged.
 
         Raises
         ------
         BlockMisfitError
-            If it is of another unit, rate or number of channels; the message gives both.
+            If the unit, rate or number of channels differs; the message gives both values.
         """
         if block.unit != self.unit.id:
             raise BlockMisfitError(
@@ -251,6 +250,6 @@ class UnitMonitor:
 
 
 def _pieces(block: SampleBlock, n_most: int) -> Iterator[SampleBlock]:
-    """Cut a long block so that the ring never overruns the segment being filled."""
+    """Split a long block, so that the ring does not overwrite the segment being filled."""
     for start in range(0, block.n_samples, n_most):
         yield block.from_sample(start, start + n_most)

@@ -1,4 +1,4 @@
-"""Broad-band vibration of one bearing over some segments, and vibration of the newest."""
+"""Broad-band vibration of one bearing, averaged over segments, and its most recent vibration."""
 
 import math
 from collections.abc import Sequence
@@ -30,10 +30,10 @@ OVERALL_NAMES = (*SHAFT_SPANS, ORBIT, *BEARING_SPEEDS)
 def overall_readings(
     segments: Sequence[Segment], rows: Sequence[int], bearing: Bearing, number: int
 ) -> Found:
-    """Broad-band vibration, averaged over the segments, and its budgets, by quantity.
+    """Return the broad-band vibration, averaged over the segments, and its budgets, by quantity.
 
-    Peak-to-peak values and the farthest excursions are averaged as they are, velocities as power.
-    Rows are those of the bearing's four channels; number is its place in the unit.
+    Peak-to-peak values and farthest excursions are averaged linearly, velocities as power. `rows`
+    are the rows of the bearing's four channels, `number` is the bearing's index in the unit.
     """
     if segments[-1].overall is None:
         return dict.fromkeys(OVERALL_NAMES, missing(Reason.NOT_MEASURED)), {}
@@ -57,7 +57,10 @@ def overall_readings(
 def recent_readings(
     segment: Segment, rows: Sequence[int], rate_hz: float
 ) -> tuple[RecentReadings, ...]:
-    """Shaft vibration of the newest parts of a segment, and bearing velocity of all of it."""
+    """Return the shaft vibration of the newest parts of a segment, oldest first.
+
+    The newest entry also contains the bearing velocities of the whole segment.
+    """
     recent, overall, found = segment.recent, segment.overall, []
     if recent is None or overall is None:
         return ()
@@ -81,7 +84,7 @@ def recent_readings(
 
 
 def polled_readings(polls: Sequence[Segment], rows: Sequence[int]) -> tuple[RecentReadings, ...]:
-    """Shaft vibration at 1× of each of some polls."""
+    """Return the shaft vibration at 1× of each poll."""
     return tuple(
         RecentReadings(
             poll.stop_ns,
@@ -102,7 +105,7 @@ def _polled(poll: Segment, row: int) -> Reading:
 
 
 def _turning(segment: Segment, amplitude: Reading) -> Reading:
-    """An amplitude at 1×, as far as the speed is known."""
+    """Return a 1× amplitude with the quality of the speed included; missing without a speed."""
     speed = segment.speed.rpm
     if speed.value is None or amplitude.value is None:
         return speed if speed.value is None else amplitude

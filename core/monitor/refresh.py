@@ -1,4 +1,4 @@
-"""`Refresh`: the evaluation of one bearing over the segments that are averaged at one moment."""
+"""Evaluation of one bearing over the segments that are averaged at one moment."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,25 +29,25 @@ JUDGED = (
     "stiffness_xx_n_per_m",
     "stiffness_yy_n_per_m",
 )
-"""The readings whose worst quality is the quality of the assessment."""
+"""Quantities whose worst quality is the quality of the assessment."""
 
 
 @dataclass(frozen=True)
 class Refresh:
-    """What one assessment is made of; it changes no more, so that the assessment may come later.
+    """Immutable input of one assessment, which can be evaluated later.
 
     Parameters
     ----------
     kept
-        The segments or polls, at least one.
+        Segments or polls to average, at least one.
     newest
-        Samples of the last one.
+        Samples of the newest segment or poll.
     n_expected
-        How many segments there could have been.
+        Largest possible number of segments.
     n_voided
-        Segments begun and lost since the service started.
+        Number of segments interrupted by gaps or restarts since the service started.
     last_growth
-        Thermal growth of the gaps when it was last measured.
+        Last measured thermal growth of the gaps.
     """
 
     unit: Unit
@@ -61,7 +61,7 @@ class Refresh:
 
     @cached_property
     def averaged(self) -> AveragingWindow:
-        """The samples that the assessment stands on."""
+        """Range of the averaged samples."""
         first, last = self.kept.segments[0], self._segment
         usable = np.array([segment.order_usable[ORDER1] for segment in self.kept.segments])
         n_segments = int(usable[:, self._rows].all(axis=1).sum())
@@ -78,11 +78,11 @@ class Refresh:
 
     @property
     def growth(self) -> Growth | None:
-        """Thermal growth of the gaps, measured now."""
+        """Thermal growth of the gaps in this window; None if it is not measured."""
         return measured_growth(self._position[0]) if measures_growth(self.bearing) else None
 
     def assessment(self) -> Assessment:
-        """Evaluate the bearing."""
+        """Evaluate the bearing and return its assessment."""
         newest, rows, coverage = self._segment, self._rows, self.averaged.coverage
         found = bearing_readings(
             self.unit, self.bearing, self.settings, self.kept, coverage, self._position

@@ -1,1 +1,1 @@
-"""Samples of one unit as they come, exact to the gap."""
+"""Sample blocks of one unit, with an exact account of gaps and restarts."""

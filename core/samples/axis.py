@@ -1,7 +1,7 @@
-"""Sample axis of one device: a counter of any width becomes an index that never wraps.
+"""Sample axis of one device: converts a counter of any width to an index that never wraps.
 
-Every adapter places what it reads on a `SampleAxis` and decides by rules of its own wire which
-counters it believes.
+Every adapter places its samples on a `SampleAxis`; the rules of its protocol decide which counter
+values are accepted.
 """
 
 from dataclasses import dataclass
@@ -9,24 +9,24 @@ from dataclasses import dataclass
 from core.units import NS_PER_S
 
 DEVICE_EPOCHS = 1 << 32
-"""Epochs that a device reports are below this; those that an adapter counts begin here."""
+"""Epochs reported by a device are below this number; epochs counted by an adapter start here."""
 
 RECOUNTED_EPOCHS = 1 << 33
-"""Epochs from here on are counts that began again without a new epoch, numbered by their second."""
+"""Epochs from here on number sample counts that restarted within an epoch, by start second."""
 
 
 @dataclass(frozen=True)
 class ClockTolerance:
-    """How far a clock and a count of samples, or two clocks, may disagree.
+    """Tolerance between a clock and a sample count, or between two clocks.
 
-    The defaults are for a device whose clock may be corrected by a second and run a permille wrong.
+    The defaults allow clock corrections of one second and a drift of 0.1 %.
 
     Parameters
     ----------
     step_s
-        Independent of the time that has passed.
+        Constant deviation, independent of the elapsed time.
     drift
-        Share of the time that has passed.
+        Deviation as a fraction of the elapsed time.
     """
 
     step_s: float = 1.0
@@ -38,25 +38,24 @@ class ClockTolerance:
 
 
 class Epochs:
-    """Numbers the counts of one device, across restarts of the adapter that reads it.
+    """Epoch numbers of one device's sample counts, across restarts of its adapter.
 
-    What the adapter itself has counted, as the wraps of a narrow counter or restarts that the
-    device did not report, is gone when its process ends. Such a count has a number of its own: the
-    second in which the adapter began, plus the restarts since, fewer than one a second. Only
-    a device that reports its epoch, and whose counter is wide enough to need no unwrapping, is on
-    the same axis before and after.
+    The adapter loses its own state (wraps of a narrow counter, restarts that the device did not
+    report) when its process ends. It therefore numbers such sample counts itself: its start time in
+    seconds plus the number of restarts since, fewer than one per second. Only a device that reports
+    its epoch, and whose counter needs no unwrapping, keeps its epoch when the adapter restarts.
 
     Parameters
     ----------
     begun_ns
-        When this run of the adapter began, UTC.
+        Start time of this run of the adapter, UTC.
     trusts_device
-        Whether the epoch that the device reports identifies its count.
+        Whether the epoch reported by the device identifies its sample count.
 
     Attributes
     ----------
     number
-        Of the present count.
+        Epoch number of the current sample count.
     """
 
     def __init__(self, begun_ns: int, *, trusts_device: bool) -> None:
@@ -65,12 +64,12 @@ class Epochs:
         self.number = 0 if trusts_device else self._own
 
     def begin_first(self, reported: int) -> None:
-        """Take over the epoch that the device reports of the first count."""
+        """Set the epoch of the first sample count to the reported one, if the device is trusted."""
         if self._trusts_device:
             self.number = reported % DEVICE_EPOCHS
 
     def begin(self, reported: int | None = None) -> None:
-        """Begin another count; its epoch is None where the device has reported no restart."""
+        """Begin a new sample count; `reported` is None if the device reported no new epoch."""
         self._own += 1
         if reported is not None and self._trusts_device:
             self.number = reported % DEVICE_EPOCHS
@@ -79,20 +78,20 @@ class Epochs:
 
 
 def signed_distance(counter: int, reference: int, modulus: int) -> int:
-    """Distance from one reading of a counter to another, the short way round; may be negative."""
+    """Return the signed distance from a reference to a counter value, at most half a modulus."""
     half = modulus // 2
     return (counter - reference + half) % modulus - half
 
 
 class SampleAxis:
-    """Where one device stands on its sample axis, across connections.
+    """Position of one device on its sample axis, kept across connections.
 
     Attributes
     ----------
     index
-        Where the axis stands; None before the first sample.
+        Current sample index; None before the first sample.
     at_ns
-        When it came to stand there.
+        Monotonic time at which the index was reached.
     """
 
     def __init__(self, rate_hz: float, epochs: Epochs) -> None:
@@ -103,26 +102,26 @@ class SampleAxis:
 
     @property
     def epoch(self) -> int:
-        """Number of the present count."""
+        """Epoch number of the current sample count."""
         return self.epochs.number
 
     def stand_at(self, index: int, at_ns: int) -> None:
-        """Begin the axis, or go on at another place, at a time by a clock that is never set."""
+        """Set the sample index, reached at a time of a monotonic clock."""
         self.index, self.at_ns = index, at_ns
 
     def forward(self, counter: int, modulus: int) -> int:
-        """Samples from where the axis stands up to a counter's reading, without whole wraps."""
+        """Return the samples from the current index to a counter value, without whole wraps."""
         return (counter - (self.index or 0)) % modulus
 
     def jump(self, counter: int, modulus: int, at_ns: int) -> int:
-        """Samples up to a counter's reading, with as many whole wraps as the clock has seen."""
+        """Return the samples to a counter value, with whole wraps according to the elapsed time."""
         forward = self.forward(counter, modulus)
         return forward + modulus * max(0, round((self.elapsed(at_ns) - forward) / modulus))
 
     def elapsed(self, at_ns: int) -> float:
-        """Samples that a device takes in the time since the axis came to where it stands."""
+        """Return the number of samples in the time since the current index was reached."""
         return max(0, at_ns - self.at_ns) / NS_PER_S * self._rate_hz
 
     def allowance(self, at_ns: int, tolerance: ClockTolerance) -> float:
-        """Samples by which a jump up to now may differ from those that the clock expects."""
+        """Return the allowed difference, in samples, between a jump and the elapsed time."""
         return tolerance.over(self.elapsed(at_ns), self._rate_hz)

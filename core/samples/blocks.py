@@ -1,4 +1,4 @@
-"""`SampleBlock`: what every adapter delivers and everything downstream consumes."""
+"""Sample blocks: the common data format of all acquisition adapters."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -21,14 +21,14 @@ from core.samples.calibration import UnitCalibration
 from core.units import NS_PER_S, ns_from_s
 
 UNCOUNTED_LOSS = "uncounted_loss"
-"""Reason of the loss of samples that were not counted: their number follows from the time."""
+"""Rejection reason of lost samples that were not counted; their number is derived from time."""
 
 
 @dataclass(frozen=True)
 class Rejection:
-    """Samples per channel that a device offered and the adapter refused, directly before a block.
+    """Number of samples per channel that an adapter rejected directly before a block.
 
-    The reason is a short snake-case word, used as a counter's label.
+    The reason is in snake case and is used as the label of a counter.
     """
 
     reason: str
@@ -36,12 +36,12 @@ class Rejection:
 
     @property
     def is_estimated(self) -> bool:
-        """Whether the number of samples follows from the time, not from a counter."""
+        """Whether the number of samples is derived from time, not from a counter."""
         return self.reason == UNCOUNTED_LOSS
 
 
 class StampFault(StrEnum):
-    """What is wrong with a device's time stamp; the names become counters."""
+    """Fault of a device's time stamp; the names are used as labels of counters."""
 
     REGRESSED = "stamp_regressed"
     REPEATED = "stamp_repeated"
@@ -50,20 +50,20 @@ class StampFault(StrEnum):
 
 @dataclass(frozen=True)
 class DeviceClock:
-    """A device's clocks, as seen from the host's.
+    """Time stamp and sampling clock of a device, compared with the host's clock.
 
     Parameters
     ----------
     offset_s
-        How far the device's stamps are ahead of the host's clock, at the least delay seen on the
-        way; None if the device does not stamp.
+        Offset of the device's time stamps from the host's clock at the smallest observed delay,
+        positive if ahead; None if the device has no time stamps.
     drift_ppm
-        How much faster than nominal the device samples by the host's clock, in parts per million;
-        None until there are enough arrivals, and where the device samples when polled.
+        Deviation of the sampling rate from nominal by the host's clock, in parts per million; None
+        until enough blocks have arrived, and for devices that sample when polled.
     u_drift_ppm
-        Its standard uncertainty.
+        Standard uncertainty of `drift_ppm`.
     n_faults
-        Blocks since the start whose own stamp was not used.
+        Number of blocks since the start whose time stamp was not used.
     """
 
     offset_s: float | None
@@ -73,26 +73,26 @@ class DeviceClock:
 
 
 class BlockMisfitError(ValueError):
-    """A block does not fit the unit: it has another rate or other channels, or is another's."""
+    """Sample block does not fit the unit: the rate, the channels or the unit differ."""
 
 
 @dataclass(frozen=True, eq=False)
 class SideValues:
-    """What a device delivers beside its samples, for each cell of a block.
+    """Time stamps, channel states and slow values of a block, one set for each cell.
 
-    A cell is a run of samples with one verdict of the device on each channel, one time stamp and
-    one set of slow values.
+    A cell is a run of samples with one OK state per channel, one time stamp and one set of slow
+    values.
 
     Parameters
     ----------
     starts : (n_cells,)
-        First sample of each cell, counted from that of the block: rising from 0.
+        First sample of each cell, relative to the block; ascending from 0.
     start_ns : (n_cells,)
-        Time of that sample, UTC nanoseconds since 1970.
+        Time of the first sample of each cell, UTC nanoseconds since 1970.
     ok : (n_channels, n_cells)
-        The device's own verdict.
+        OK state of each channel, as reported by the device.
     slow : (n_slow, n_cells)
-        Values of the slow channels; NaN where the device has none.
+        Values of the slow channels; NaN if the device has none.
     """
 
     starts: npt.NDArray[np.int64]
@@ -102,7 +102,7 @@ class SideValues:
 
     @classmethod
     def of(cls, start_ns: int, ok: Sequence[bool], slow: Sequence[float]) -> "SideValues":
-        """Values of a single cell."""
+        """Return the side values of a block with a single cell."""
         return cls(
             starts=np.zeros(1, dtype=np.int64),
             start_ns=np.array([start_ns], dtype=np.int64),
@@ -112,11 +112,11 @@ class SideValues:
 
     @property
     def n_cells(self) -> int:
-        """Cells of the block."""
+        """Number of cells of the block."""
         return len(self.starts)
 
     def within(self, start: int, stop: int, rate_hz: float) -> "SideValues":
-        """Values of the samples from one up to before another, with their own first cell."""
+        """Return the values of the samples `start` to `stop - 1`; the first cell begins at 0."""
         first = int(np.searchsorted(self.starts, start, side="right")) - 1
         cells = slice(first, max(first + 1, int(np.searchsorted(self.starts, stop))))
         starts, start_ns = self.starts[cells] - start, self.start_ns[cells].copy()
@@ -127,34 +127,35 @@ class SideValues:
 
 @dataclass(frozen=True, eq=False)
 class SampleBlock:
-    """Consecutive samples of all waveform channels of one unit, as its device delivers them.
+    """Consecutive samples of all waveform channels of one unit, as delivered by its device.
 
     Parameters
     ----------
     calibration
-        Unit, rate, and how counts become engineering units; shared by all blocks of a source.
+        Unit, rate, and calibration of counts to engineering units; shared by all blocks of a
+        source.
     epoch
-        Changes when the device restarts its sample count.
+        Epoch of the sample count; changes when the device restarts it.
     first_index
-        Index of the first sample in this epoch, never wrapping.
+        Index of the first sample in this epoch; never wraps.
     counts
-        (n_channels, n_samples) int16 counts of the converter; or, from a device that has none,
-        float32 engineering units, not a number where the device has no sample.
+        (n_channels, n_samples) int16 counts of the converter, or float32 engineering units from a
+        device without counts, NaN for missing samples.
     side
-        Time stamps, the device's verdicts and slow values.
+        Time stamps, channel states reported by the device, and slow values.
     rejected
-        What was refused between the previous block and this one; the rest of a jump in
+        Samples rejected between the previous block and this one; the rest of a jump in
         ``first_index`` is a gap.
     clock
-        How the device's clock stands against the host's; None if there is no such clock.
+        Comparison of the device's clock with the host's; None without a device clock.
     stamp_fault
-        Why one of the device's own time stamps was not used: it then follows from the index.
+        Fault of a device time stamp that was not used; the time is then derived from the index.
     sampled_s
-        When the device had its last sample, by the steady clock of the host that has read it, as
-        far as that is known; None if it comes from no device. Ages are counted from here: what
-        a device, a link or a queue has held back is not new when it comes.
+        Monotonic time of the last sample on the host that read it, s; None if the block comes from
+        no device. The age of data is measured from here and so includes delays in the device, the
+        link and queues.
     elsewhere
-        Readings of slow channels that another device measures.
+        Readings of slow channels that are measured by other devices.
     """
 
     calibration: UnitCalibration
@@ -183,7 +184,7 @@ class SampleBlock:
             )
 
     def __eq__(self, other: object) -> bool:
-        """Whether both hold the same, bit for bit."""
+        """Whether both blocks are equal bit by bit."""
         if not isinstance(other, SampleBlock):
             return NotImplemented
         return self._content == other._content
@@ -201,12 +202,12 @@ class SampleBlock:
 
     @property
     def rate_hz(self) -> float:
-        """Samples per second and channel."""
+        """Sampling rate of each channel."""
         return self.calibration.rate_hz
 
     @property
     def n_samples(self) -> int:
-        """Samples per channel."""
+        """Number of samples per channel."""
         return int(self.counts.shape[1])
 
     @property
@@ -227,7 +228,7 @@ class SampleBlock:
 
     @cached_property
     def verdicts(self) -> VerdictArray:
-        """(n_channels, n_cells) quality of each channel in each cell."""
+        """Quality of each channel in each cell as indices of `VERDICTS`, (n_channels, n_cells)."""
         if not self.n_samples:
             return np.zeros(self.side.ok.shape, dtype=np.uint8)
         limits = self.calibration.limits
@@ -235,11 +236,11 @@ class SampleBlock:
 
     @cached_property
     def channel_quality(self) -> tuple[Quality, ...]:
-        """Quality of each channel throughout the block."""
+        """Worst quality of each channel within the block."""
         return worst_qualities(self.verdicts)
 
     def cell_qualities(self) -> Iterator[tuple[tuple[Quality, ...], int]]:
-        """Quality of each channel in each cell, and the time of the first sample after the cell."""
+        """Yield, for each cell, the channel qualities and the time of the first sample after it."""
         lengths = np.diff(self.side.starts, append=self.n_samples)
         stops_ns = self.side.start_ns + np.rint(lengths / self.rate_hz * NS_PER_S).astype(np.int64)
         for verdicts, stop_ns in zip(self.verdicts.T.tolist(), stops_ns.tolist(), strict=True):
@@ -247,10 +248,10 @@ class SampleBlock:
 
     @cached_property
     def samples(self) -> SampleArray:
-        """(n_channels, n_samples) in the engineering unit of each channel.
+        """Samples in the engineering unit of each channel, (n_channels, n_samples).
 
-        A channel with a sample that is not finite is zero in that cell: one NaN would blind a whole
-        spectrum, and the channel is bad there.
+        A channel with a non-finite sample is zero, and bad, in the whole cell: one NaN would
+        invalidate a whole spectrum.
         """
         found = self.calibration.to_units(self.counts)
         is_blank = self.verdicts == NOT_FINITE
@@ -266,7 +267,7 @@ class SampleBlock:
         return {c.id: c.reading(value) for c, value in newest} | dict(self.elsewhere)
 
     def from_sample(self, start: int, stop: int | None = None) -> "SampleBlock":
-        """Return a part of the block, counted from its own start; what was rejected stays in front.
+        """Return samples `start` to `stop - 1` as a block; `rejected` is kept if `start` is 0.
 
         Raises `ValueError` if the part begins outside the block.
         """
@@ -285,7 +286,7 @@ class SampleBlock:
 
 
 def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:
-    """Consecutive blocks as one, with the clock of the last and the first fault of a stamp."""
+    """Return consecutive blocks as one, with the last block's clock and the first stamp fault."""
     first, last = blocks[0], blocks[-1]
     if first is last:
         return first

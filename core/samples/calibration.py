@@ -1,4 +1,4 @@
-"""Calibration of one unit's device: counts of its converter to engineering units."""
+"""Calibration of one unit's device: conversion of counts to engineering units."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,14 +11,14 @@ from core.checks.channels import COUNTS_FULL_SCALE, ChannelLimits
 from core.quality import Reading, Reason, mean_reading, missing
 
 BLOCK_SAMPLES = 50
-"""A twelfth of a second at 600 Hz: the shortest time for which a lost probe is reported."""
+"""Default samples per cell; 1/12 s at 600 Hz, the shortest reported loss of a probe."""
 
 _LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True)
 class ChannelCalibration:
-    """How the counts of one waveform channel become its engineering unit.
+    """Calibration of one waveform channel: counts to engineering units.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class ChannelCalibration:
     unit_per_v
         Engineering units per volt: the reciprocal of the transducer's sensitivity.
     ok_min_v, ok_max_v
-        Limits of the mean voltage of a healthy transducer over turns of the shaft (gap OK limits).
+        Limits of a healthy transducer's mean voltage over turns of the shaft (gap OK limits).
     """
 
     full_scale_v: float
@@ -50,7 +50,8 @@ class ChannelCalibration:
 UNLIMITED = ChannelCalibration(
     full_scale_v=_LARGEST, unit_per_v=1.0, ok_min_v=-float("inf"), ok_max_v=float("inf")
 )
-"""Of engineering units whose device judges its transducers itself, such as a rack."""
+"""Calibration of samples in engineering units from a device, such as a rack, that checks its
+transducers itself."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class SlowCalibration:
     maximum: float
 
     def reading(self, value: float) -> Reading:
-        """A slow value with its quality: missing if it is not finite or out of range."""
+        """Return a slow value with its quality: missing if it is not finite or out of range."""
         if not np.isfinite(value):
             return missing(Reason.NOT_MEASURED)
         if not self.minimum <= value <= self.maximum:
@@ -70,14 +71,14 @@ class SlowCalibration:
         return Reading(float(value))
 
     def mean(self, values: FloatArray, weights: npt.NDArray[np.int64]) -> Reading:
-        """Mean of slow values, to the last bit as `core.quality.mean_reading` of their readings.
+        """Return the mean of slow values, bit-identical to `core.quality.mean_reading`.
 
         Parameters
         ----------
         values : (n,)
-            Oldest first.
+            Slow values, oldest first.
         weights : (n,)
-            Samples for which each of them holds.
+            Number of samples for which each value holds.
         """
         is_known = np.isfinite(values) & (self.minimum <= values) & (values <= self.maximum)
         if not is_known.all():
@@ -90,14 +91,14 @@ class SlowCalibration:
 
 @dataclass(frozen=True)
 class UnitCalibration:
-    """Everything needed to read one unit's device, in wire order.
+    """Calibration of one unit's device, with the channels in wire order.
 
     Parameters
     ----------
     block_samples
-        Samples of each channel that share one verdict on each channel and one set of slow values.
-        They begin at multiples of it, so that the same samples are judged the same way however
-        the wire cuts them.
+        Samples of a cell, which share one OK state per channel and one set of slow values. Cells
+        begin at multiples of this number, so that quality does not depend on the message
+        boundaries.
     """
 
     unit: str
@@ -108,7 +109,7 @@ class UnitCalibration:
 
     @cached_property
     def limits(self) -> ChannelLimits:
-        """Limits of all channels as arrays."""
+        """OK limits and full scales of all channels as arrays."""
         return ChannelLimits.of(
             [(c.full_scale_v, c.unit_per_v, c.ok_min_v, c.ok_max_v) for c in self.channels]
         )
@@ -124,7 +125,7 @@ class UnitCalibration:
         return gain[:, np.newaxis]
 
     def to_units(self, counts: RawArray) -> SampleArray:
-        """Engineering units of int16 counts; float32 samples are engineering units already.
+        """Convert int16 counts to engineering units; return float32 samples unchanged.
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
-"""Where every offered sample went: gaps, outages, restarts, and counts that begin again.
+"""Account of missing samples: gaps, outages, and restarts of the device's sample count.
 
-If a device continues its count, missing samples are counted by index, exactly. If it restarts the
-count, their number is estimated from times and marked as an estimate.
+If a device continues its sample count, missing samples are counted exactly by index. If it restarts
+the count, their number is estimated from times and marked as an estimate.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,16 +17,17 @@ _SECONDS = 1 << 32
 
 @dataclass(frozen=True)
 class Gap:
-    """Samples that were not delivered, per channel: exact where the device has counted them.
+    """Gap of samples per channel that were not delivered.
 
     Parameters
     ----------
     stop_ns
         Time of the first sample after the gap.
     start_ns
-        Time of the first sample that is missing; None where it follows from the number.
+        Time of the first missing sample; None if it follows from `n_samples`.
     is_estimated
-        Whether the number follows from the times: the device counted anew, or counts nothing.
+        Whether `n_samples` is estimated from times: the device restarted its sample count, or has
+        none.
     """
 
     epoch: int
@@ -39,17 +40,19 @@ class Gap:
 
 @dataclass(frozen=True)
 class SampleAccount:
-    """Samples per channel since the first block: offered = stored + flagged + gap + rejected.
+    """Account of samples per channel: offered = stored + flagged + gap + rejected.
+
+    It starts with the first block.
 
     Parameters
     ----------
     n_flagged
-        Held like the stored ones, but at least one channel was not good with them.
+        Samples held, like `n_stored`, at which at least one channel was not good.
     n_repeated
-        Offered a second time and dropped; not part of the balance.
+        Samples offered a second time and dropped; not part of the balance.
     n_restarts
-        How often the device began to count anew. What it measured between the last sample that
-        arrived and its restart is unknown.
+        Number of restarts of the device's sample count. The samples between the last one that
+        arrived and the restart are not counted.
     """
 
     n_stored: int = 0
@@ -61,11 +64,11 @@ class SampleAccount:
 
     @property
     def n_offered(self) -> int:
-        """What the device has counted."""
+        """Number of samples that the device offered."""
         return self.n_stored + self.n_flagged + self.n_gap + sum(self.rejected.values())
 
     def with_taken(self, n_samples: int, n_flagged: int, n_repeated: int) -> "SampleAccount":
-        """Add the samples of one block; so many of them have a channel that is not good."""
+        """Return the account with one block added; `n_flagged` of `n_samples` are not good."""
         return replace(
             self,
             n_stored=self.n_stored + n_samples - n_flagged,
@@ -74,7 +77,10 @@ class SampleAccount:
         )
 
     def with_missing(self, n_missing: int, rejections: Iterable[Rejection]) -> "SampleAccount":
-        """Add what is missing before a block; what was rejected beyond that was offered before."""
+        """Return the account with the samples missing before a block added.
+
+        Rejections count only up to `n_missing`; further rejected samples were offered before.
+        """
         if not n_missing:
             return self
         rejected = dict(self.rejected)
@@ -88,9 +94,9 @@ class SampleAccount:
 
 @dataclass(frozen=True)
 class Reach:
-    """How far the stored samples of a unit reach: the first sample after them, and its time.
+    """End of the stored samples of a unit: index and time of the first sample after them.
 
-    Gaps are those already recorded after it, oldest first.
+    `gaps` are the gaps already recorded after this end, oldest first.
     """
 
     epoch: int
@@ -100,10 +106,10 @@ class Reach:
 
 
 def outage(reach: Reach, block: SampleBlock) -> list[Gap]:
-    """Return what is missing between the stored samples and the first block after them.
+    """Return the gaps between the stored samples and the first block after them.
 
-    There is one gap for every stretch that is not recorded yet; none if the block follows on what
-    is stored or repeats it.
+    Gaps already recorded are left out. The list is empty if the block continues or repeats the
+    stored samples.
     """
     if _goes_on(reach, block):
         return list(_counted(reach, block))
@@ -111,9 +117,9 @@ def outage(reach: Reach, block: SampleBlock) -> list[Gap]:
 
 
 def restart(reach: Reach, block: SampleBlock) -> Gap | None:
-    """Return what is missing between the last sample that arrived and the restart of its device.
+    """Return the gap between the last sample that arrived and the restart of the sample count.
 
-    It is None if by the device's clock nothing is; what was counted since is no part of it.
+    The result is None if the times show no gap. Samples missing after the restart are not included.
     """
     stop_ns = _begin_ns(block) if n_missed(reach.stop_ns, block) else block.start_ns
     lost = _lost(reach, reach.stop_ns, stop_ns, block.rate_hz)
@@ -121,9 +127,9 @@ def restart(reach: Reach, block: SampleBlock) -> Gap | None:
 
 
 def begins_anew(reach: Reach, block: SampleBlock) -> bool:
-    """Whether a block that is old by its index is new by its time.
+    """Whether the device restarted its sample count within the same epoch.
 
-    Then it is no repetition: the device has begun to count again, in the same epoch.
+    The block's index was reached before, but its time is new: it is no repetition.
     """
     if block.epoch != reach.epoch or block.first_index >= reach.stop_index:
         return False
@@ -131,28 +137,28 @@ def begins_anew(reach: Reach, block: SampleBlock) -> bool:
 
 
 def n_missed(stop_ns: int, block: SampleBlock) -> int:
-    """Samples of a new count that were not delivered, before the first block of it.
+    """Return the number of samples missing between the start of a new count and its first block.
 
-    A count that by its index began before `stop_ns`, up to which samples of earlier counts have
-    arrived, does not show what is missing: it did not begin then, as a counter that went on or has
-    wrapped.
+    Up to `stop_ns`, samples of earlier counts have arrived. If index and time place the start of
+    the new count before that, the counter did not start at zero (it continued or wrapped) and
+    shows no missing samples: 0.
     """
     counted_ns = ns_from_s(block.first_index / block.rate_hz)
     return block.first_index if _begin_ns(block) - stop_ns >= -_TOLERANCE.over(counted_ns) else 0
 
 
 def _goes_on(reach: Reach, block: SampleBlock) -> bool:
-    """Whether index and time agree that it is the same count, still running."""
+    """Whether the block continues the same sample count, by its index and its time."""
     if block.epoch != reach.epoch:
         return False
     passed_ns = ns_from_s((block.first_index - reach.stop_index) / block.rate_hz)
     deviation_ns = abs(block.start_ns - reach.stop_ns - passed_ns)
-    poll_ns = ns_from_s(2.0 / block.rate_hz)  # where a sample is a poll, this may be a minute
+    poll_ns = ns_from_s(2.0 / block.rate_hz)  # up to a minute if each sample is a poll
     return deviation_ns <= poll_ns + _TOLERANCE.over(passed_ns)
 
 
 def _counted(reach: Reach, block: SampleBlock) -> Iterator[Gap]:
-    """The stretches up to the block that no gap of this count covers."""
+    """Yield the gaps before the block that are not recorded yet, in a continued sample count."""
     at = reach.stop_index
     for gap in sorted(reach.gaps, key=lambda gap: gap.first_index):
         if gap.epoch != reach.epoch or _is_older(gap, reach):
@@ -165,7 +171,7 @@ def _counted(reach: Reach, block: SampleBlock) -> Iterator[Gap]:
 
 
 def _is_older(gap: Gap, reach: Reach) -> bool:
-    """Whether a gap is of an earlier count of the same epoch, that had come farther."""
+    """Whether a gap belongs to an earlier sample count of the same epoch."""
     return gap.stop_ns - reach.stop_ns < -_TOLERANCE.over(0)
 
 
@@ -177,7 +183,7 @@ def _piece(block: SampleBlock, start: int, stop: int) -> Gap:
 
 
 def _estimated(reach: Reach, block: SampleBlock) -> list[Gap]:
-    """From the end of the old count to the beginning of the new one, and what that has missed."""
+    """Return the gap between the old and the new sample count and, if any, that within the new."""
     start_ns = max([reach.stop_ns, *(gap.stop_ns for gap in reach.gaps if gap.is_estimated)])
     begin_ns = _begin_ns(block)
     if block.epoch == reach.epoch or begin_ns < start_ns or block.first_index == 0:
@@ -187,28 +193,28 @@ def _estimated(reach: Reach, block: SampleBlock) -> list[Gap]:
 
 
 def _begin_ns(block: SampleBlock) -> int:
-    """When the device began to count, by this block."""
+    """Return the start time of the sample count, from the block's index and time."""
     return block.start_ns - ns_from_s(block.first_index / block.rate_hz)
 
 
 def _lost(reach: Reach, start_ns: int, stop_ns: int, rate_hz: float) -> Gap:
     n_samples = max(0, round((stop_ns - start_ns) / NS_PER_S * rate_hz))
-    start_ns = min(start_ns, stop_ns)  # a clock may have been put back
+    start_ns = min(start_ns, stop_ns)  # a clock may have been set back
     return Gap(reach.epoch, reach.stop_index, n_samples, stop_ns, start_ns, is_estimated=True)
 
 
 @dataclass(frozen=True)
 class Count:
-    """The count that a unit is in.
+    """Current sample count of a unit.
 
     Parameters
     ----------
     reported
-        Its epoch as blocks name it.
+        Epoch in the adapter's blocks.
     epoch
-        As everything downstream names it.
+        Epoch in the store and in the analysis.
     stop_index, stop_ns
-        Of the first sample after those that have arrived.
+        Index and time of the first sample after those that have arrived.
     """
 
     reported: int
@@ -218,28 +224,28 @@ class Count:
 
 
 class Counts:
-    """Gives another number to a count that a device begins again in the same epoch.
+    """Assignment of a new epoch to a sample count that restarts within the same epoch.
 
-    A device may begin its count again without reporting it, and so may a program that reads it. By
-    the index alone, all that it then delivers has been there; its time shows that it is new. The
-    count is None before the first block.
+    A device or a program that reads it may restart the count without reporting it. The index alone
+    then looks like repeated samples; the time shows that they are new. `count` is None before the
+    first block.
     """
 
     def __init__(self) -> None:
         self.count: Count | None = None
 
     def restore(self, count: Count | None) -> None:
-        """Go on in a count that began before a restart of padwatch."""
+        """Restore the current sample count after a restart of padwatch."""
         self.count = count
 
     def replayed(self, block: SampleBlock) -> SampleBlock:
-        """A block that was taken before, in the count that it belonged to."""
+        """Return a replayed block with the epoch that was assigned to its sample count."""
         if self.count is None or block.epoch != self.count.reported:
             return block
         return _in(block, self.count.epoch)
 
     def placed(self, block: SampleBlock) -> SampleBlock:
-        """The next block, in the count that it belongs to."""
+        """Return the next block with the epoch of its sample count; detects a restarted count."""
         count = self.count
         epoch, is_new = block.epoch, True
         if count is not None and block.epoch == count.reported:

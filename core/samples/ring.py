@@ -1,4 +1,4 @@
-"""Ring of the newest samples of one unit, with an account of those that it does not hold."""
+"""Ring buffer of the newest samples of one unit, with an account of missing samples."""
 
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -17,9 +17,10 @@ from core.units import ns_from_s
 
 @dataclass(frozen=True)
 class Window:
-    """Consecutive samples (n_channels, n_samples) of one epoch in engineering units.
+    """Window of consecutive samples (n_channels, n_samples) of one epoch, in engineering units.
 
-    Each channel has its worst quality within the window, each slow channel its mean.
+    `channel_quality` is the worst quality of each channel within the window; `slow` holds the means
+    of the slow channels.
     """
 
     unit: str
@@ -33,7 +34,7 @@ class Window:
 
     @property
     def n_samples(self) -> int:
-        """Samples per channel."""
+        """Number of samples per channel."""
         return int(self.samples.shape[1])
 
     @property
@@ -49,7 +50,7 @@ class Window:
 
 @dataclass(frozen=True)
 class _Part:
-    """Cells of a block that lie within a window, if only in part, and their samples within it."""
+    """Part of a block within a window: its cells, and the number of samples of each (weights)."""
 
     block: SampleBlock
     cells: slice
@@ -68,7 +69,7 @@ class _Part:
         return cls(block, cells, slice(start, stop), np.diff(edges))
 
     def readings(self, slow_channel: str) -> list[Reading]:
-        """Of a slow channel, one for each cell."""
+        """Return the readings of a slow channel, one for each cell."""
         block, n_cells = self.block, len(self.weights)
         if slow_channel in block.elsewhere:
             return [block.elsewhere[slow_channel]] * n_cells
@@ -80,12 +81,12 @@ class _Part:
 
 
 class Ring:
-    """The newest blocks of one epoch; samples are addressed by their index.
+    """Ring buffer of the newest blocks of one epoch; samples are addressed by index.
 
     Parameters
     ----------
     capacity
-        Samples per channel that are held.
+        Number of samples held per channel.
     """
 
     def __init__(self, n_channels: int, capacity: int) -> None:
@@ -98,18 +99,18 @@ class Ring:
         self.account = SampleAccount()
 
     def write(self, block: SampleBlock) -> Gap | None:
-        """Take a block in; return the gap before it, lost or rejected, if there is one.
+        """Append a block and return the gap of lost or rejected samples before it, or None.
 
-        Samples that were already taken are dropped and counted, never joined on again; so are
-        rejected ones, as far as they are more than the jump in the index.
+        Repeated samples are counted and dropped. Rejected samples count only up to the jump in the
+        index.
 
         Raises
         ------
         BlockMisfitError
-            As `require` does.
+            If the number of channels differs.
         """
         self.require(block)
-        if self.epoch is None:  # what came before padwatch looked was not offered to it
+        if self.epoch is None:  # earlier samples do not count as offered
             self.epoch, self.stop_index = block.epoch, block.first_index
             self.contiguous_from = block.first_index
         n_missing = self._n_missing_before(block)
@@ -126,7 +127,7 @@ class Ring:
         return Gap(block.epoch, first_index, n_missing, block.start_ns, is_estimated=is_estimated)
 
     def require(self, block: SampleBlock) -> None:
-        """Refuse a block of another number of channels, with a `BlockMisfitError`."""
+        """Check the number of channels of a block; raise `BlockMisfitError` if it differs."""
         if len(block.counts) != self._n_channels:
             raise BlockMisfitError(
                 f"{len(block.counts)} channels offered to a ring of {self._n_channels}"
@@ -138,17 +139,17 @@ class Ring:
         return max(block.first_index - self.stop_index, 0)
 
     def holds(self, first_index: int, stop_index: int) -> bool:
-        """Whether these samples are all here, without a gap."""
+        """Whether the ring holds the samples `first_index` to `stop_index - 1` without a gap."""
         oldest = max(self.contiguous_from, self.stop_index - self._capacity)
         return oldest <= first_index <= stop_index <= self.stop_index
 
     def read(self, first_index: int, stop_index: int) -> Window:
-        """Calibrate a stretch of consecutive samples.
+        """Return the calibrated window of the samples `first_index` to `stop_index - 1`.
 
         Raises
         ------
         LookupError
-            If any of them is not held, or if none are asked for.
+            If the ring does not hold all of these samples, or the range is empty.
         """
         if first_index == stop_index or not self.holds(first_index, stop_index):
             raise LookupError(f"samples {first_index} to {stop_index} are not in the ring")
@@ -191,7 +192,7 @@ class Ring:
 
 
 def _units(parts: Sequence[_Part]) -> SampleArray:
-    """(n_channels, n_samples) in engineering units, of consecutive parts."""
+    """Return the samples of consecutive parts in engineering units, (n_channels, n_samples)."""
     calibration = parts[0].block.calibration
     if all(
         part.block.calibration is calibration and part.block.counts.dtype == np.int16
@@ -203,7 +204,7 @@ def _units(parts: Sequence[_Part]) -> SampleArray:
 
 
 def _slow_means(parts: Sequence[_Part]) -> dict[str, Reading]:
-    """Mean of each slow channel, each value for the samples of its cell."""
+    """Return the mean of each slow channel, weighted by the samples of each cell."""
     first = parts[0].block
     weights = np.concatenate([part.weights for part in parts])
     are_alike = all(part.block.calibration is first.calibration for part in parts)

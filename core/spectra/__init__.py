@@ -1,1 +1,1 @@
-"""One stretch of time, transformed once: lines, speed, vortex, orbit."""
+"""Spectral analysis of sample segments: lines, speed, vortex, orbit."""

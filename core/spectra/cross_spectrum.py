@@ -1,4 +1,4 @@
-"""`CrossSpectrum`: how four signals of a bearing vary together, line by line, and how surely."""
+"""Averaged cross-spectra of the four signals of a bearing, and their statistics."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,15 +11,15 @@ from core.arrays import ComplexArray, FloatArray
 from core.spectra.lines import hann
 
 SHAFT_X, SHAFT_Y, BEARING_X, BEARING_Y = range(4)
-"""Where the channels of a bearing stand in every matrix."""
+"""Indices of a bearing's channels in every matrix."""
 
 
 @dataclass(frozen=True)
 class CrossSpectrum:
-    """Averages over segments; every spectral result of padwatch is a pure function of this.
+    """Cross-spectrum averaged over segments; all spectral results are pure functions of it.
 
-    Two channels are averaged over the segments in which both are usable, so that a failed channel
-    takes nothing from the others, and amplitudes that are compared come from the same time.
+    Each pair of channels is averaged over the segments in which both are usable. A failed channel
+    does not affect the others, and compared amplitudes come from the same segments.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class CrossSpectrum:
     power : (n_lines, n_channels, n_channels)
         Mean of ``|P_i|²`` over the segments in which both i and j are usable, µm².
     n_segments : (n_channels, n_channels)
-        How many those are.
+        Number of segments in which both i and j are usable.
     """
 
     frequency_hz: FloatArray
@@ -38,14 +38,14 @@ class CrossSpectrum:
     n_segments: npt.NDArray[np.int64]
 
     def amplitude_um_pk(self, channel: int) -> FloatArray:
-        """Root mean square over the segments of a channel's line amplitudes, (n_lines,)."""
+        """Return the rms over the segments of a channel's line amplitudes, (n_lines,)."""
         amplitude: FloatArray = np.sqrt(self.power[:, channel, channel])
         return amplitude
 
     def amplitude_ratio(self, numerator: int, denominator: int) -> FloatArray:
-        """Ratio of two channels' amplitudes over their common segments, (n_lines,).
+        """Return the ratio of two channels' amplitudes over their common segments, (n_lines,).
 
-        Zero where the denominator is zero: no motion, no ratio; the excitation guard's business.
+        It is zero where the denominator is zero; `line_excitation` excludes such lines.
         """
         below = self.power[:, denominator, numerator]
         ratio = np.divide(
@@ -55,7 +55,7 @@ class CrossSpectrum:
         return root
 
     def coherence(self, first: int, second: int) -> FloatArray:
-        """Squared coherence of two channels, (n_lines,), 0 to 1; always 1 for one segment."""
+        """Return the squared coherence of two channels, (n_lines,); always 1 for one segment."""
         product = self.power[:, first, second] * self.power[:, second, first]
         squared = np.abs(self.matrix[:, first, second]) ** 2
         coherence: FloatArray = np.divide(
@@ -64,7 +64,7 @@ class CrossSpectrum:
         return np.minimum(coherence, 1.0)
 
     def coherence_at(self, line: int, first: int, second: int) -> float:
-        """Squared coherence of two channels at one line."""
+        """Return the squared coherence of two channels at one line."""
         product = float(self.power[line, first, second]) * float(self.power[line, second, first])
         squared = abs(complex(self.matrix[line, first, second])) ** 2
         return min(squared / product, 1.0) if product > 0.0 else 0.0
@@ -73,13 +73,13 @@ class CrossSpectrum:
 NO_SPECTRUM = CrossSpectrum(
     np.zeros(0), np.zeros((0, 4, 4), complex), np.zeros((0, 4, 4)), np.zeros((4, 4), np.int64)
 )
-"""In the place of a spectrum that is not there."""
+"""Empty cross-spectrum, for evidence without waveforms."""
 
 
 def average(
     frequency_hz: FloatArray, phasors_um_pk: ComplexArray, usable: npt.NDArray[np.bool_]
 ) -> CrossSpectrum:
-    """Average the phasors of some segments.
+    """Return the cross-spectrum averaged over segments.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def average(
     phasors_um_pk : (n_segments, n_channels, n_lines)
         Finite, also where not usable.
     usable : (n_segments, n_channels)
-        Whether the channel may be believed throughout the segment.
+        Whether the channel is usable in the whole segment.
     """
     all_usable = bool(usable.all())
     counted = phasors_um_pk if all_usable else phasors_um_pk * usable[:, :, np.newaxis]
@@ -108,14 +108,14 @@ NOISE_BANDWIDTH_BINS = 1.5
 """Equivalent noise bandwidth of Hann's taper (Harris 1978, table I)."""
 
 BIN_CORRELATION = (1.0, 2.0 / 3.0, 1.0 / 6.0)
-"""Of the phasors of white noise in bins 0, 1 and 2 apart: Hann's taper convolved with itself."""
+"""Correlation of white-noise phasors 0, 1 and 2 bins apart: Hann's taper convolved with itself."""
 
 CORRELATED_LINES = 1.0 + 2.0 * sum(rho**2 for rho in BIN_CORRELATION[1:])
-"""Neighbouring lines that count as one in a mean of squares, 1.94."""
+"""Number of adjacent lines equivalent to one independent line in a mean of squares, 1.94."""
 
 
 def phasor_power_per_density(bin_hz: float) -> float:
-    """Mean squared 0-to-peak phasor of noise with a one-sided density of 1 per Hz.
+    """Return the mean squared 0-to-peak phasor of noise with a one-sided density of 1 per Hz.
 
     The mean square in a bin is density times noise bandwidth; a 0-to-peak square is twice that.
     """
@@ -124,12 +124,14 @@ def phasor_power_per_density(bin_hz: float) -> float:
 
 @lru_cache(maxsize=32)
 def independent_segments(n_segments: int, overlap: float) -> float:
-    """Independent segments that overlapping ones are worth (Welch 1967, equation 12).
+    """Return the number of independent segments equivalent to overlapping ones.
+
+    Welch (1967), equation 12.
 
     Parameters
     ----------
     overlap
-        Share of a segment that the next one repeats, from 0 to below 1.
+        Overlap of consecutive segments as a fraction of a segment, from 0 to below 1.
     """
     taper = hann(1024)
     excess, lag = 0.0, 1
@@ -148,33 +150,33 @@ WHITE_PRODUCTS = (1.0, *(rho**2 for rho in BIN_CORRELATION[1:]))
 SMEARED_IN_PHASE = (1.0, -1.0 / 3.0, -1.0 / 6.0)
 SMEARED_IN_QUADRATURE = (1.0, 1.0 / 3.0, 0.0)
 SMEARED_APART = (1.0, 0.0, -1.0 / 12.0)
-"""The same of white noise times what it leaves in a line when each of its parts is integrated with
-the line's frequency instead of its own, d times its share in the bins d = -1, 0, 1 of the taper;
-for the factor's part in phase with the noise, in quadrature, and independent of it. In phase, what
-one line has too much its neighbours have too little: only the ends of a stretch of lines are
-left."""
+"""Correlation, 0, 1 and 2 bins apart, of products of white noise and its integration error in a
+line. The error arises because noise d bins off is integrated with the line's frequency instead of
+its own; it is d times the taper's weight at d = -1, 0, 1. The factors are in phase with the noise,
+in quadrature, and independent of it. In phase, the errors of neighbouring lines cancel; only those
+at the ends of a run of lines remain."""
 
 SMEAR_BINS_SQUARED = 1.0 / 3.0
-"""Variance of the frequency, in bins, that a line of broadband noise holds."""
+"""Variance of the frequencies, in bins squared, that contribute to a line of broadband noise."""
 
 
 def correlated_sum(
     terms: FloatArray, lines: npt.NDArray[np.int64], products: FloatArray | Sequence[float]
 ) -> FloatArray:
-    """Covariance of a sum over lines, each of several terms, whose neighbours are correlated.
+    """Return the covariance of n sums over lines whose terms are correlated between near bins.
 
     Parameters
     ----------
     terms : (..., n_lines, n, m)
-        Standard deviations of the n summands' m independent real parts.
+        Standard deviations of the m independent real parts of each sum's terms.
     lines : (n_lines,)
-        Which bins they are, rising.
+        Bin index of each line, ascending.
     products : (3, m) or (3,)
-        Correlation of each part, or of all, 0, 1 and 2 bins apart.
+        Correlation of each part, or of all parts, 0, 1 and 2 bins apart.
 
     Returns
     -------
-    (..., n, n); with no negative variance, as products are of a real process.
+    (..., n, n); no variance is negative if `products` are correlations of a real process.
     """
     *outer, _, n, m = terms.shape
     spread = np.zeros((*outer, n, int(lines[-1] - lines[0]) + 1, m))
@@ -190,9 +192,10 @@ def correlated_sum(
 
 @lru_cache(maxsize=8)
 def leakage_kernel(n_lines: int) -> FloatArray:
-    """Share of a line's power that Hann's side lobes may put on others, (n_lines, n_lines).
+    """Return the largest fraction of line power that leaks to other lines, (n_lines, n_lines).
 
-    Zero within the main lobe. The envelope of the lobes at distance d is ``1 / (π d (d² - 1))``.
+    It is zero within Hann's main lobe; the envelope of the side lobes at a distance of d bins is
+    ``1 / (π d (d² - 1))``.
     """
     distance = np.abs(np.subtract.outer(np.arange(n_lines), np.arange(n_lines))).astype(np.float64)
     far = distance > 2.0

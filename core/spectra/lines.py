@@ -1,4 +1,4 @@
-"""Spectral lines: transforms of one segment, and amplitudes at exact frequencies.
+"""Spectral lines: Fourier transforms of one segment at its bins and at exact frequencies.
 
 Amplitudes are zero-to-peak; the taper is Hann's, periodic, as in the paper (Brito et al., 3.1).
 """
@@ -15,33 +15,33 @@ from core.checks.sensor_checks import SensorLimits
 
 @dataclass(frozen=True)
 class SegmentSettings:
-    """How samples are cut into segments and what is read off one; defaults after Brito et al., 3.1.
+    """Settings of segments and of their evaluation; defaults after Brito et al., 3.1.
 
     Parameters
     ----------
     segment_samples
-        Points of one Hann-tapered segment.
+        Samples of one Hann-tapered segment.
     overlap
-        Share of a segment that the next one repeats.
+        Overlap of consecutive segments as a fraction of a segment.
     n_segments
-        Segments that are averaged; 24 at 600 Hz are about five minutes.
+        Number of averaged segments; 24 at 600 Hz are about five minutes.
     min_segments
-        Below this number of segments a result is marked uncertain.
+        Number of segments below which a result is marked uncertain.
     max_frequency_hz
-        Spectra are kept up to here.
+        Highest frequency of the spectra.
     vortex_order
         Nominal frequency of the part-load vortex in multiples of the running speed.
     vortex_band
-        Orders within which its peak is looked for.
+        Lowest and highest order of the vortex peak.
     min_line_to_floor
-        Power of a line over the median of its surroundings from which it stands out.
+        Smallest ratio of a significant line's power to the median of the surrounding lines.
     min_speed_fraction
-        Share of the rated speed below which the machine counts as standing.
+        Fraction of the rated speed below which the machine is at standstill.
     velocity_low_order, velocity_high_hz
-        Band of a bearing's broad-band velocity: from this multiple of the rated speed (a quarter
-        takes in everything down to the vortex) to this frequency.
+        Band of a bearing's broad-band velocity: from this multiple of the rated speed (0.25
+        includes the vortex) to this frequency.
     sensors
-        What counts as a failed transducer or an unsteady record.
+        Limits for failed transducers and unsteady operation.
     """
 
     segment_samples: int = 8192
@@ -59,17 +59,17 @@ class SegmentSettings:
 
     @property
     def hop_samples(self) -> int:
-        """Samples from one segment's start to the next one's."""
+        """Samples between the starts of consecutive segments."""
         return self.segment_samples - round(self.segment_samples * self.overlap)
 
 
 FINE_STEPS = 64
-"""Samples of one run in a Fourier sum at any frequency."""
+"""Number of samples covered by the fine table in `turning_factors`."""
 
 
 @lru_cache(maxsize=8)
 def hann(n_samples: int) -> FloatArray:
-    """Periodic Hann taper, (n_samples,), read-only."""
+    """Return the periodic Hann taper, (n_samples,), read-only."""
     taper = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(n_samples) / n_samples)
     taper.setflags(write=False)
     return taper
@@ -77,14 +77,14 @@ def hann(n_samples: int) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def taper_weights(n_samples: int) -> FloatArray:
-    """The same, scaled so that a line reads 0-to-peak."""
+    """Return the Hann taper scaled so that a line's phasor is zero-to-peak, read-only."""
     weights: FloatArray = 2.0 * hann(n_samples) / hann(n_samples).sum()
     weights.setflags(write=False)
     return weights
 
 
 def tapered(samples: SampleArray | FloatArray) -> FloatArray:
-    """Remove each channel's mean and apply the taper, scaled so that a line reads 0-to-peak.
+    """Remove each channel's mean and apply the Hann taper of `taper_weights`.
 
     Parameters
     ----------
@@ -101,11 +101,11 @@ def tapered(samples: SampleArray | FloatArray) -> FloatArray:
 
 
 def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
-    """Phasors at the first bins above zero of the discrete Fourier transform.
+    """Return the phasors at the first bins above zero of the discrete Fourier transform.
 
     Returns
     -------
-    (n_channels, n_lines), line 0 being bin 1.
+    (n_channels, n_lines); line 0 is bin 1.
     """
     phasors: ComplexArray = fft.rfft(tapered_samples, axis=1)[:, 1 : n_lines + 1]
     return phasors
@@ -114,7 +114,7 @@ def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
 def exact_phasors(
     tapered_samples: FloatArray, rate_hz: float, frequency_hz: FloatArray
 ) -> ComplexArray:
-    """Phasors at any frequencies, on or off the bins: one discrete Fourier sum each.
+    """Return the phasors at arbitrary frequencies, on or between the bins, as Fourier sums.
 
     Parameters
     ----------
@@ -138,9 +138,9 @@ def exact_phasors(
 
 
 def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) -> ComplexArray:
-    """(n_samples, n_lines) factors ``exp(-iωt)`` that turn the phasors of frequencies back.
+    """Return the factors ``exp(-iωt)`` of Fourier sums at the frequencies, (n_samples, n_lines).
 
-    The exponential of a sum of steps: a fine table within each run and a coarse one over runs.
+    Each factor is the product of a fine table within a run and a coarse table over the runs.
     """
     turn_rad = -2j * np.pi * frequency_hz / rate_hz
     n_coarse = -(-n_samples // FINE_STEPS)
@@ -151,13 +151,16 @@ def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) ->
 
 
 def line_phasors(tapered_samples: FloatArray, factors: ComplexArray) -> ComplexArray:
-    """As `exact_phasors`, by factors of `turning_factors`."""
+    """Return phasors as `exact_phasors`, from precomputed factors of `turning_factors`."""
     parts: FloatArray = tapered_samples @ factors.view(np.float64)
     return parts.view(np.complex128)
 
 
 def part_phasors(samples: FloatArray, factors: ComplexArray) -> ComplexArray:
-    """The same of samples that are not tapered, (n_channels, n_lines), without a copy of them."""
+    """Return the phasors of samples without taper, (n_channels, n_lines), without copying them.
+
+    The taper is applied to the factors, and the mean of each channel is removed.
+    """
     weighted = factors * taper_weights(samples.shape[1])[:, np.newaxis]
     of_mean = samples.mean(axis=1, keepdims=True) * weighted.sum(axis=0)
     phasors: ComplexArray = line_phasors(samples, weighted) - of_mean
@@ -167,10 +170,10 @@ def part_phasors(samples: FloatArray, factors: ComplexArray) -> ComplexArray:
 def peak_frequency_hz(
     power: FloatArray, frequency_hz: FloatArray, band_hz: tuple[float, float]
 ) -> float | None:
-    """Frequency of the strongest line in a band, between the bins.
+    """Return the frequency of the strongest line in a band, interpolated between the bins.
 
-    A tone that falls between two bins of a Hann spectrum at ``k + d`` shows them in the amplitude
-    ratio ``a = (1 + d) / (2 - d)``, so ``d = (2a - 1) / (a + 1)`` (Grandke 1983, eq. 10).
+    The bins k and k + 1 next to a tone at ``k + d`` in a Hann spectrum have the amplitude ratio
+    ``a = (1 + d) / (2 - d)``, so ``d = (2a - 1) / (a + 1)`` (Grandke 1983, eq. 10).
 
     Parameters
     ----------
@@ -178,11 +181,11 @@ def peak_frequency_hz(
     frequency_hz : (n_lines,)
         Evenly spaced.
     band_hz
-        Lowest and highest frequency of interest.
+        Lowest and highest frequency of the band.
 
     Returns
     -------
-    None when the strongest line of the band is no peak but the flank of one outside it.
+    None if the strongest line of the band is not a peak but the flank of a line outside.
     """
     inside = np.flatnonzero((frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1]))
     inside = inside[(inside > 0) & (inside < power.size - 1)]

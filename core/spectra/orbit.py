@@ -1,6 +1,6 @@
-"""The shaft's path in its bearing, sample by sample: whole, at running speed alone, and its marks.
+"""Shaft orbit in its bearing, sample by sample: unfiltered, 1×-filtered, and key-phase marks.
 
-Samples that are missing are NaN throughout; what is made of too few of them is NaN, too.
+Missing samples are NaN; results from too few samples are NaN, too.
 """
 
 import math
@@ -12,25 +12,25 @@ from core.arrays import ComplexArray, FloatArray
 from core.spectra.speed import ODD_TURN, rising_edges
 
 FILTER_TURNS = 8.0
-"""Width of the taper in which 1× is read: its first zeros are a quarter of the running speed away
-from 1×, so that a vortex at 0.25× has none of it left."""
+"""Width of the taper of the 1× filter in turns. Its zeros are 0.25 orders from 1× and every 1/8
+order beyond; a vortex at 0.25× falls on one."""
 
 MIN_WEIGHT = 0.5
-"""Share of the taper that must lie on samples."""
+"""Fraction of the taper's weight that must fall on existing samples."""
 
 
 @dataclass(frozen=True)
 class Ellipse:
-    """The path of a shaft that moves with one frequency.
+    """Elliptical orbit of a shaft at one frequency.
 
     Parameters
     ----------
     major_um_pk, minor_um_pk
-        Half axes.
+        Semi-axes.
     angle_deg
-        Of the major axis, from x towards y, -90 to 90.
+        Angle of the major axis, from x towards y, -90 to 90.
     sense
-        +1 if it runs from x to y, -1 from y to x, 0 on a straight line.
+        Sense of rotation: +1 from x to y, -1 from y to x, 0 for a straight line.
     """
 
     major_um_pk: float
@@ -40,19 +40,19 @@ class Ellipse:
 
 
 def order_phasors(trace_um: FloatArray, rate_hz: float, frequency_hz: float) -> ComplexArray:
-    """Phasor of one frequency at each sample, over a taper of `FILTER_TURNS` turns around it.
+    """Return the phasor at one frequency for each sample, tapered over `FILTER_TURNS` turns.
 
     Parameters
     ----------
     trace_um : (n_samples,)
-        Mean removed; NaN where there is no sample.
+        Displacement without mean; NaN for missing samples.
     frequency_hz
-        Must lie above zero and below ``rate_hz / 2``.
+        Frequency above zero and below ``rate_hz / 2``.
 
     Returns
     -------
-    (n_samples,) of zero-to-peak phasors ``P`` with ``x(t) = Re(P exp(iωt))``, t from the first
-    sample; NaN where too little of the taper lies on samples.
+    (n_samples,) zero-to-peak phasors ``P`` with ``x(t) = Re(P exp(iωt))``, t from the first sample;
+    NaN where too many samples are missing.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def order_phasors(trace_um: FloatArray, rate_hz: float, frequency_hz: float) -> 
     turned = np.where(there, trace_um, 0.0) * np.exp(
         -2.0j * math.pi * frequency_hz / rate_hz * np.arange(trace_um.size)
     )
-    from scipy.signal import oaconvolve  # slow to load, and not needed to begin
+    from scipy.signal import oaconvolve  # slow import, not needed at start
 
     weight = oaconvolve(there.astype(np.float64), taper, mode="same")
     total = oaconvolve(turned, taper, mode="same")
@@ -80,17 +80,17 @@ def order_phasors(trace_um: FloatArray, rate_hz: float, frequency_hz: float) -> 
 
 
 def trace_of(phasors: ComplexArray, rate_hz: float, frequency_hz: float) -> FloatArray:
-    """Motion of the phasors of `order_phasors`, (n_samples,) µm."""
+    """Return the displacement of phasors from `order_phasors`, (n_samples,) µm."""
     angle = 2.0 * math.pi * frequency_hz / rate_hz * np.arange(phasors.size)
     trace: FloatArray = (phasors * np.exp(1.0j * angle)).real
     return trace
 
 
 def ellipse_of(x: complex, y: complex) -> Ellipse:
-    """Path of a shaft from its phasors in x and y.
+    """Return the elliptical orbit of a shaft from its phasors in x and y.
 
-    The motion x + iy is a forward circle and a backward circle (Childs 1993, section 1.9): the half
-    axes are the sum and the difference of their radii.
+    The motion x + iy is the sum of a forward and a backward circle (Childs 1993, section 1.9). The
+    semi-axes are the sum and the difference of their radii.
     """
     forward, backward = (x + 1.0j * y) / 2.0, (x.conjugate() + 1.0j * y.conjugate()) / 2.0
     along, against = abs(forward), abs(backward)
@@ -104,17 +104,17 @@ def ellipse_of(x: complex, y: complex) -> Ellipse:
 
 
 def marks_of(signal: FloatArray) -> FloatArray:
-    """Where the mark of the shaft passes a key-phase pick-up.
+    """Return the positions at which the shaft's mark passes the key-phase pick-up.
 
     Parameters
     ----------
     signal : (n_samples,)
-        With pulses that rise; NaN where there is no sample.
+        Key-phase signal with rising pulses; NaN for missing samples.
 
     Returns
     -------
-    (n_marks,) in samples from the first, between them too; none where the pulses are not one a
-    turn: a shaft at rest makes noise, not marks.
+    (n_marks,) fractional sample positions; empty if there is not exactly one pulse per turn, as
+    with the noise of a shaft at rest.
     """
     there = np.flatnonzero(np.isfinite(signal))
     if there.size < 2:

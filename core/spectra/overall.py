@@ -1,8 +1,8 @@
 """Broad-band vibration of a segment, and vibration of its newest parts.
 
-Broad-band displacement of shafts and velocity of bearings are what standards of the ISO 20816
-family judge. Limits of fast changes are judged by the newest parts: averages over minutes show a
-step minutes later, parts of a segment show it within seconds, and for how long it has lasted.
+The standards of the ISO 20816 family evaluate broad-band displacement of shafts and velocity of
+bearings. Limits for fast changes use the newest parts of a segment: they show a step and its
+duration within seconds; averages over minutes would show it minutes later.
 """
 
 import math
@@ -21,11 +21,11 @@ from core.spectra.lines import SegmentSettings
 from core.units import hz_from_rpm
 
 MAX_PARTS = 4
-"""Of what a segment adds to the one before; 3 s each at the defaults."""
+"""Largest number of parts per hop; 3 s each by default."""
 
 PART_TURNS = 4.0
-"""Turns in a part, at least: the main lobe of Hann's taper then reaches half an order from 1×
-(Harris 1978), short of the vortex at 0.2 to 0.4 orders."""
+"""Smallest number of turns in a part. The main lobe of Hann's taper then reaches half an order from
+1× (Harris 1978), short of the vortex at 0.2 to 0.4 orders."""
 
 MM_FROM_UM = 1e-3
 
@@ -39,12 +39,12 @@ class Overall:
     Parameters
     ----------
     peak_to_peak_um : (n_channels,)
-        Of the samples as they are; NaN where a channel measures no displacement.
+        Range of the raw samples; NaN for channels that measure no displacement.
     orbit_um_pk : (n_bearings,)
-        Farthest that each shaft went from its mean place, as ISO 20816-1, annex B, S_max; NaN
-        where not both directions are displacements.
+        Largest displacement of each shaft from its mean position, S_max of ISO 20816-1, annex B;
+        NaN unless both directions are displacements.
     velocity_mm_s_rms : (n_channels,)
-        Over the band, free of the transducer's response; zero for a key-phase.
+        Velocity in the band, with the transducer's response compensated; zero for a key-phase.
     """
 
     peak_to_peak_um: FloatArray
@@ -53,13 +53,13 @@ class Overall:
 
 
 class OverallTransform:
-    """Reads broad-band vibration off segments of one unit.
+    """Computation of the broad-band vibration of one unit's segments.
 
     Parameters
     ----------
     settings
-        The band is that of its `velocity_low_order` of the rated speed to `velocity_high_hz`, as
-        far as the sampling rate reaches.
+        Settings of the velocity band: from `velocity_low_order` times the rated speed to
+        `velocity_high_hz`, at most half the sampling rate.
     """
 
     def __init__(self, unit: Unit, settings: SegmentSettings) -> None:
@@ -77,20 +77,20 @@ class OverallTransform:
         band_hz: FloatArray = frequency_hz[self._band]
         mm_s = 2.0 * np.pi * band_hz * MM_FROM_UM
         factor = [(mm_s * np.abs(displacement_factor(c, band_hz))) ** 2 for c in unit.channels]
-        # of real and imaginary parts in turn
+        # for alternating real and imaginary parts
         self._power_factor = np.repeat(factor, 2, axis=1)
 
     def of(self, samples: FloatArray, centred: FloatArray, phasors: ComplexArray) -> Overall:
-        """Broad-band vibration of a segment.
+        """Return the broad-band vibration of a segment.
 
         Parameters
         ----------
         samples : (n_channels, n_samples)
-            As measured, finite.
+            Finite samples as measured.
         centred : (n_channels, n_samples)
-            The same without the mean of each channel.
+            Samples without the mean of each channel.
         phasors : (n_channels, n_lines)
-            At all bins above zero, in the channels' own units.
+            Phasors at all bins above zero, in the channels' own units.
         """
         span = np.where(self._is_displacement, np.ptp(samples, axis=1), np.nan)
         parts = phasors[:, self._band].view(np.float64)
@@ -110,16 +110,16 @@ class OverallTransform:
 
 @dataclass(frozen=True)
 class RecentVibration:
-    """The newest parts of one segment, oldest first.
+    """Vibration of the newest parts of one segment, oldest first.
 
     Parameters
     ----------
     stop : (n_parts,)
-        Sample behind each part, counted from the segment's first.
+        First sample after each part, relative to the segment's first sample.
     order1_um_pk : (n_parts, n_channels)
-        Displacement amplitudes at 1×, without runout where that can be taken off.
+        Displacement amplitudes at 1×; runout is subtracted if possible.
     peak_to_peak_um : (n_parts, n_channels)
-        Of the samples as they are; only of channels that measure displacement.
+        Range of the raw samples; valid only for channels that measure displacement.
     """
 
     stop: npt.NDArray[np.int64]
@@ -129,7 +129,7 @@ class RecentVibration:
 
 @dataclass(frozen=True)
 class RecentReadings:
-    """Some quantities of one bearing, of the samples just before a moment alone."""
+    """Readings of one bearing over a short time that ends at `time_ns`, by quantity."""
 
     time_ns: int
     readings: Mapping[str, Reading]
@@ -138,17 +138,17 @@ class RecentReadings:
 def parts_of(
     n_samples: int, hop_samples: int, turn_samples: float
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """First sample of each part of a segment, and the one behind it.
+    """Return the start and stop indices of the parts of a segment, each (n_parts,).
 
-    They cover what the segment adds to the one before; a part is as long as its turns need, so
-    that it may begin earlier.
+    The parts cover the last hop of the segment. A part has at least `PART_TURNS` turns and may
+    therefore begin earlier.
 
     Parameters
     ----------
     hop_samples
-        Samples from one segment's start to the next one's.
+        Samples between the starts of consecutive segments.
     turn_samples
-        Samples in a turn of the shaft.
+        Samples per turn of the shaft.
     """
     n_parts = int(np.clip(hop_samples / (PART_TURNS * turn_samples), 1, MAX_PARTS))
     stop = n_samples - hop_samples + hop_samples * np.arange(1, n_parts + 1) // n_parts

@@ -1,9 +1,9 @@
-"""What a rack reports of a unit at one moment, as a segment without bins.
+"""Polls of a monitoring rack: vectors of a unit at one moment, as a segment without bins.
 
-A block of a rack has one sample for each poll, and a row for each quantity that the rack gives of a
-channel: amplitudes zero-to-peak in the channel's engineering unit, phases in degrees, positive
-where the reading leads the key-phase, gaps in micrometres. Each row has its own quality. Speed and
-temperatures are slow channels, as ever.
+A block of a rack has one sample for each poll and one row for each quantity that the rack reports
+for a channel: amplitudes zero-to-peak in the channel's engineering unit, phases in degrees,
+positive if the reading leads the key-phase, gaps in micrometres. Each row has its own quality.
+Speed and temperatures are slow channels.
 """
 
 import math
@@ -31,7 +31,7 @@ _NO_LINES: FloatArray = np.empty(0)
 
 
 class VectorPart(StrEnum):
-    """What a rack gives of a channel."""
+    """Quantity that a monitoring rack reports for a channel."""
 
     ORDER1_AMPLITUDE = "order1_amplitude"
     ORDER1_PHASE = "order1_phase"
@@ -45,35 +45,34 @@ AMPLITUDE_PARTS = (
     VectorPart.VORTEX_AMPLITUDE,
     VectorPart.OVERALL,
 )
-"""Parts that have a detector; the overall amplitude is carried along, nothing is made of it."""
+"""Parts with an amplitude detector. The overall amplitude is recorded but not evaluated."""
 
 
 @dataclass(frozen=True)
 class VectorRow:
-    """One row: which channel, by id, and what of it."""
+    """Row of a rack's block: channel id and quantity."""
 
     channel: str
     part: VectorPart
 
     @property
     def id(self) -> str:
-        """Name of the row, in register maps."""
+        """Name of the row in register maps."""
         return f"{self.channel}.{self.part}"
 
 
 @dataclass(frozen=True)
 class PollSettings:
-    """Which polls make a result.
+    """Averaging of polls to results.
 
     Parameters
     ----------
     n_polls
-        Polls in the averaging window; 60 of 5 s are five minutes.
+        Polls in the averaging window; 60 polls of 5 s are five minutes.
     hop_polls
-        Polls from one result to the next, up to `n_polls`, after which limits of vibration are
-        judged.
+        Polls between results, at most `n_polls`; vibration limits are evaluated at each result.
     min_polls
-        Polls with a changed vector below which a result is uncertain; at least 2, up to `n_polls`.
+        Number of polls with a changed vector below which a result is uncertain; 2 to `n_polls`.
     """
 
     n_polls: int = 60
@@ -82,23 +81,23 @@ class PollSettings:
 
 
 class PollTransform(KeptSegments):
-    """Makes segments without bins of the samples of blocks whose rows are vectors.
+    """Transform of a rack's polls to segments without bins.
 
     Parameters
     ----------
     unit
-        Its rate is that of the polls.
+        Unit; its rate is the rate of the polls.
     rows
-        What the rows of a block are.
+        Channel and quantity of each row of a block.
     settings
-        What counts as a speed; lengths of segments play no part here.
+        Settings of speed and vortex; lengths of segments are not used.
     averaging
-        Which polls make a result.
+        Averaging of polls to results.
 
     Raises
     ------
     ValueError
-        If a row is of a channel that the unit has not, or there twice.
+        If the channel of a row is unknown, or a row is repeated.
     """
 
     def __init__(
@@ -119,14 +118,14 @@ class PollTransform(KeptSegments):
                 raise ValueError(f"row {row.id!r} is of no channel of unit {unit.id!r}")
         if len(self._row) < len(rows):
             raise ValueError(f"two of {len(rows)} rows are the same")
-        # a rack's phase has another reference than a slow-roll vector of padwatch's
+        # the phase reference of a rack differs from that of padwatch's slow-roll vectors
         self._runout = {
             c.id: runout_verdict(c.slow_roll, c.probe, unit.rated_speed_rpm, has_key_phase=False)
             for c in unit.channels
         }
 
     def add(self, window: Window) -> Segment:
-        """Read the one sample of a window, and keep it as a segment."""
+        """Convert the only sample of a window to a segment and keep it."""
         speed = running_speed(self._unit, window.slow, _NO_LINES, _NO_LINES, self._settings)
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
         order_hz = turn_hz * np.array([1.0, self._settings.vortex_order])
@@ -139,7 +138,7 @@ class PollTransform(KeptSegments):
         angle_deg, angle_quality = self._of_channels(VectorPart.ORDER1_PHASE, window)
         has_phase = _usable(angle_quality)
         factor = np.array([displacement_factor(c, order_hz) for c in self._unit.channels])
-        # without a phase the factor's own angle would pass for one
+        # without a phase, the angle of the factor would look like a measured one
         turned: ComplexArray = np.where(has_phase[:, np.newaxis], factor, np.abs(factor))
         phasors: ComplexArray = amplitude * turned
         phasors[:, ORDER1] *= np.exp(1j * np.deg2rad(angle_deg))
@@ -173,7 +172,7 @@ class PollTransform(KeptSegments):
     def _of_channels(
         self, part: VectorPart, window: Window, least: float = -math.inf
     ) -> tuple[FloatArray, tuple[Quality, ...]]:
-        """Values of a part, (n_channels,), zero where not usable, and their qualities."""
+        """Return the values of a part, (n_channels,), zero if not usable, and their qualities."""
         found = [self._row_of(channel.id, part, window, least) for channel in self._unit.channels]
         return np.array([value for value, _ in found]), tuple(quality for _, quality in found)
 
@@ -185,7 +184,7 @@ class PollTransform(KeptSegments):
             return 0.0, NOT_GIVEN
         value, quality = float(window.samples[row, 0]), window.channel_quality[row]
         if quality.level is not Level.GOOD:
-            return 0.0, bad(quality.reason)  # a rack's gap is a mean already
+            return 0.0, bad(quality.reason)  # uncertain is also bad: a rack's gap is already a mean
         if not math.isfinite(value):
             return 0.0, bad(Reason.NOT_FINITE)
         return (value, quality) if value >= least else (0.0, bad(Reason.OUT_OF_RANGE))

@@ -1,7 +1,7 @@
-"""Runout of the shaft under its probes, measured at slow roll and taken off the 1× line.
+"""Runout of the shaft under its probes: measured at slow roll, subtracted from the 1× vector.
 
-At slow roll the shaft does not vibrate; what a probe reads at 1× then is the surface. It can be
-taken off at speed only by a phase that both have in common: that of a mark on the shaft.
+At slow roll the shaft does not vibrate; the 1× vector of a probe is then the runout of the surface.
+Subtraction at speed needs a common phase reference: the mark on the shaft.
 """
 
 import cmath
@@ -16,7 +16,7 @@ from core.spectra.speed import KeyPhase, Speed, SpeedSource
 
 
 class RunoutVerdict(StrEnum):
-    """Whether a slow-roll vector was taken off, else why not."""
+    """Whether a slow-roll vector was subtracted; if not, the reason."""
 
     APPLIED = "applied"
     NO_VECTOR = "no_vector"
@@ -32,19 +32,23 @@ def take_off_runout(
     rated_speed_rpm: float,
     shaft_angle_rad: float | None,
 ) -> tuple[complex, RunoutVerdict]:
-    """Take the slow-roll vector off a probe's 1× phasor; leave it as it is where that is no use.
+    """Subtract the slow-roll vector from a probe's 1× phasor if the vector is applicable.
 
-    Only for 1×: nothing is known of the surface at other orders, and the vortex has no runout.
+    Only for 1×: runout at other orders is not measured, and the vortex has no runout.
 
     Parameters
     ----------
     phasor_um_pk
         1× phasor of one segment, relative to its first sample.
     probe
-        The probe that is there now.
+        Serial number or mark of the installed probe.
     shaft_angle_rad
-        Angle that the shaft has turned at the first sample since the mark passed the pick-up; none
-        without a key-phase.
+        Shaft angle at the first sample, from the passage of the mark at the pick-up; None without a
+        key-phase.
+
+    Returns
+    -------
+    The phasor, and whether the vector was subtracted.
     """
     verdict = runout_verdict(vector, probe, rated_speed_rpm, shaft_angle_rad is not None)
     if vector is None or shaft_angle_rad is None or verdict is not RunoutVerdict.APPLIED:
@@ -56,7 +60,7 @@ def take_off_runout(
 def runout_verdict(
     vector: SlowRollVector | None, probe: str, rated_speed_rpm: float, has_key_phase: bool
 ) -> RunoutVerdict:
-    """Whether a vector may be taken off the readings of a probe, else the first reason why not."""
+    """Return whether a slow-roll vector is applicable to a probe; if not, the first reason."""
     if vector is None:
         return RunoutVerdict.NO_VECTOR
     if vector.probe != probe:
@@ -75,18 +79,18 @@ def without_runout(
     speed: Speed,
     key_phase: KeyPhase | None,
 ) -> tuple[ComplexArray, Mapping[str, RunoutVerdict]]:
-    """Take the slow-roll vectors off the 1× phasors where they are of use.
+    """Subtract the applicable slow-roll vectors from the 1× phasors.
 
     Parameters
     ----------
     order1_um_pk
         (n_channels,) phasors at exactly `speed`, relative to the segment's first sample.
     rows
-        Of the shaft channels.
+        Rows of the shaft channels.
 
     Returns
     -------
-    The phasors, and what was done to each shaft channel, by id.
+    The phasors, and the verdict for each shaft channel, by id.
     """
     angle_rad = shaft_angle_rad(speed, key_phase)
     cleaned, verdicts = order1_um_pk.copy(), {}
@@ -103,10 +107,10 @@ def without_runout(
 
 
 def shaft_angle_rad(speed: Speed, key_phase: KeyPhase | None) -> float | None:
-    """Angle of the shaft at a segment's first sample, or None if phasors cannot refer to it.
+    """Return the shaft angle at a segment's first sample; None without a usable phase reference.
 
-    A shaft angle without the undoubted speed of the same pulses is none: the phasors' phase would
-    drift away from it.
+    The speed must come from the same key-phase and be good; otherwise the phase of the phasors
+    would drift relative to the angle.
     """
     agreed = speed.source is SpeedSource.KEY_PHASE and speed.rpm.quality == GOOD
     return key_phase.shaft_angle_rad if key_phase is not None and agreed else None

@@ -1,4 +1,4 @@
-"""Segments: each stretch of samples is transformed once, here, and averaged elsewhere."""
+"""Segments: each window of samples is transformed once; averages are computed elsewhere."""
 
 import cmath
 import copy
@@ -40,16 +40,16 @@ from core.spectra.vortex import vortex_frequency_hz
 from core.units import hz_from_rpm
 
 OUTSIDE = uncertain(Reason.SENSOR_FAILURE)
-"""Of a channel with a block whose mean lies outside its OK limits."""
+"""Quality of a channel with the mean of a cell outside its OK limits."""
 
 CLIPPED = bad(Reason.CLIPPED)
 
 ORDER1, VORTEX = range(2)
-"""Where the two order lines stand in `Segment.order_phasors_um_pk`."""
+"""Columns of the two order lines in `Segment.order_phasors_um_pk`."""
 
 
 class Evidence(StrEnum):
-    """What results are made of. The names appear in the API."""
+    """Kind of input that results are computed from. The names appear in the API."""
 
     WAVEFORMS = "waveforms"
     AMPLITUDE_AND_PHASE = "amplitude_and_phase"
@@ -58,39 +58,40 @@ class Evidence(StrEnum):
 
 @dataclass(frozen=True)
 class Segment:
-    """One transformed segment of a unit, or one poll of its rack.
+    """Transformed segment of a unit's samples, or one poll of its rack.
 
     Parameters
     ----------
     channel_quality
-        One for each channel, throughout the segment; of a poll, that of the gaps.
+        Quality of each channel in the whole segment; for a poll, the quality of the gaps.
     usable : (n_channels,)
-        Whether the samples of each channel may be believed.
+        Whether the samples of each channel are usable (not bad).
     mean
-        (n_channels,) mean of the samples, engineering units of each channel.
+        (n_channels,) mean of the samples, in the engineering unit of each channel.
     bin_phasors_um_pk
-        (n_channels, n_lines) displacement phasors at the bins above zero; None of a poll.
+        (n_channels, n_lines) displacement phasors at the bins above zero; None for a poll.
     order_frequency_hz
-        (2,) exact frequencies of 1× and of the vortex; of its nominal order where there is no peak.
+        (2,) exact frequencies of 1× and of the vortex; without a vortex peak, its nominal order.
     has_vortex_peak
-        Whether a line that bearings share has its peak in the vortex band, up to this segment.
+        Whether a line shared by shaft and bearings has a peak in the vortex band, averaged up to
+        this segment.
     order_phasors_um_pk
-        (n_channels, 2) displacement phasors at exactly these, 1× without runout where that can be
-        taken off; finite also where not usable. Without a phase they are amplitudes.
+        (n_channels, 2) displacement phasors at exactly `order_frequency_hz`, finite also if not
+        usable; amplitudes if the phase is unknown. Runout is subtracted from 1× if possible.
     order_quality
-        (2, n_channels) qualities of these.
+        (2, n_channels) qualities of the order phasors.
     order_usable, has_phase : (2, n_channels)
-        Whether each may be believed, and whether its phase is known.
+        Whether each order phasor is usable, and whether its phase is known.
     at_mark_um_pk : (n_channels,)
-        1× phasors when the shaft's mark passes the pick-up; None without a key-phase.
+        1× phasors relative to the passage of the shaft's mark; None without a key-phase.
     runout
-        Whether runout was taken off 1×, by shaft channel.
+        Whether runout was subtracted from 1×, by shaft channel.
     overall
-        Broad-band vibration; None of a poll.
+        Broad-band vibration; None for a poll.
     clipped_share
-        (n_channels,) share of the samples at an end of the converter's range.
+        (n_channels,) fraction of the samples at an end of the converter's range.
     recent
-        Vibration of the newest parts; None of a poll.
+        Vibration of the newest parts; None for a poll.
     """
 
     epoch: int
@@ -116,22 +117,22 @@ class Segment:
     recent: RecentVibration | None
 
     def is_grazed(self, row: int) -> bool:
-        """Whether a channel is left out for a few clipped samples alone."""
+        """Whether a channel is bad only because of a few clipped samples."""
         few = 0.0 < self.clipped_share[row] <= MAX_CLIPPED_SHARE
         return bool(few) and self.channel_quality[row] == CLIPPED
 
     def line_quality(self, row: int, line: int) -> Quality:
-        """Quality of a channel at a line; a few clipped samples leave the segments before."""
+        """Return a channel's quality at a line; a few clipped samples make it only uncertain."""
         return uncertain(Reason.CLIPPED) if self.is_grazed(row) else self.order_quality[line][row]
 
     @cached_property
     def spans_um_pp(self) -> tuple[Reading, ...]:
-        """Broad-band displacement of each channel."""
+        """Broad-band peak-to-peak displacement of each channel."""
         return self._of_channels(None if self.overall is None else self.overall.peak_to_peak_um)
 
     @cached_property
     def velocities_mm_s_rms(self) -> tuple[Reading, ...]:
-        """Broad-band velocity of each channel."""
+        """Broad-band rms velocity of each channel."""
         return self._of_channels(None if self.overall is None else self.overall.velocity_mm_s_rms)
 
     def _of_channels(self, values: FloatArray | None) -> tuple[Reading, ...]:
@@ -139,7 +140,7 @@ class Segment:
         return tuple(self.reading((row,), value) for row, value in enumerate(each))
 
     def reading(self, rows: Sequence[int], value: float) -> Reading:
-        """A value from some channels, as far as all of them may be believed."""
+        """Return a value derived from channels with their worst quality; missing if one is bad."""
         qualities = [self.channel_quality[row] for row in rows]
         if any(quality.level is Level.BAD for quality in qualities):
             return missing(worst(qualities).reason)
@@ -149,25 +150,25 @@ class Segment:
 
 
 class KeptSegments:
-    """The segments or polls that are averaged.
+    """Segments or polls of the averaging window.
 
     Parameters
     ----------
     n_segments
-        How many make a full average.
+        Number of segments of a full average.
     min_segments
-        How many independent ones make a result that is not uncertain.
+        Number of independent segments below which a result is uncertain.
     segment_samples, hop_samples
-        Samples of one, and from the start of one to that of the next.
+        Samples per segment, and between the starts of consecutive segments.
     result_samples
-        Results come with the first segment that ends at or after each multiple of this.
+        Results are due at the first segment that ends at or after each multiple of this.
     n_rows
-        Rows of a block.
+        Number of rows of a block.
 
     Attributes
     ----------
     frequency_hz
-        (n_lines,) of the segments' bins; None of polls.
+        (n_lines,) frequencies of the bins; None for polls.
     """
 
     frequency_hz: FloatArray | None = None
@@ -191,30 +192,30 @@ class KeptSegments:
         self.segments.clear()
 
     def snapshot(self) -> "KeptSegments":
-        """The same segments, apart from those that follow."""
+        """Return a copy that later segments do not change."""
         found = copy.copy(self)
         found.segments = self.segments.copy()
         return found
 
     def keep(self, segment: Segment) -> Segment:
-        """Keep a segment, and drop what has left the averaging time."""
+        """Append a segment, drop those outside the averaging window, and return it."""
         self.segments.append(segment)
         self.drop_before(segment.first_index - self.n_segments * self.hop_samples + 1)
         return segment
 
     def drop_before(self, first_index: int) -> None:
-        """Drop segments that begin before a sample."""
+        """Drop the segments that begin before a sample index."""
         while self.segments and self.segments[0].first_index < first_index:
             self.segments.popleft()
 
 
 class SegmentTransform(KeptSegments):
-    """Transforms windows of one unit and keeps the ones that are averaged.
+    """Transform of one unit's sample windows to segments, which it keeps for averaging.
 
     Parameters
     ----------
     unit
-        Gives sampling rate, channels and rated speed.
+        Unit with sampling rate, channels and rated speed.
     """
 
     def __init__(self, unit: Unit, settings: SegmentSettings) -> None:
@@ -239,16 +240,15 @@ class SegmentTransform(KeptSegments):
         self._bearing_rows = [[ids.index(i) for i in b.channels] for b in unit.bearings]
 
     def add(self, window: Window) -> Segment:
-        """Transform a window, keep it, and drop what has left the averaging time.
+        """Transform a window to a segment, keep it, and drop segments outside the averaging window.
 
-        Nothing older than the averaging time counts, also not for where its vortex is looked for:
-        behind a gap it may be of any time.
+        They are dropped before the vortex search: after a gap they may be arbitrarily old.
         """
         self.drop_before(window.first_index - self.n_segments * self.hop_samples)
         samples: FloatArray = window.samples.astype(np.float64)
-        with np.errstate(invalid="ignore"):  # infinities of both signs
+        with np.errstate(invalid="ignore"):  # infinities of both signs give NaN
             mean: FloatArray = samples.mean(axis=1)
-        finite = np.isfinite(mean)  # no sum of single precision overflows
+        finite = np.isfinite(mean)  # sums of single-precision values do not overflow
         samples[~finite], mean[~finite] = 0.0, 0.0
         quality = tuple(
             q if good or q.level is Level.BAD else bad(Reason.NOT_FINITE)
@@ -306,7 +306,7 @@ class SegmentTransform(KeptSegments):
         mean: FloatArray,
         speed: Speed,
     ) -> tuple[Quality, ...]:
-        """Take out channels that do not move although the machine turns, or have lost contact."""
+        """Return the qualities after checks of signal and level; failed transducers are bad."""
         turning, limits = speed.rpm.value is not None, self._settings.sensors
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
         turn_samples = round(self._unit.rate_hz / turn_hz)
@@ -315,7 +315,7 @@ class SegmentTransform(KeptSegments):
         for before, channel, rms, at, own in moved:
             signal = signal_quality(rms, at, channel.unit_per_count, turning, limits)
             if before in (OUTSIDE, CLIPPED):
-                # a cable that breaks clips first: that it is lost counts for more
+                # a breaking cable clips first; the lost signal is the more important reason
                 level = level_quality(own, turn_samples, channel.ok_limits)
                 found.append(worst((signal, level, GOOD if before == OUTSIDE else before)))
             else:
@@ -375,10 +375,10 @@ class SegmentTransform(KeptSegments):
     def _vortex_hz(
         self, turn_hz: float, bins: ComplexArray, usable: npt.NDArray[np.bool_]
     ) -> float | None:
-        """Where the bearings share a line: over all segments, for one resolves a rope poorly."""
+        """Return the vortex frequency, or None; averaged, as one segment resolves it poorly."""
         low, high = self._settings.vortex_band
         band_hz = (low * turn_hz, high * turn_hz)
-        # a bin more on each side, to distinguish a peak from the flank of one outside
+        # one more bin on each side, to distinguish a peak from the flank of a line outside
         margin_hz = 1.5 * self.frequency_hz[0]
         first = int(np.searchsorted(self.frequency_hz, band_hz[0] - margin_hz, "right"))
         near = slice(first, int(np.searchsorted(self.frequency_hz, band_hz[1] + margin_hz)))
@@ -407,7 +407,7 @@ def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
 
 
 def _factors(channels: Sequence[Channel], frequency_hz: FloatArray) -> ComplexArray:
-    """(n_channels, n_lines) displacement per engineering unit, once for channels that are alike."""
+    """Return displacement factors (n_channels, n_lines), computed once for identical channels."""
     kinds = [(c.measurand, c.direction, c.response, c.delay_s) for c in channels]
     alike = dict(zip(kinds, channels, strict=True))
     factors = {kind: displacement_factor(channel, frequency_hz) for kind, channel in alike.items()}

@@ -1,7 +1,7 @@
-"""The running speed and the shaft's angle: by key-phase, speed channel, 1× line or rated value.
+"""Running speed and shaft angle from key-phase, speed channel, 1× line or rated speed.
 
-The whole segment must bear out that the pulses of a key-phase are one a turn: a pulse lost, one too
-many or one out of place makes every phase that follows from it a guess, and so there is none.
+A key-phase must have exactly one pulse per turn in the whole segment. If a pulse is missing, extra
+or displaced, all phases would be unreliable, and the segment has no key-phase.
 """
 
 import math
@@ -21,47 +21,48 @@ from core.uncertainty import Budget, random_line, systematic_line
 from core.units import hz_from_rpm, rpm_from_hz
 
 HYSTERESIS = 0.2
-"""A pulse begins this share of its height above the middle, and ends as much below it."""
+"""Hysteresis of pulse detection, to each side of the middle, as a fraction of the pulse height."""
 
 MIN_PULSES = 4
-"""Three turns; fewer would not show an odd one out."""
+"""Smallest number of pulses, three turns; with fewer, an irregular pulse would not be noticed."""
 
 MAX_DEPARTURE_TURNS = 0.02
-"""Farthest that a pulse may lie from its place in an even turning, 7°."""
+"""Largest deviation of a pulse from uniform rotation, in turns; 7°."""
 
 ODD_TURN = (0.75, 1.5)
-"""A turn shorter or longer than these shares of the middle one holds a pulse too many or too
-few."""
+"""Shortest and longest turn as a fraction of the median; beyond, a pulse is extra or missing."""
 
 OUTER_TURN = 1.1
-"""The first and the last pulse lie no more turns than this from the ends of the segment."""
+"""Largest distance, in turns, of the first and the last pulse from the ends of the segment."""
 
 LINE_SEARCH = (0.85, 1.15)
-"""Where the 1× line is looked for, in multiples of the speed that is expected."""
+"""Search band of the 1× line in multiples of the expected speed."""
 
 
 KEY_PHASE_TOLERANCE = 0.02
-"""Relative difference of key-phase and speed channel, which is often no better than this."""
+"""Largest relative difference of key-phase and speed channel; the latter is often no better."""
 
 LINE_SPREAD = 0.35
-"""Standard uncertainty of an interpolated line in bins, for a floor as strong as the line; it falls
-with the root of their powers' ratio. Found on simulated machines: 0.28 to 0.38."""
+"""Standard uncertainty of an interpolated line frequency in bins, at a noise floor as strong as the
+line; it is proportional to the square root of floor power over line power. Simulated machines show
+0.28 to 0.38."""
 
 
 @dataclass(frozen=True)
 class KeyPhase:
-    """How the shaft turned during a segment.
+    """Rotation of the shaft during a segment, from its key-phase pulses.
 
     Parameters
     ----------
     shaft_angle_rad
-        Angle that it has turned at the first sample since the mark passed the pick-up, 0 to 2π.
+        Shaft angle at the first sample, from the passage of the mark at the pick-up, 0 to 2π.
     speed_rpm
-        Mean over the segment.
+        Mean speed over the segment.
     u_relative
-        Standard uncertainty of the speed, relative, by how far the pulses lie from an even turning.
+        Relative standard uncertainty of the speed, from the pulses' deviation from uniform
+        rotation.
     n_pulses
-        Pulses in the segment.
+        Number of pulses in the segment.
     """
 
     shaft_angle_rad: float
@@ -72,14 +73,14 @@ class KeyPhase:
 
 @dataclass(frozen=True)
 class _Line:
-    """Speed that the 1× line shows, with its relative standard uncertainty."""
+    """Speed from the frequency of the 1× line, with its relative standard uncertainty."""
 
     rpm: float
     u_relative: float
 
 
 class SpeedSource(StrEnum):
-    """Where the running speed came from; shown with every result."""
+    """Source of the running speed; shown with every result."""
 
     KEY_PHASE = "key_phase"
     SLOW_CHANNEL = "slow_channel"
@@ -89,12 +90,12 @@ class SpeedSource(StrEnum):
 
 @dataclass(frozen=True)
 class Speed:
-    """Running speed in r/min; without a value when the machine stands.
+    """Running speed in r/min; missing at standstill.
 
     Parameters
     ----------
     budget
-        Its uncertainty; None for the rated speed and for a speed that another contradicts.
+        Uncertainty budget; None for the rated speed and for a speed contradicted by another source.
     """
 
     rpm: Reading
@@ -110,19 +111,19 @@ def running_speed(
     settings: SegmentSettings,
     key_phase: KeyPhase | None = None,
 ) -> Speed:
-    """Take the best speed there is: key-phase, else speed channel, else 1× line, else rated value.
+    """Return the best available speed: key-phase, else speed channel, 1× line, or rated speed.
 
-    One that the 1× line contradicts is doubted, and so is a key-phase that the speed channel
-    contradicts; one that no machine reaches is not used.
+    A speed contradicted by the 1× line is uncertain; so is a key-phase speed contradicted by the
+    speed channel. An impossible speed is not used.
 
     Parameters
     ----------
     slow
-        Slow readings of the same time.
+        Readings of the slow channels in the same window.
     frequency_hz, shaft_power : (n_lines,)
-        Power of the shaft channels together, in which the 1× line is looked for.
+        Summed power of the shaft channels, searched for the 1× line.
     key_phase
-        What the pulses show, if they are one a turn.
+        Rotation from the key-phase; None without exactly one pulse per turn.
     """
     slow_rpm = slow.get(unit.speed_channel) if unit.speed_channel else None
     for source, measured in (
@@ -153,7 +154,7 @@ def running_speed(
 
 
 def _pulsed(key_phase: KeyPhase | None, slow_rpm: Reading | None) -> Reading | None:
-    """Speed by the key-phase, uncertain where a speed channel contradicts it."""
+    """Return the key-phase speed, uncertain if contradicted by the speed channel."""
     if key_phase is None:
         return None
     other_rpm = slow_rpm.value if slow_rpm is not None else None
@@ -167,9 +168,9 @@ def _pulsed(key_phase: KeyPhase | None, slow_rpm: Reading | None) -> Reading | N
 def _budget(
     speed: Reading, pulses: KeyPhase | None, line: _Line | None, settings: SegmentSettings
 ) -> Budget | None:
-    """Uncertainty of a measured speed: of its pulses, or of a speed channel's reading.
+    """Return the uncertainty budget of a speed measured by key-phase or speed channel.
 
-    A speed channel is as good as its agreement with the 1× line, where there is one.
+    The uncertainty of a speed channel follows from its agreement with the 1× line, if available.
     """
     if speed.value is None or speed.quality != GOOD:
         return None
@@ -190,7 +191,7 @@ def _line(
     shaft_power: FloatArray,
     settings: SegmentSettings,
 ) -> _Line | None:
-    """The 1× line near an expected speed, if it stands above its surroundings."""
+    """Return the 1× line near an expected speed; None if it does not exceed the noise floor."""
     about_hz = hz_from_rpm(about_rpm)
     band_hz = (LINE_SEARCH[0] * about_hz, LINE_SEARCH[1] * about_hz)
     line_hz = peak_frequency_hz(shaft_power, frequency_hz, band_hz)
@@ -207,21 +208,21 @@ def _line(
 
 
 def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | None:
-    """Fit an even turning to the pulses of a segment.
+    """Fit a uniform rotation to the key-phase pulses of a segment.
 
     Parameters
     ----------
     signal
-        (n_samples,) with pulses that rise; the mark passes where they begin.
+        (n_samples,) with rising pulses; the mark passes at the rising edge.
 
     Returns
     -------
-    None with too few pulses, or with one that is missing, too many or out of its place.
+    None if there are too few pulses, or a pulse is missing, extra or displaced.
     """
     edges = rising_edges(signal)
     if edges.size < MIN_PULSES or _has_odd_turn(edges, signal.size):
         return None
-    # The error lies in where a pulse is found, so that positions are fitted over turns.
+    # The positions of the pulses have the error, so they are fitted over the turns.
     turns = np.arange(edges.size) - (edges.size - 1) / 2.0
     samples_per_turn = float(turns @ edges / (turns @ turns))
     middle = float(edges.mean())
@@ -241,7 +242,7 @@ def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | None:
 
 
 def rising_edges(signal: FloatArray) -> FloatArray:
-    """Where a signal rises through the middle between its extremes, in samples, between them too.
+    """Return the positions at which a signal rises through the middle between its extremes.
 
     Parameters
     ----------
@@ -249,7 +250,7 @@ def rising_edges(signal: FloatArray) -> FloatArray:
 
     Returns
     -------
-    (n_edges,) rising; noise smaller than the hysteresis makes no edge.
+    (n_edges,) fractional sample positions, ascending; noise within the hysteresis is ignored.
     """
     low, high = float(signal.min()), float(signal.max())
     middle, margin = (low + high) / 2.0, HYSTERESIS * (high - low)
@@ -265,7 +266,7 @@ def rising_edges(signal: FloatArray) -> FloatArray:
 
 
 def _has_odd_turn(edges: FloatArray, n_samples: int) -> bool:
-    """Whether a pulse is missing or one too many; a train that begins late lacks pulses as well."""
+    """Whether a pulse is missing or extra, also at the ends of the segment."""
     intervals = np.diff(edges)
     usual = float(np.median(intervals))
     outer = max(edges[0], n_samples - 1 - edges[-1])

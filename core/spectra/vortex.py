@@ -1,4 +1,4 @@
-"""Which way the shaft turns in its bearing at one line, and where the vortex is."""
+"""Roundness of the shaft orbit at one line, and frequency of the part-load vortex."""
 
 from collections.abc import Sequence
 
@@ -9,10 +9,10 @@ from core.spectra.lines import peak_frequency_hz
 
 
 def roundness(spectrum: CrossSpectrum, line: int) -> float:
-    """Roundness of the orbit: 1 a forward circle, 0 a straight line, -1 a backward circle.
+    """Return the roundness of an orbit: 1 forward circle, 0 straight line, -1 backward circle.
 
-    Forward motion has u_y a quarter turn behind u_x, so that the imaginary part of their
-    cross-spectrum is positive.
+    In forward motion u_y lags u_x by 90°, and the imaginary part of their cross-spectrum is
+    positive.
     """
     matrix = spectrum.matrix[line]
     whole = float(matrix[SHAFT_X, SHAFT_X].real + matrix[SHAFT_Y, SHAFT_Y].real)
@@ -22,20 +22,20 @@ def roundness(spectrum: CrossSpectrum, line: int) -> float:
 def vortex_frequency_hz(
     spectra: Sequence[CrossSpectrum], band_hz: tuple[float, float]
 ) -> float | None:
-    """Find the strongest line of shaft motion that the bearings share.
+    """Return the frequency of the strongest line of coherent shaft and bearing motion in a band.
 
-    The shaft's power is weighted by its coherence with the bearing's motion, free of the bias of
-    few segments, and summed over directions and bearings. A line of one probe alone (runout, mains,
-    a loose cable) does not count.
+    The shaft's power is weighted by its coherence with the bearing's motion, corrected for the bias
+    of few segments, and summed over directions and bearings. A line of one probe alone (runout,
+    mains, a loose cable) does not count.
 
     Parameters
     ----------
     spectra
-        Of the bearings of a unit, at the same lines.
+        Cross-spectra of a unit's bearings, at the same lines.
 
     Returns
     -------
-    None when no line of the band stands out as a peak, or when nothing is coherent there.
+    None if no line of the band is a peak, or if none is coherent.
     """
     frequency_hz = spectra[0].frequency_hz
     shared = np.zeros(frequency_hz.size)

@@ -1,1 +1,1 @@
-"""The estimators of film stiffness and damping, their evidence and uncertainty."""
+"""Estimators of film stiffness and damping, their evidence and uncertainty."""

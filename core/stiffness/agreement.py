@@ -1,7 +1,7 @@
-"""Whether the estimators of one bearing agree on its film.
+"""Agreement of the estimators of one bearing.
 
-Gains and the bracket's stiffness act on all estimators alike and cannot make them differ; what does
-not, and is stated, may.
+Errors of the gains and of the bracket's stiffness are common to all estimators and cancel in the
+comparison. All other stated errors can explain a difference.
 """
 
 import itertools
@@ -25,14 +25,14 @@ from core.stiffness.stiffness_budget import (
 from core.uncertainty import SHAFT_GAIN, Budget, Kind, coverage_factor, random_line
 
 FALSE_ALARM = 1e-6
-"""Probability that chance alone makes two estimates differ. A bearing has some 100,000 independent
-averages of five minutes a year with eight comparisons each: about one a year."""
+"""Probability of a false disagreement. A bearing has about 100,000 independent averages of five
+minutes per year, with eight comparisons each: about one false disagreement per year."""
 
 COMMON = frozenset({SHAFT_GAIN, BEARING_GAIN, BRACKET})
 
 
 def disagree(first: Budget, second: Budget) -> bool:
-    """Whether two results of one quantity differ by more than chance and stated limits explain."""
+    """Whether two results of one quantity differ by more than their uncertainty."""
     lines = [line for line in (*first.lines, *second.lines) if line.name not in COMMON]
     random = [line for line in lines if line.kind is Kind.RANDOM]
     spread = math.hypot(*(line.contribution for line in random))
@@ -49,19 +49,19 @@ def contradicting(
     orders: CrossSpectrum,
     lines: Mapping[str, int],
 ) -> set[str]:
-    """Names of the results of estimators that do not agree.
+    """Return the names of the quantities whose estimators disagree.
 
-    Where `dynamic` has found a film, `transfer` is compared with what it should find at its line;
-    without, the lines are compared with each other.
+    `transfer` is compared with its expected value from the film of `dynamic`; without a result of
+    `dynamic`, the `transfer` results of the lines are compared with each other.
 
     Parameters
     ----------
     budgets
-        Of all stiffnesses and dampings, by quantity.
+        Uncertainty budgets of all stiffnesses and dampings, by quantity.
     orders
         Cross-spectrum at the order lines.
     lines
-        Where each stands in it, by the prefix of its quantities.
+        Index of each line in `orders`, by the prefix of its quantities.
     """
     doubted: set[str] = set()
     for row, (axes, along) in enumerate((("xx", SHAFT_X), ("yy", SHAFT_Y))):
@@ -85,7 +85,7 @@ def contradicting(
             continue
         film, covariance = [budgets[name] for name in of_row], found.covariance[row]
         for prefix, measured in at_lines.items():
-            # what `transfer` finds at the line if the film is that of `dynamic`
+            # expected result of `transfer` at the line from the film of `dynamic`
             across = motion_across(orders, lines[prefix], along)
             omega = 2.0 * math.pi * float(orders.frequency_hz[lines[prefix]])
             motion = [1.0 + 0.0j, across] if row == 0 else [across, 1.0 + 0.0j]
@@ -105,7 +105,7 @@ def _without_cross_coupling(budget: Budget) -> Budget:
 
 
 def _combined(budgets: Sequence[Budget], factors: FloatArray, covariance: FloatArray) -> Budget:
-    """Budget of a sum of coefficients with their factors."""
+    """Return the budget of a linear combination of coefficients."""
     random = math.sqrt(float(factors @ covariance @ factors))
     systematic = zip(
         *([line for line in b.lines if line.kind is Kind.SYSTEMATIC] for b in budgets), strict=True

@@ -1,6 +1,6 @@
-"""Uncertainty of what is read off single channels and pairs of them, but for stiffnesses.
+"""Uncertainty budgets of amplitudes, phases, coherences, roundness and frequencies.
 
-The random part comes from how far segments or polls differ among themselves.
+The random part is the scatter of the segments or polls.
 """
 
 import math
@@ -28,7 +28,7 @@ from core.uncertainty import (
 def amplitude_budget(
     amplitude_um_pk: float, phasors_um_pk: ComplexArray, systematic: tuple[BudgetLine, ...]
 ) -> Budget | None:
-    """Uncertainty of the root mean square of the amplitudes of phasors (n,), µm 0-pk."""
+    """Return the uncertainty budget of the rms amplitude of phasors (n,), µm 0-pk."""
     if amplitude_um_pk == 0.0:
         return None
     power = np.abs(phasors_um_pk) ** 2
@@ -38,9 +38,10 @@ def amplitude_budget(
 def phase_budget(
     phase_deg: float, vectors: ComplexArray, runout_um_pk: float = 0.0
 ) -> Budget | None:
-    """Uncertainty of the phase, deg, of the mean of vectors (n,), not wrapped at 0 or 360°.
+    """Return the uncertainty budget of the phase of a mean vector, deg, not wrapped at 0 or 360°.
 
-    Runout turns the mean by so much at most.
+    `vectors` are the averaged vectors (n,). The contribution of runout is its largest possible
+    rotation of the mean vector.
     """
     mean = complex(vectors.mean())
     across = (vectors * np.conj(mean)).imag / abs(mean) ** 2
@@ -52,14 +53,14 @@ def phase_budget(
 def amplitude_lines(
     bearing: Bearing, place: int, value: float, runout_um_pk: float = 0.0
 ) -> tuple[BudgetLine, ...]:
-    """What stays the same in an amplitude, µm 0-pk, or another measure of a channel's motion.
+    """Return the systematic contributions to an amplitude or another measure of vibration.
 
     Parameters
     ----------
     place
-        Of the channel among the bearing's four.
+        Index of the channel among the bearing's four.
     runout_um_pk
-        Of the shaft's surface, as far as the value holds it.
+        Largest shaft runout contained in the value.
     """
     if place in (BEARING_X, BEARING_Y):
         return (systematic_line(BEARING_GAIN, bearing.accuracy.bearing_gain, value),)
@@ -70,20 +71,20 @@ def amplitude_lines(
 
 
 def coherence_budget(coherence: float, n_segments: float) -> Budget | None:
-    """Uncertainty of a squared coherence (Bendat and Piersol, Random Data, 4th ed., table 9.6).
+    """Return the uncertainty budget of a squared coherence.
 
-    Its estimate is skewed, the more so near 0 and 1 and with few segments. That of ``artanh γ`` is
-    close to normal, with variance and bias ``1 / (2 (n - 1))`` (Enochson and Goodman 1965), and the
-    interval is that of γ² from it.
+    Bendat and Piersol, Random Data, 4th ed., table 9.6. The estimate is skewed, especially near 0
+    and 1 and with few segments. ``artanh γ`` is nearly normal with variance and bias
+    ``1 / (2 (n - 1))`` (Enochson and Goodman 1965); its interval is transformed to γ².
 
     Parameters
     ----------
     n_segments
-        Independent segments.
+        Number of independent segments.
 
     Returns
     -------
-    None for a coherence of exactly 0 or 1, and with fewer than two segments.
+    None if the coherence is exactly 0 or 1, or with fewer than two segments.
     """
     if not (0.0 < coherence < 1.0 and n_segments >= 2.0):
         return None
@@ -97,16 +98,16 @@ def coherence_budget(coherence: float, n_segments: float) -> Budget | None:
 def roundness_budget(
     bearing: Bearing, roundness: float, phasors_um_pk: ComplexArray, runout_um_pk: tuple[float, ...]
 ) -> Budget | None:
-    """Uncertainty of the roundness of an orbit.
+    """Return the uncertainty budget of the roundness of an orbit.
 
-    The random part is the jackknife's, to first order: how far each segment alone would move it.
+    The random part is a first-order jackknife: the influence of each segment on the roundness.
 
     Parameters
     ----------
     phasors_um_pk : (n, 2)
-        Of u_x and u_y in the segments or polls in which both are usable.
+        Phasors of u_x and u_y in the segments or polls in which both are usable.
     runout_um_pk
-        Of u_x and u_y, not taken off.
+        Largest runout contained in u_x and u_y.
     """
     x, y = phasors_um_pk.T
     of_each = np.abs(x) ** 2 + np.abs(y) ** 2
@@ -135,14 +136,14 @@ def roundness_budget(
 def frequency_budget(
     frequency_hz: float, each_hz: FloatArray, speed: Speed | None
 ) -> Budget | None:
-    """Uncertainty of the mean frequency of a line, by its scatter and that of the speed.
+    """Return the uncertainty budget of the mean frequency of a line, from its scatter and speed.
 
     Parameters
     ----------
     each_hz : (n,)
-        In each segment or poll.
+        Frequency in each segment or poll.
     speed
-        The newest, where the frequency follows from it; None where the line itself was found.
+        Newest speed if the frequency is derived from it; None if the line itself was measured.
     """
     own = None
     if speed is not None and speed.budget is not None:

@@ -1,8 +1,8 @@
-"""All eight coefficients of an oil film from what shakes the machine between its harmonics.
+"""All eight coefficients of an oil film from broadband vibration between the harmonics.
 
 The force on the rotor does not enter ``(k_b - m_b ω² + iω c_b) V = (K + iω C) U`` (the bracket's
-rows of Brito et al., equation 6), so hydraulic noise identifies the film. Runout lives on the
-harmonics of the running speed, and these are left out.
+rows of Brito et al., equation 6), so hydraulic noise identifies the film. The harmonics of the
+running speed contain runout and are left out.
 """
 
 import math
@@ -24,53 +24,54 @@ from core.stiffness.film_covariance import EACH_ROW, BracketChanges, FilmFit
 from core.stiffness.film_fit import N_ITERATIONS, NormalEquations, line_weights, smoother
 
 MIN_LINES = 12
-"""Usable lines below which there is no result."""
+"""Smallest number of usable lines for a result."""
 
 MAX_INERTIA_SHARE = 0.8
-"""Largest mass that is sought takes so much of the bracket's stiffness away at the highest line."""
+"""Largest ratio of inertia to stiffness of a bracket with fitted mass, at the highest line."""
 
 MAX_MASS_STD = 0.5
-"""A mass that is not given must be found to that share of what a bracket may be thought to have;
-else the lines do not determine it, and a film with it would be a guess."""
+"""Largest standard uncertainty of a fitted mass as a fraction of the largest plausible mass of the
+bracket. Beyond it the lines do not determine the mass, and there is no result."""
 
 STIFFNESS, MASS, DAMPING, DELAY = range(4)
-"""Changes of the bracket's dynamic stiffness: relative, per kg, per N·s/m, per s by which the
-bearing channels are late."""
+"""Changes of the bracket's dynamic stiffness: relative stiffness, mass in kg, damping in N·s/m, and
+delay of the bearing channels in s."""
 
 
 @dataclass(frozen=True)
 class DynamicStiffness:
-    """Stiffness and damping of a film with what they rest on.
+    """Stiffness and damping of a film, with statistics of the fit.
 
     Parameters
     ----------
     coefficients : (2, 4)
-        Of the rows x and y, the directions of the force: (k_i1, k_i2, c_i1, c_i2), N/m and N·s/m.
+        Coefficients (k_i1, k_i2, c_i1, c_i2) of the rows x and y, the directions of the force; N/m
+        and N·s/m.
     covariance : (2, 4, 4)
         Random covariance of the coefficients of each row.
     changes : (4, 2, 4)
-        Of the coefficients, per unit of `STIFFNESS`, `MASS`, `DAMPING` and `DELAY`.
+        Change of the coefficients per unit of `STIFFNESS`, `MASS`, `DAMPING` and `DELAY`.
     bracket_mass_kg, bracket_mass_std_kg
-        Mass of the bracket that was used; its random standard uncertainty if it was fitted with the
-        film, else 0.
+        Mass of the bracket used in the fit; its random standard uncertainty if the mass was fitted
+        with the film, else 0.
     delay_s, delay_std_s
-        Apparent delay of the bearing channels, whatever the bracket's mass, and its random standard
-        uncertainty.
+        Apparent delay of the bearing channels, fitted together with the bracket's mass, and its
+        random standard uncertainty.
     delay_per_damping
-        Change of that delay per N·s/m of the bracket's damping.
+        Change of `delay_s` per N·s/m of the bracket's damping.
     coherence : (2,)
         Multiple coherence of each bearing channel with the shaft's motion through the fitted film,
-        over the used lines as they are weighted; 0 to 1.
+        over the weighted lines; 0 to 1.
     coherence_segments : (2,)
-        Independent segments that would make that of a single line as certain.
+        Number of independent segments with which a single line's coherence is equally certain.
     lack_of_fit : (2,)
-        About 1 if the film is as constant over frequency as the model assumes, else more.
+        About 1 if stiffness and damping are constant over frequency, as modelled; else larger.
     frequency_hz : (n_used,)
-        The lines that were used.
+        Frequencies of the used lines.
     probe_noise_um2_per_hz : (2,)
-        One-sided density that was taken off the shaft spectra.
+        One-sided noise density subtracted from the shaft spectra.
     noise_share
-        Largest share of the shaft's weighted motion, over its directions, that it amounts to.
+        Noise power as a fraction of the shaft's weighted power, in the worst direction.
     """
 
     coefficients: FloatArray
@@ -111,20 +112,20 @@ def dynamic_stiffness(
     settings: DynamicSettings,
     n_integrations: tuple[int, int] = (2, 2),
 ) -> DynamicStiffness | Reason:
-    """Estimate a film's coefficients, or return the reason why that is not possible.
+    """Estimate a film's coefficients, or return the reason why there is no result.
 
-    A bracket whose mass is not known has it fitted with the film, one mass for both directions.
+    An unknown mass of the bracket is fitted with the film, one mass for both directions.
 
     Parameters
     ----------
     spectrum
-        Of (u_x, u_y, v_x, v_y), averaged over segments in which all four were usable.
+        Cross-spectrum of (u_x, u_y, v_x, v_y), averaged over segments in which all four are usable.
     turn_hz
         Lowest and highest 1× frequency measured in these segments.
     n_integrations
-        From the measurands of v_x and v_y to displacement: 2 for acceleration, 1 for velocity, 0.
-        At very high coherence the residual is what integration leaves; how its lines hang together
-        decides the stated uncertainty, nothing else.
+        Number of integrations of v_x and v_y to displacement: 2 for acceleration, 1 for velocity,
+        0. At very high coherence the residual is the integration error; the correlation of its
+        lines affects only the stated uncertainty.
 
     Raises
     ------
@@ -144,7 +145,7 @@ def dynamic_stiffness(
     frequency_hz, matrix = spectrum.frequency_hz[lines], spectrum.matrix[lines]
     smoothing = smoother(tuple(lines.tolist()))
     bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
-    # what integration with a wrong frequency leaves of each bearing's line
+    # error of each bearing line from integration with the line's frequency
     slope = np.array(n_integrations) * bin_hz / frequency_hz[:, np.newaxis]
     smear_share = SMEAR_BINS_SQUARED * slope**2
 
@@ -177,13 +178,13 @@ def _bracket_changes(bracket: BracketDynamics, fit: FilmFit) -> BracketChanges:
     changes[STIFFNESS] = bracket.stiffness_n_per_m
     changes[MASS] = -(omega**2)
     changes[DAMPING] = 1j * omega
-    # what is read late has turned back by ω times the delay
+    # a delay turns the phase back by ω times the delay
     changes[DELAY] = 1j * omega * fit.equations.bracket_n_per_m
     return BracketChanges(fit, changes)
 
 
 def _with_mass(bracket: BracketDynamics, fit: FilmFit) -> BracketDynamics | None:
-    """The bracket with the mass that the film's residual asks for; None if it asks for none."""
+    """Return the bracket with the mass fitted to the residual; None if it is not determined."""
     found = _bracket_changes(bracket, fit).estimate([MASS])
     if found is None:
         return None
@@ -209,7 +210,7 @@ def _result(
         covariance = fit.spread(fit.own_influences[:, np.newaxis], EACH_ROW)
     else:
         covariance = changes.film_covariance([MASS], mass.influences)
-        for change in (STIFFNESS, DAMPING, DELAY):  # with that of the mass, which is fitted
+        for change in (STIFFNESS, DAMPING, DELAY):  # the fitted mass follows
             per[change] += float(changes.follow(change, [MASS])[0]) * changes.per[MASS]
     omega_unit = fit.equations.omega_unit
     scale = np.array([1.0, 1.0, omega_unit, omega_unit])

@@ -1,4 +1,4 @@
-"""Settings of `dynamic`, the lines that it uses, and the noise floor of the shaft probes."""
+"""Settings of `dynamic`, selection of its spectral lines, and noise floor of the shaft probes."""
 
 import math
 from dataclasses import dataclass
@@ -16,14 +16,14 @@ from core.spectra.cross_spectrum import (
 )
 
 MAX_LEAKAGE = 0.005
-"""Largest share of a line's shaft power that may have come through side lobes of stronger lines.
-Leakage carries runout, and it carries the wrong frequency into integration."""
+"""Largest fraction of a line's shaft power that may be leakage from stronger lines. Leakage
+contains runout, and it is integrated with the wrong frequency."""
 
 N_BLOCKS = 4
-"""Parts of the quiet band, in case the shaft moves unseen in some of them."""
+"""Number of parts of the quiet band; the shaft may move in some of them."""
 
 SAME_FLOOR = 3.0
-"""Standard deviations within which a part shows the same floor as the quietest."""
+"""Largest difference from the floor of the quietest part, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -33,26 +33,26 @@ class DynamicSettings:
     Parameters
     ----------
     band_hz
-        Lines are taken from here, between the harmonics of the running speed.
+        Band of the used lines, which lie between the harmonics of the running speed.
     guard_bins
-        Distance of lines from every harmonic. Hann's main lobe reaches 2 bins; the third takes up
-        what the tone wanders within a segment.
+        Smallest distance of lines from harmonics. Hann's main lobe reaches 2 bins; the third bin
+        allows for speed changes within a segment.
     probe_noise_um2_per_hz
         Known one-sided noise density (x, y) of the shaft probes; ``None`` estimates it.
     quiet_band_hz
-        Where it is estimated: the shaft hardly moves there, and what it moves shows in the
-        bearing channels and is taken out.
+        Band in which the noise density is estimated. The shaft hardly moves there; motion that is
+        coherent with the bearing channels is subtracted.
     min_segments
-        Below this there is no result; at least 3, as two inputs are fitted.
+        Smallest number of segments for a result; at least 3, because two inputs are fitted.
     min_signal_share
-        Share of the shaft's weighted motion, in its worst direction, that must not be noise.
+        Smallest fraction of the shaft's weighted power that is not noise, in the worst direction.
     min_coherence
-        Multiple coherence of bearing with shaft motion over the used lines, free of its bias.
+        Smallest multiple coherence of bearing with shaft motion over the used lines, unbiased.
     max_relative_uncertainty
-        Random standard uncertainty of a direct stiffness over the larger direct one; beyond it
-        the excitation is insufficient.
+        Largest random standard uncertainty of a direct stiffness, relative to the larger direct
+        stiffness; beyond it the excitation is insufficient.
     overlap
-        Share of a segment that the next one repeats.
+        Overlap of consecutive segments as a fraction of a segment.
     """
 
     band_hz: tuple[float, float] = (0.6, 12.0)
@@ -69,7 +69,7 @@ class DynamicSettings:
 def used_lines(
     spectrum: CrossSpectrum, turn_hz: tuple[float, float], settings: DynamicSettings
 ) -> npt.NDArray[np.int64]:
-    """Indices of the lines that carry the shaft's own broadband motion and some bearing motion."""
+    """Return the indices of the lines with broadband shaft motion and bearing motion."""
     power = np.diagonal(spectrum.matrix, axis1=1, axis2=2).real
     used = _between_harmonics_of(settings.band_hz, spectrum, turn_hz, settings)
     used &= np.all(power > 0.0, axis=1)
@@ -86,7 +86,7 @@ def _between_harmonics_of(
     turn_hz: tuple[float, float],
     settings: DynamicSettings,
 ) -> npt.NDArray[np.bool_]:
-    """Lines of a band between the harmonics, (n_lines,)."""
+    """Return a mask of the lines of a band between the harmonics, (n_lines,)."""
     inside = (spectrum.frequency_hz >= band_hz[0]) & (spectrum.frequency_hz <= band_hz[1])
     return inside & between_harmonics(spectrum.frequency_hz, turn_hz, settings.guard_bins)
 
@@ -94,20 +94,20 @@ def _between_harmonics_of(
 def between_harmonics(
     frequency_hz: FloatArray, turn_hz: tuple[float, float], guard_bins: float
 ) -> npt.NDArray[np.bool_]:
-    """Which lines lie between the harmonics of the running speed.
+    """Return a mask of the lines between the harmonics of the running speed, (n_lines,).
 
     Parameters
     ----------
     frequency_hz : (n_lines,)
-        Evenly spaced.
+        Evenly spaced frequencies.
     turn_hz
-        Lowest and highest 1× frequency that was measured during the averaging time; the guard of
-        the n-th harmonic spans n times that.
+        Lowest and highest 1× frequency measured in the averaging window; the guard of the n-th
+        harmonic spans n times this range.
 
     Raises
     ------
     ValueError
-        If the frequencies are not positive and in order.
+        If the 1× frequencies are not positive and ascending.
     """
     lowest, highest = turn_hz
     if not 0.0 < lowest <= highest:
@@ -121,13 +121,13 @@ def between_harmonics(
 
 
 def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> npt.NDArray[np.bool_]:
-    """Which lines are their own, not the side lobes of stronger ones.
+    """Return a mask of the lines with little leakage from stronger lines.
 
     Parameters
     ----------
     shaft_power : (n_lines, n_channels)
     lines
-        The n lines asked for; by default all.
+        Slice of the n lines to check; by default all.
 
     Returns
     -------
@@ -139,16 +139,16 @@ def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> npt.N
 
 
 def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexArray) -> FloatArray:
-    """Power of signals that two others do not explain, (n_lines, n).
+    """Return the power of signals that is not coherent with two inputs, (n_lines, n).
 
     Parameters
     ----------
     matrix : (n_lines, n, n)
-        Spectra of the signals.
+        Cross-spectra of the signals.
     given : (n_lines, 2, 2)
-        Spectra of the two others.
+        Cross-spectra of the two inputs.
     cross : (n_lines, n, 2)
-        Signals times conjugated others.
+        Cross-spectra of the signals with the inputs, which are conjugated.
     """
     determinant = (given[:, 0, 0] * given[:, 1, 1]).real - np.abs(given[:, 0, 1]) ** 2
     usable = determinant > 1e-12 * (given[:, 0, 0] * given[:, 1, 1]).real
@@ -167,20 +167,20 @@ def probe_noise_power(
     settings: DynamicSettings,
     n_segments: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean squared phasor of the probes' noise, known or from lines in the quiet band.
+    """Return the mean squared phasors of the probes' noise, known or estimated in the quiet band.
 
-    What shaft and bearing have in common is motion and does not count; the rest is the probes'
-    noise and, through the film, the bearing transducers'. Where those are quiet the estimate is
-    true, else it is high.
+    The part of the shaft spectra coherent with the bearing is motion and is subtracted. The rest is
+    noise of the probes and, through the film, of the bearing transducers; the latter biases the
+    estimate upwards.
 
     Parameters
     ----------
     n_segments
-        Independent segments of the average; at least 3.
+        Number of independent segments of the average; at least 3.
 
     Returns
     -------
-    (2,) in µm², zero if no line is quiet; and their relative standard uncertainties, (2,).
+    (2,) in µm², zero without lines in the quiet band; and relative standard uncertainties, (2,).
     """
     if settings.probe_noise_um2_per_hz is not None:
         bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])
@@ -198,10 +198,10 @@ def probe_noise_power(
     edges = np.linspace(0, rest.shape[0], n_blocks + 1).astype(np.int64)[:-1]
     counts = np.diff(np.append(edges, rest.shape[0]))[:, np.newaxis]
     sums = np.add.reduceat(rest, edges, axis=0)
-    # two fitted signals take two of the segments' freedoms (Bendat and Piersol, 9.3)
+    # two fitted inputs take two degrees of freedom (Bendat and Piersol, 9.3)
     freedoms = n_segments - 2.0
     spread = math.sqrt(CORRELATED_LINES / (counts.min() * freedoms))
-    # the mean of all parts that show the same floor: the least alone would be low by chance
+    # average all parts with the same floor: the lowest part alone would be biased low
     same = sums / counts <= (1.0 + SAME_FLOOR * math.sqrt(2.0) * spread) * (sums / counts).min(
         axis=0
     )

@@ -1,4 +1,4 @@
-"""All eight film coefficients from the broadband motion of a bearing, as readings with budgets."""
+"""Readings and uncertainty budgets of the eight film coefficients of `dynamic`."""
 
 import math
 
@@ -32,12 +32,13 @@ from core.uncertainty import (
 )
 
 MAX_LACK_OF_FIT = 3.0
-"""Beyond it the film is not constant over the band, or something shakes the bracket directly."""
+"""Largest lack of fit. Beyond it the film is not constant over the band, or the bracket is excited
+directly."""
 
 RESOLUTION = 0.001
-"""Half-width, relative to a row's direct coefficient, of what tapering does to `dynamic`: a line
-holds motion of its neighbours, which is integrated with the line's own frequency. Found to be
-0.03 % in simulations without any noise, at 0.07 Hz a bin."""
+"""Half-width of the error of `dynamic` from tapering, relative to a row's direct coefficient. A
+line contains motion of neighbouring lines, which is integrated with the wrong frequency.
+Simulations without noise show 0.03 % at 0.07 Hz per bin."""
 
 NAMES = (
     *(name for row in DYNAMIC_COEFFICIENTS for name in row),
@@ -56,18 +57,19 @@ def dynamic_readings(
     settings: DynamicSettings,
     n_integrations: tuple[int, int] = (2, 2),
 ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-    """Readings of `dynamic`, their budgets, and what it found.
+    """Return the readings of `dynamic`, their budgets, and the fitted film or None.
 
     Parameters
     ----------
     spectrum
-        Averaged over the segments in which all four channels were usable; None if there are none.
+        Cross-spectrum averaged over the segments in which all four channels were usable; None
+        without such segments.
     turn_hz
         Lowest and highest 1× frequency in these segments.
     quality
-        Of everything that goes in; if bad, its reason is the answer.
+        Quality of the input; without a spectrum, its reason is that of the missing readings.
     n_integrations
-        From the measurands of v_x and v_y to displacement.
+        Number of integrations of v_x and v_y to displacement.
     """
     if spectrum is None:
         return dict.fromkeys(NAMES, missing(quality.reason)), {}, None
@@ -84,15 +86,15 @@ def dynamic_readings(
 def dynamic_budgets(
     found: DynamicStiffness, bracket: BracketDynamics, accuracy: BearingAccuracy
 ) -> dict[str, Budget]:
-    """Uncertainty of all eight coefficients from `dynamic`, by quantity.
+    """Return the uncertainty budgets of all eight coefficients of `dynamic`, by quantity.
 
-    A mass that was fitted with the film is part of the statistics.
+    The uncertainty of a fitted mass is contained in the random part.
     """
     mass_kg = 0.0 if bracket.mass_kg is None else mass_half_width_kg(bracket, accuracy)
     damping = _damping_half_width(found, bracket, accuracy)
     names = (BRACKET, MASS, DAMPING, DELAY)
     widths = (accuracy.bracket_stiffness, mass_kg, damping, accuracy.delay_s)
-    # a shaft spectrum that is too large by a share makes every coefficient too small by as much
+    # coefficients are inversely proportional to the shaft spectrum
     left_in = found.noise_share / (1.0 - found.noise_share)
     std, budgets = found.std, {}
     for row, column in np.ndindex(2, 4):
@@ -118,7 +120,7 @@ def _damping_half_width(
 
 
 def _fit_quality(found: DynamicStiffness, max_delay_s: float, damping: float) -> Quality:
-    """Whether one constant film on this bracket explains the motion, with channels in step."""
+    """Return the quality of the fit: uncertain with a channel delay or a poor fit."""
     sure = coverage_factor((), 1.0 - FALSE_ALARM)
     limits_s = max_delay_s + abs(found.delay_per_damping) * damping
     if abs(found.delay_s) > limits_s + sure * found.delay_std_s:
@@ -132,7 +134,10 @@ def _fit_quality(found: DynamicStiffness, max_delay_s: float, damping: float) ->
 def _evidence(
     found: DynamicStiffness, bearing: Bearing, damping: float, quality: Quality
 ) -> dict[str, Budgeted]:
-    """What is measured beside the film; a fitted mass is proportional to the stiffness given."""
+    """Return coherence, lack of fit, number of lines, delay and bracket mass, with budgets.
+
+    A fitted mass is proportional to the given stiffness of the bracket.
+    """
     evidence: dict[str, Budgeted] = {}
     for axis, coherence, n_segments, lack_of_fit in zip(
         "xy", found.coherence, found.coherence_segments, found.lack_of_fit, strict=True

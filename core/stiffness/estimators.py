@@ -1,4 +1,4 @@
-"""The estimators of film stiffness: one table, the check of their signs, and the choice of one."""
+"""Table of the film stiffness estimators, check of their signs, and choice of the preferred one."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -10,15 +10,15 @@ from core.quality import Reading, Reason, missing, worst
 
 @dataclass(frozen=True)
 class EstimatorEntry:
-    """What an estimator reports of a direction, as names of quantities with "xx" or "yy" for axes.
+    """Quantities that an estimator reports for a direction, with "xx" or "yy" for axes.
 
     Parameters
     ----------
     label
-        Words for people.
+        Displayed name.
     stiffness, damping, coherence
-        Names with a place for ``{axes}``; `axis` in that of the coherence is "x" or "y". Equation
-        (5) cannot tell stiffness from damping.
+        Names of the quantities with a placeholder ``{axes}``, or ``{axis}`` ("x" or "y") for the
+        coherence. No damping for equation (5), which does not separate it from stiffness.
     """
 
     label: str
@@ -27,7 +27,7 @@ class EstimatorEntry:
     coherence: str
 
     def names(self, axes: str) -> tuple[str, ...]:
-        """Stiffness and, where there is one, damping of a direction."""
+        """Return the names of stiffness and, if reported, damping of a direction."""
         return tuple(
             name.format(axes=axes) for name in (self.stiffness, self.damping) if name is not None
         )
@@ -63,7 +63,7 @@ ESTIMATORS: Mapping[Estimator, EstimatorEntry] = {
 }
 
 TRANSFERS = {line: Estimator(f"transfer_{line}") for line in LINES}
-"""`transfer` by the line that it is read from."""
+"""`transfer` estimators by the prefix of their line."""
 
 DYNAMIC_COEFFICIENTS = tuple(
     tuple(
@@ -73,20 +73,20 @@ DYNAMIC_COEFFICIENTS = tuple(
     )
     for row in "xy"
 )
-"""Quantities of `dynamic`, (2, 4) as in `core.stiffness.dynamic.DynamicStiffness`."""
+"""Names of the coefficients of `dynamic`, (2, 4) as in `DynamicStiffness.coefficients`."""
 
 MODEL_DOUBTS = frozenset({Reason.POOR_FIT, Reason.CHANNEL_DELAY, Reason.ESTIMATORS_DISAGREE})
-"""Why a number with little scatter may be wrong."""
+"""Reasons for which the model of an estimator may be wrong, whatever the scatter of its results."""
 
 
 def preferred_stiffness(
     readings: Mapping[str, Reading], preference: Sequence[Estimator], axes: str
 ) -> tuple[Reading, Estimator | None]:
-    """Take the first estimator in order of preference that is good, else the first with a number.
+    """Return the stiffness of the first good estimator by preference, else the first with a value.
 
-    A number of few segments is no stiffness yet: a single segment makes any noise coherent. One
-    that stands in for another whose model does not hold is uncertain for the same reason: what
-    spoils the one may reach the other.
+    Values with few segments are not used: in a single segment, any noise is coherent. If the model
+    of a preferred estimator is doubted, its substitute is uncertain for the same reason, because
+    the cause may affect both.
 
     Parameters
     ----------
@@ -95,7 +95,8 @@ def preferred_stiffness(
 
     Returns
     -------
-    Without any number: why the first choice that was measured has none, and no estimator.
+    The reading and its estimator. Without any value, a missing reading with the reason of the first
+    measured estimator, and None.
     """
     found = [(readings[ESTIMATORS[e].stiffness.format(axes=axes)], e) for e in preference]
     measured = [(r, e) for r, e in found if r.quality.reason is not Reason.NOT_MEASURED]
@@ -114,21 +115,21 @@ def preferred_stiffness(
 
 
 def signs_checked(readings: Mapping[str, Reading]) -> dict[str, Reading]:
-    """Replace numbers of a reversed sign by the reason `polarity`.
+    """Replace readings with a reversed sign by missing readings with the reason `polarity`.
 
-    Direct stiffness and damping of a film are positive. With one transducer of a direction
-    reversed, the ratio of bearing to shaft motion changes its sign, and both come out negative.
-    Amplitudes, and with them equation (5), are not affected.
+    Direct stiffness and damping of a film are positive. If one transducer of a direction is
+    reversed, the ratio of bearing to shaft motion changes its sign, and both become negative.
+    Amplitudes, and therefore equation (5), are not affected.
 
-    A negative direct coefficient of `dynamic` takes out all coefficients of its direction, as it is
-    not known whether the shaft or the bearing transducer is reversed. A negative stiffness of
-    `transfer` takes out its damping, but not the other way round: cross-coupling alone can make the
-    damping that a single line shows negative.
+    A negative direct coefficient of `dynamic` removes all coefficients of its direction, because
+    either the shaft or the bearing transducer may be reversed. A negative stiffness of `transfer`
+    removes its damping as well. A negative damping does not remove the stiffness: cross-coupling
+    alone can make the damping at a single line negative.
 
     Parameters
     ----------
     readings
-        By quantity.
+        Readings by quantity.
     """
     found, dynamic = dict(readings), ESTIMATORS[Estimator.DYNAMIC]
     for axes, crossed in (("xx", ("xx", "xy", "yx")), ("yy", ("yy", "yx", "xy"))):
@@ -145,12 +146,12 @@ def signs_checked(readings: Mapping[str, Reading]) -> dict[str, Reading]:
 
 
 def is_reversed(readings: Mapping[str, Reading], axes: str) -> bool | None:
-    """Whether a transducer of a direction is reversed, by the best estimator that has a result.
+    """Whether a transducer of a direction is reversed, by the best estimator with a result.
 
     Parameters
     ----------
     readings
-        From :func:`signs_checked`.
+        Readings returned by :func:`signs_checked`.
     axes
         "xx" or "yy".
 

@@ -1,4 +1,4 @@
-"""Whether a line carries enough of the machine's own motion to read a stiffness from."""
+"""Evidence for a stiffness at a spectral line: coherence and excitation."""
 
 from dataclasses import dataclass
 
@@ -7,36 +7,36 @@ from core.spectra.cross_spectrum import CrossSpectrum
 from core.spectra.lines import SegmentSettings
 
 CHANCE = 1e-6
-"""Probability with which noise alone may be as coherent as what a stiffness is read from."""
+"""Probability that independent noise reaches the coherence required for a stiffness."""
 
 MAX_RUNOUT_SHARE = 0.25
-"""Of the shaft's amplitude, beyond which runout hides its motion."""
+"""Largest runout as a fraction of the shaft's amplitude; beyond it runout hides the motion."""
 
 
 def chance_coherence(n_segments: float) -> float:
-    """Squared coherence that two independent noises exceed once in a million averages.
+    """Return the squared coherence that independent noise exceeds in one of a million averages.
 
     Carter, Knapp and Nuttall (1973): without overlap, P(γ² > c) = (1 - c)^(n - 1).
 
     Parameters
     ----------
     n_segments
-        Independent segments that are averaged, more than 1.
+        Number of averaged independent segments, more than 1.
     """
     return float(1.0 - CHANCE ** (1.0 / (n_segments - 1.0)))
 
 
 @dataclass(frozen=True)
 class EvidenceSettings(SegmentSettings):
-    """Also what counts as evidence of a stiffness.
+    """Settings of segments and of the evidence required for a stiffness.
 
     Parameters
     ----------
     min_coherence
-        Squared coherence of shaft and bearing motion below which there is no stiffness. At 0.9, a
-        bearing line that is noise to the rest makes equation (5) read 5 % high.
+        Smallest squared coherence of shaft and bearing motion for a stiffness. At 0.9, equation (5)
+        is 5 % too high if the incoherent part is noise of the bearing line.
     min_coverage
-        Share of the wanted segments below which a result is marked uncertain.
+        Fraction of the possible segments below which a result is marked uncertain.
     """
 
     min_coherence: float = 0.9
@@ -51,22 +51,22 @@ def line_excitation(
     min_coherence: float = 0.9,
     runout_um_pk: float = 0.0,
 ) -> Reason:
-    """Whether a line carries enough motion for `ratio` and `transfer`, else the reason.
+    """Return whether a line has enough motion for equation (5) and `transfer`; else the reason.
 
     Parameters
     ----------
     min_coherence
-        Least squared coherence of shaft and bearing motion.
+        Smallest squared coherence of shaft and bearing motion.
     runout_um_pk
-        Largest runout of the shaft's surface at this line that is not taken off; zero away from the
-        harmonics of the running speed. It is as coherent as motion: only amplitude can tell.
+        Largest shaft runout contained in this line; zero off the harmonics of the running speed.
+        Coherence does not reveal runout, so its amplitude is compared with the shaft's.
 
     Returns
     -------
     OK, FEW_SEGMENTS or INSUFFICIENT_EXCITATION.
     """
     if spectrum.n_segments[shaft, bearing] < 2:
-        return Reason.FEW_SEGMENTS  # one segment is coherent with anything
+        return Reason.FEW_SEGMENTS  # the coherence of one segment is always 1
     shaft_um_pk = float(spectrum.amplitude_um_pk(shaft)[line])
     hidden = runout_um_pk > MAX_RUNOUT_SHARE * shaft_um_pk
     incoherent = spectrum.coherence_at(line, shaft, bearing) < min_coherence

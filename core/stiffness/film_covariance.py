@@ -1,7 +1,7 @@
-"""A fitted film: its evidence, its random errors, and what its residual shows of the bracket.
+"""Fitted film: its coherence, its random covariance, and bracket changes from its residual.
 
-Every estimate here is linear in ``Σ_lines w Σ_segments conj(f u) e``: e is the force that the fit
-leaves over, f u a linear form of the shaft's motion, its influence on the estimate.
+Every estimate is linear in ``Σ_lines w Σ_segments conj(f u) e``, with the residual force e and the
+influence f u on the estimate, a linear form of the shaft's motion u.
 """
 
 from collections.abc import Sequence
@@ -24,11 +24,11 @@ from core.stiffness.film_fit import N_UNKNOWNS, NormalEquations
 
 PART_PRODUCTS: FloatArray = np.array(
     [
-        *[WHITE_PRODUCTS] * 4,  # residual with the shaft's motion
+        *[WHITE_PRODUCTS] * 4,  # residual times the shaft's motion
         SMEARED_IN_PHASE,
         SMEARED_IN_QUADRATURE,
         *[SMEARED_APART] * 4,
-        WHITE_PRODUCTS,  # the probes' noise in both
+        WHITE_PRODUCTS,  # probe noise in both
         (0.0, 0.0, 0.0),
     ]
 ).T
@@ -36,27 +36,27 @@ PART_PRODUCTS: FloatArray = np.array(
 
 EACH_ROW = np.array([[0], [1]])
 BOTH_ROWS = np.array([[0, 1]])
-"""Rows through whose residuals groups of estimates are made."""
+"""Rows whose residuals enter a group of estimates: each row alone, or both."""
 
 
 @dataclass(frozen=True)
 class FilmFit:
-    """A film with all that its random errors come from.
+    """Weighted least-squares fit of a film, and the sources of its random errors.
 
     Parameters
     ----------
     weight : (n_lines, 2)
-        From `core.stiffness.film_fit.line_weights`.
+        Weights from `core.stiffness.film_fit.line_weights`.
     lines : (n_lines,)
-        Which bins they are, rising.
+        Bin index of each line, ascending.
     smoothing : (n_lines, n_lines)
-        From `core.stiffness.film_fit.smoother`.
+        Matrix from `core.stiffness.film_fit.smoother`.
     smear_share : (n_lines, 2)
-        Share of the bearing's power that integration at the lines leaves over.
+        Integration error as a fraction of the bearing's power.
     n_segments
-        Independent segments.
+        Number of independent segments.
     floor_std : (2,)
-        Relative standard uncertainty of each probe's noise power, as far as it was estimated.
+        Relative standard uncertainty of each probe's noise power; zero if it is known.
     """
 
     equations: NormalEquations
@@ -79,39 +79,39 @@ class FilmFit:
 
     @cached_property
     def residual(self) -> FloatArray:
-        """Power of the force that is left over, (n_lines, 2)."""
+        """Power of the residual force, (n_lines, 2)."""
         return self.equations.residual(self.unknowns)
 
     @property
     def coherence(self) -> FloatArray:
-        """Share of each bearing channel's weighted power that the film explains, (2,), 0 to 1."""
+        """Fraction of each bearing channel's weighted power explained by the film, (2,), 0 to 1."""
         whole = (self.weight * self.equations.force_power).sum(axis=0)
         share: FloatArray = 1.0 - (self.weight * self.residual).sum(axis=0) / whole
         return np.minimum(np.maximum(share, 0.0), 1.0)
 
     @property
     def coherence_segments(self) -> FloatArray:
-        """Segments by which one line's coherence would be as certain as that of all lines, (2,).
+        """Number of segments with which a single line's coherence is equally certain, (2,).
 
-        The share that is left, residual over whole, moves with the relative errors of each line's
-        residual and power, ``1 / √n`` each and common to both as far as the residual is all of it.
-        The residual moves it a second time through the weights.
+        The unexplained fraction is residual over total power. Its error comes from each line's
+        residual and power, with relative errors of ``1 / √n`` that are correlated by their ratio.
+        The residual enters a second time through the weights.
         """
         left, whole = self.weight * self.residual, self.weight * self.equations.force_power
         left, whole = left / left.sum(axis=0), whole / whole.sum(axis=0)
         moves = left + self.smoothing.T @ (whole - left)
         shared = 2.0 * moves * whole * self.residual / self.equations.force_power
         squares = (moves**2 + whole**2 - shared).sum(axis=0)
-        variance = CORRELATED_LINES * squares / (self.n_segments - 2.0)  # two fitted signals
+        variance = CORRELATED_LINES * squares / (self.n_segments - 2.0)  # two fitted inputs
         found: FloatArray = 1.0 + 2.0 * self.coherence / variance
         return found
 
     @property
     def lack_of_fit(self) -> FloatArray:
-        """How much the residual still has in common with the shaft's motion, (2,).
+        """Coherence of the residual with the shaft's motion, relative to chance, (2,).
 
-        Its mean is 1 if stiffness and damping are constant over the lines: the residual is then as
-        little correlated with the shaft as `n_segments` independent segments let it be.
+        Its mean is 1 if stiffness and damping are constant over the lines: the residual is then
+        correlated with the shaft only by chance, according to `n_segments`.
         """
         equations, ratio = self.equations, self.equations.ratio[:, np.newaxis, np.newaxis]
         # moments of the residual with (u_1, u_2, iω u_1, iω u_2): real part, then ratio × imaginary
@@ -138,14 +138,14 @@ class FilmFit:
     def spread(
         self, influences: ComplexArray, rows: npt.NDArray[np.int64] = BOTH_ROWS
     ) -> FloatArray:
-        """Covariance of groups of n estimates by their influences, (n_groups, n, n).
+        """Return the covariance of groups of n estimates from their influences, (n_groups, n, n).
 
         Parameters
         ----------
         influences : (n_groups, n_rows, n_lines, n, 2)
-            Of the shaft's motion on the estimates, through the residual of each row.
+            Influence of the shaft's motion on the estimates, through the residual of each row.
         rows : (n_groups or 1, n_rows)
-            Which rows these are.
+            Indices of the rows of `influences`.
         """
         parts = (influences @ self._parts[rows]).view(np.float64)
         of_rows = correlated_sum(parts, self.lines, PART_PRODUCTS).sum(axis=1)
@@ -153,7 +153,7 @@ class FilmFit:
         # per unit of noise power
         slope = (influences.conj() * weighted[..., np.newaxis, :]).real.sum(axis=(1, 2))
         slope = slope * self.equations.noise_power * self.floor_std
-        # real part of conj(x) e with circular e: half of its power (Bendat and Piersol, 9.2)
+        # the real part of conj(x) e with circular e has half its power (Bendat and Piersol, 9.2)
         covariance: FloatArray = of_rows / (2.0 * self.n_segments)
         covariance += slope @ slope.transpose(0, 2, 1)
         return covariance
@@ -162,13 +162,13 @@ class FilmFit:
     def _parts(self) -> ComplexArray:
         """Independent parts of the errors per influence, (2, n_lines, 2, 6).
 
-        What integration leaves of neighbouring lines cancels in the part of an influence that is in
-        phase with a row's force, whatever chance makes of the size of each: powers are smooth.
+        Integration errors of neighbouring lines cancel in the part of an influence in phase with a
+        row's force. Their sizes use smoothed powers, which are free of the scatter of single lines.
         """
         shaft, root = self.equations.shaft, _hermitian_root(self.equations.shaft)
         weight, film = self.weight.T[..., None, None], self.film.transpose(1, 0, 2)[..., None, :]
         smear = (self._smoothed(self.equations.force_power) * self.smear_share).T[..., None, None]
-        smeared = np.minimum(weight * smear, 1.0)  # of the smooth residual, one over the weight
+        smeared = np.minimum(weight * smear, 1.0)  # fraction of the smooth residual 1 / weight
         rest = weight**2 * self.residual.T[..., None, None] * (1.0 - smeared)
         across = film.conj().swapaxes(-1, -2)
         force = (film @ shaft @ across).real
@@ -176,9 +176,9 @@ class FilmFit:
         size = np.sqrt(self._smoothed(force[:, :, 0, 0].T).T)[..., None, None]
         power = np.diagonal(shaft, axis1=1, axis2=2).real
         smooth_root = np.sqrt(self._smoothed(power) / power)[:, :, np.newaxis] * root
-        # The residual holds the probes' noise as the shaft's motion does, and so with one phase:
-        # E[x*e x*e] is not 0 as for independent signals (Isserlis 1918). What that takes off some
-        # coefficients is left in.
+        # The probes' noise is in the residual and in the shaft's motion, with a common phase:
+        # E[x*e x*e] is not 0 as for independent signals (Isserlis 1918). The resulting reduction of
+        # some variances is neglected.
         noise = self.equations.noise_power[:, np.newaxis]
         parts = (
             np.sqrt(rest) * root,
@@ -189,17 +189,17 @@ class FilmFit:
         return np.concatenate(parts, axis=-1)
 
     def _smoothed(self, power: FloatArray) -> FloatArray:
-        """Straight lines through the logarithm, along the first axis."""
+        """Return the power smoothed by local regression of its logarithm, along the first axis."""
         smooth: FloatArray = np.exp(self.smoothing @ np.log(power))
         return smooth
 
 
 def _hermitian_root(shaft: ComplexArray) -> ComplexArray:
-    """Hermitian square roots of (n_lines, 2, 2) spectra."""
+    """Return the Hermitian square roots of cross-spectra, (n_lines, 2, 2)."""
     trace = (shaft[:, 0, 0] + shaft[:, 1, 1]).real
     determinant = (shaft[:, 0, 0] * shaft[:, 1, 1]).real - np.abs(shaft[:, 0, 1]) ** 2
     root = np.sqrt(np.maximum(determinant, 0.0))
-    # a matrix solves its own characteristic equation (Cayley and Hamilton)
+    # closed form of the 2 × 2 square root, by the theorem of Cayley and Hamilton
     whole = shaft + root[:, np.newaxis, np.newaxis] * np.eye(2)
     squared: ComplexArray = whole / np.sqrt(trace + 2.0 * root)[:, np.newaxis, np.newaxis]
     return squared
@@ -207,14 +207,14 @@ def _hermitian_root(shaft: ComplexArray) -> ComplexArray:
 
 @dataclass(frozen=True)
 class BracketEstimate:
-    """Estimates of some changes of the bracket.
+    """Estimated changes of the bracket.
 
     Parameters
     ----------
     value, std : (n,)
-        With random standard uncertainties.
+        Estimates and their random standard uncertainties.
     influences : (2, n_lines, n, 2)
-        Of the shaft's motion on the values, through the residual of each row.
+        Influence of the shaft's motion on the estimates, through the residual of each row.
     """
 
     value: FloatArray
@@ -224,15 +224,15 @@ class BracketEstimate:
 
 @dataclass(frozen=True)
 class BracketChanges:
-    """Changes of the bracket's dynamic stiffness, and how far the residual asks for each.
+    """Changes of the bracket's dynamic stiffness, and their estimation from the residual.
 
-    One step of Gauss and Newton, with the shaft's motion through the fitted film in the place of
-    the bearing's, whose noise would bias the estimates.
+    One Gauss-Newton step. It uses the shaft's motion through the fitted film instead of the
+    bearing's motion, whose noise would bias the estimates.
 
     Parameters
     ----------
     stiffnesses : (n, n_lines)
-        Change of the dynamic stiffness per unit of each.
+        Derivative of the dynamic stiffness with respect to each change.
     """
 
     fit: FilmFit
@@ -240,13 +240,13 @@ class BracketChanges:
 
     @cached_property
     def per(self) -> FloatArray:
-        """Change of the film's unknowns with each, (n, 2, 4)."""
+        """Derivative of the film's unknowns with respect to each change, (n, 2, 4)."""
         equations = self.fit.equations
         return equations.solve(self.fit.weight, equations.moment(self.stiffnesses))
 
     @cached_property
     def _left(self) -> ComplexArray:
-        """What each leaves over once the film has followed it, (n_lines, n, 2 rows, 2)."""
+        """Residual per unit of each change after a new fit of the film, (n_lines, n, 2 rows, 2)."""
         relative = (self.stiffnesses / self.fit.equations.bracket_n_per_m).T
         left: ComplexArray = relative[:, :, np.newaxis, np.newaxis] * self.fit.film[:, np.newaxis]
         left -= self.fit.equations.film(self.per)
@@ -254,7 +254,7 @@ class BracketChanges:
 
     @cached_property
     def _motion(self) -> ComplexArray:
-        """Spectra of the shaft's motion without the probes' noise, (n_lines, 2, 2)."""
+        """Cross-spectra of the shaft's motion without the probes' noise, (n_lines, 2, 2)."""
         return self.fit.equations.shaft - np.diag(self.fit.equations.noise_power)
 
     @cached_property
@@ -266,13 +266,13 @@ class BracketChanges:
         return information
 
     def follow(self, change: int, fitted: Sequence[int]) -> FloatArray:
-        """Change of the fitted ones per unit of another, (n_fitted,)."""
+        """Return the response of the fitted changes to a unit of another change, (n_fitted,)."""
         information = self._information
         step = np.linalg.solve(information[np.ix_(fitted, fitted)], information[fitted, change])
         return np.asarray(-step, dtype=np.float64)
 
     def estimate(self, fitted: Sequence[int]) -> BracketEstimate | None:
-        """Estimate some together, the others as they are; None if they cannot be separated."""
+        """Estimate the fitted changes jointly, all others fixed; None if they are inseparable."""
         information = self._information[np.ix_(fitted, fitted)]
         if not np.all(np.linalg.eigvalsh(information) > 0.0):
             return None
@@ -288,12 +288,12 @@ class BracketChanges:
         return BracketEstimate(-inverse @ score, np.sqrt(np.diagonal(covariance)), influences)
 
     def film_covariance(self, fitted: Sequence[int], influences: ComplexArray) -> FloatArray:
-        """Covariance of the film's unknowns if some changes are fitted with them, (2, 4, 4).
+        """Return the covariance of the film's unknowns fitted together with changes, (2, 4, 4).
 
         Parameters
         ----------
         fitted, influences
-            These changes, and the influences on their estimate.
+            Indices of the fitted changes, and the influences on their estimates.
         """
         through = self.per[fitted].transpose(1, 2, 0)[:, np.newaxis, np.newaxis] @ influences
         for row in (0, 1):

@@ -1,8 +1,8 @@
-"""Fitting a film's eight coefficients to averaged spectra by weighted least squares.
+"""Weighted least-squares fit of a film's eight coefficients to averaged cross-spectra.
 
-Row i of ``z_b V = (K + iωC) U`` asks for four real numbers (k_i1, k_i2, c_i1, c_i2) that minimise
-``Σ_lines w Σ_segments |z_b v_i - Σ_j (k_ij + iω c_ij) u_j|²``. Written out, the sums over segments
-are the entries of the cross-spectrum matrix, so that no segment is needed a second time.
+For row i of ``z_b V = (K + iωC) U``, four real numbers (k_i1, k_i2, c_i1, c_i2) minimise
+``Σ_lines w Σ_segments |z_b v_i - Σ_j (k_ij + iω c_ij) u_j|²``. The sums over segments are entries
+of the cross-spectrum matrix; the segments themselves are not needed.
 """
 
 import math
@@ -17,30 +17,30 @@ from core.spectra.cross_spectrum import BEARING_X
 from core.stiffness.dynamic_lines import conditional_power
 
 MIN_SHARE = 0.05
-"""Below this share of motion in the shaft spectra their noise-free part may not be invertible."""
+"""Smallest fraction of motion in the shaft spectra; below, the noise-free part may be singular."""
 
 ROUNDING = 1e-12
-"""Relative power that signals without noise leave over."""
+"""Relative residual power of noise-free signals, from rounding."""
 
 SMOOTHING_REACH_BINS = 6
-"""To each side, over which the residual spectrum is smoothed before it weighs the lines."""
+"""Number of bins to each side over which the residual spectrum is smoothed for the weights."""
 
 N_ITERATIONS = 4
-"""Of fitting and weighting; the third changes stiffness by less than 0.01 %."""
+"""Number of iterations of fit and weights; the third changes stiffness by less than 0.01 %."""
 
 N_UNKNOWNS = 4
 
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """The sums of every line; stiffness in N/m, damping times `omega_unit` in N/m.
+    """Normal equations of each line; unknowns are stiffness and damping times `omega_unit`, N/m.
 
     Parameters
     ----------
     matrix : (n_lines, 4, 4)
-        Cross-spectra of (u_x, u_y, v_x, v_y) at the lines that are used.
+        Cross-spectra of (u_x, u_y, v_x, v_y) at the used lines.
     omega : (n_lines,)
-        Their angular frequencies.
+        Angular frequencies of the lines.
     bracket_n_per_m : (n_lines,)
         Dynamic stiffness of the bracket.
     noise_power : (2,)
@@ -54,7 +54,7 @@ class NormalEquations:
 
     @cached_property
     def omega_unit(self) -> float:
-        """Angular frequency at which damping counts in N/m, to be as large as stiffness."""
+        """Angular frequency that scales damping to N/m, comparable with stiffness."""
         return float(self.omega.mean())
 
     @cached_property
@@ -64,67 +64,70 @@ class NormalEquations:
 
     @property
     def shaft(self) -> ComplexArray:
-        """Spectra of the shaft's motion, its noise included, (n_lines, 2, 2)."""
+        """Cross-spectra of the shaft's motion including noise, (n_lines, 2, 2)."""
         return self.matrix[:, :BEARING_X, :BEARING_X]
 
     @property
     def cross(self) -> ComplexArray:
-        """Spectra of bearing times conjugated shaft, (n_lines, 2, 2)."""
+        """Cross-spectra of the bearing with the conjugated shaft, (n_lines, 2, 2)."""
         return self.matrix[:, BEARING_X:, :BEARING_X]
 
     @cached_property
     def gram(self) -> FloatArray:
-        """Gram matrix of the shaft's motion, its noise included, (n_lines, 4, 4)."""
+        """Gram matrix of the shaft's motion including noise, (n_lines, 4, 4)."""
         return _gram(self.shaft, self.ratio)
 
     @cached_property
     def noise_gram(self) -> FloatArray:
-        """Share of the probes' noise in it, which is independent, (n_lines, 4, 4)."""
+        """Gram matrix of the probes' noise, which is independent in x and y, (n_lines, 4, 4)."""
         return _gram(np.diag(self.noise_power).astype(np.complex128), self.ratio)
 
     @cached_property
     def true_gram(self) -> FloatArray:
-        """Gram matrix of the motion without the probes' noise."""
+        """Gram matrix of the shaft's motion without the probes' noise, (n_lines, 4, 4)."""
         return self.gram - self.noise_gram
 
     @cached_property
     def force(self) -> FloatArray:
-        """Shaft motion times force of the bracket, for each row, (n_lines, 2, 4)."""
+        """Moments of the shaft's motion with the bracket's force, for each row, (n_lines, 2, 4)."""
         return self.moment(self.bracket_n_per_m)
 
     @cached_property
     def force_power(self) -> FloatArray:
-        """Power of the force of the bracket, for each row, (n_lines, 2)."""
+        """Power of the bracket's force, for each row, (n_lines, 2)."""
         bearing = self.matrix[:, BEARING_X:, BEARING_X:]
         power = np.diagonal(bearing, axis1=1, axis2=2).real
         return np.asarray(np.abs(self.bracket_n_per_m[:, np.newaxis]) ** 2 * power)
 
     def moment(self, stiffness_n_per_m: ComplexArray) -> FloatArray:
-        """Shaft motion times force of brackets of (..., n_lines), (..., n_lines, 2, 4)."""
+        """Return the moments of the shaft's motion with the force of brackets.
+
+        Dynamic stiffnesses (..., n_lines) give moments (..., n_lines, 2, 4).
+        """
         cross = stiffness_n_per_m[..., np.newaxis, np.newaxis] * self.cross
         scale = self.ratio[:, np.newaxis, np.newaxis]
         return np.concatenate([cross.real, scale * cross.imag], axis=-1)
 
     def solve(self, weight: FloatArray, right: FloatArray) -> FloatArray:
-        """Unknowns of both rows, (..., 2, 4).
+        """Solve for the unknowns of both rows, (..., 2, 4).
 
         Parameters
         ----------
         weight : (n_lines, 2)
         right : (..., n_lines, 2, 4)
-            `force`, or moments.
+            Right-hand side: `force`, or results of `moment`.
         """
         moment = (weight[..., np.newaxis] * right).sum(axis=-3)
         unknowns: FloatArray = np.linalg.solve(self.normal(weight), moment[..., np.newaxis])[..., 0]
         return unknowns
 
     def normal(self, weight: FloatArray) -> FloatArray:
-        """Weighted sum of the Gram matrices of the motion for each row, (2, 4, 4)."""
+        """Return the weighted sum of `true_gram` for each row, (2, 4, 4)."""
         summed = weight.T @ self.true_gram.reshape(weight.shape[0], -1)
         return summed.reshape(-1, N_UNKNOWNS, N_UNKNOWNS)
 
     def residual(self, unknowns: FloatArray) -> FloatArray:
-        """Power of the force that is left over, (n_lines, 2) in (N/m)² µm²."""
+        """Return the power of the residual force, (n_lines, 2) in (N/m)² µm²."""
         squares = np.einsum("ra,rb->rab", unknowns, unknowns).reshape(2, -1)
         modelled = self.gram.reshape(-1, N_UNKNOWNS**2) @ squares.T
         common = np.einsum("lra,ra->lr", self.force, unknowns)
@@ -132,25 +135,25 @@ class NormalEquations:
         return np.maximum(left, 0.0)
 
     def film(self, unknowns: FloatArray) -> ComplexArray:
-        """Dynamic stiffness of films of (..., 2, 4) unknowns at the lines, (n_lines, ..., 2, 2)."""
+        """Return the dynamic stiffness of films from (..., 2, 4) unknowns, (n_lines, ..., 2, 2)."""
         ratio = self.ratio.reshape(-1, *(1,) * unknowns.ndim)
         film: ComplexArray = unknowns[..., :2] + 1j * (ratio * unknowns[..., 2:])
         return film
 
     def signal_share(self, weight: FloatArray) -> float:
-        """Smallest share of motion in the weighted shaft spectra, over directions and rows."""
+        """Return the fraction of motion in the weighted shaft spectra, worst direction and row."""
         noise, motion = ((weight.T @ power).tolist() for power in self._powers)
         return min(1.0 - _largest_share(*row) for row in zip(noise, motion, strict=True))
 
     @cached_property
     def _powers(self) -> tuple[FloatArray, FloatArray]:
-        """Of the probes' noise and of the shaft's motion, each (n_lines, 2 × 2)."""
+        """Power of the probes' noise and of the shaft's motion with noise, each (n_lines, 4)."""
         noise, motion = (gram[:, :2, :2].reshape(-1, 4) for gram in (self.noise_gram, self.gram))
         return noise, motion
 
 
 def _gram(shaft: ComplexArray, ratio: FloatArray) -> FloatArray:
-    """Real parts of the products of (u_1, u_2, iω u_1, iω u_2), (n_lines, 4, 4)."""
+    """Return the real parts of the products of (u_1, u_2, iω u_1, iω u_2), (n_lines, 4, 4)."""
     scale = ratio[:, np.newaxis, np.newaxis]
     gram = np.empty((ratio.size, N_UNKNOWNS, N_UNKNOWNS))
     gram[:, :2, :2] = shaft.real
@@ -161,7 +164,7 @@ def _gram(shaft: ComplexArray, ratio: FloatArray) -> FloatArray:
 
 
 def _largest_share(part: Sequence[float], whole: Sequence[float]) -> float:
-    """Largest part in any direction of the whole, two symmetric (2, 2) matrices laid out flat."""
+    """Return the largest ratio of two quadratic forms, symmetric (2, 2) matrices laid out flat."""
     determinant = whole[0] * whole[3] - whole[1] ** 2
     if not determinant > ROUNDING * whole[0] * whole[3]:
         return 1.0
@@ -173,14 +176,15 @@ def _largest_share(part: Sequence[float], whole: Sequence[float]) -> float:
 
 
 def line_weights(equations: NormalEquations, smoothing: FloatArray) -> FloatArray | None:
-    """Reciprocal residual spectra, (n_lines, 2), fitted in turn with the film.
+    """Return the reciprocal residual spectra as weights, (n_lines, 2), iterated with the film fit.
 
-    The fit starts from what any response to the shaft would leave, weighted by coherence.
+    The first weights are from the bearing's power that is incoherent with the shaft, times the
+    coherence.
 
     Parameters
     ----------
     smoothing : (n_lines, n_lines)
-        From `smoother`.
+        Matrix from `smoother`.
 
     Returns
     -------
@@ -201,18 +205,18 @@ def line_weights(equations: NormalEquations, smoothing: FloatArray) -> FloatArra
 
 @lru_cache(maxsize=32)
 def smoother(lines: tuple[int, ...]) -> FloatArray:
-    """Matrix that puts a straight line through the neighbours of each line, (n_lines, n_lines).
+    """Return the matrix of a local linear regression over neighbouring lines, (n_lines, n_lines).
 
     Parameters
     ----------
     lines
-        Indices of the lines, which are bins.
+        Bin indices of the lines.
     """
     distance = np.subtract.outer(np.array(lines), np.array(lines)).astype(np.float64)
     near = (np.abs(distance) <= SMOOTHING_REACH_BINS).astype(np.float64)
     count, first = near.sum(axis=1), (near * distance).sum(axis=1)
     second = (near * distance**2).sum(axis=1)
-    alone = count * second == first**2  # a line without neighbours keeps what it has
+    alone = count * second == first**2  # a line without neighbours is not smoothed
     determinant = np.where(alone, 1.0, count * second - first**2)
     sloped = near * (second[:, np.newaxis] - first[:, np.newaxis] * distance)
     matrix: FloatArray = np.where(alone[:, np.newaxis], np.eye(len(lines)), sloped)
@@ -222,6 +226,6 @@ def smoother(lines: tuple[int, ...]) -> FloatArray:
 
 
 def _smoothed(smoothing: FloatArray, residual: FloatArray, force_power: FloatArray) -> FloatArray:
-    """Straight lines through the logarithm: the spectra of transducer noise are steep."""
+    """Return the residual smoothed in the logarithm, as spectra of transducer noise are steep."""
     smooth: FloatArray = np.exp(smoothing @ np.log(np.maximum(residual, ROUNDING * force_power)))
     return smooth

@@ -1,4 +1,4 @@
-"""One order line of a bearing: amplitudes, phases, equation (5) and transfer, with evidence."""
+"""Order line of a bearing: amplitudes, phases, equation (5) and `transfer`, with evidence."""
 
 import cmath
 import math
@@ -42,10 +42,10 @@ from core.stiffness.stiffness_budget import (
 from core.uncertainty import Budgeted, effective_number
 
 FLOOR_REACH = 12
-"""Bins to each side of a line in which its surroundings are judged."""
+"""Number of bins to each side of a line from which its noise floor is computed."""
 
 MAIN_LOBE = 2
-"""Bins to each side of a tone that a Hann taper spreads it over."""
+"""Number of bins to each side of a tone in the main lobe of Hann's taper."""
 
 DIRECTIONS = {"xx": (SHAFT_X, BEARING_X), "yy": (SHAFT_Y, BEARING_Y)}
 
@@ -58,33 +58,34 @@ AMPLITUDES = {
 
 
 QualityOf = Callable[..., Quality | Reading]
-"""Quality of a reading from some channels at a line, or the reason why there is none."""
+"""Function that returns the quality of a line of channels, or a missing reading with a reason."""
 
 
 @dataclass(frozen=True)
 class OrderLine:
-    """An order line of one bearing over some segments or polls.
+    """Order line of one bearing, averaged over segments or polls.
 
     Parameters
     ----------
     orders
-        Cross-spectrum that holds the line.
+        Cross-spectrum that contains the line.
     at
         Index of the line in `orders`.
     line
         `ORDER1` or `VORTEX`.
     bins
-        Cross-spectrum at the bins, for the surroundings of the line; None of polls.
+        Cross-spectrum at the bins, for the noise floor around the line; None for polls.
     min_segments
-        Independent segments or polls below which there is no `transfer`.
+        Smallest number of independent segments or polls for `transfer`.
     phasors_um_pk, usable, has_phase : (n, 4)
-        Of each segment or poll: the line, whether the channel counts, whether its phase is known.
+        For each segment or poll: the line's phasor, whether it is usable, whether its phase is
+        known.
     at_mark_um_pk, has_mark : (n, 4)
-        1× phasors when the shaft's mark passes the pick-up, and whether they are known.
+        1× phasors relative to the passage of the shaft's mark, and whether they are known.
     floors_um_pk
-        Of (u_x, u_y, v_x, v_y): amplitude of a line of each transducer's own noise.
+        Line amplitude of each transducer's own noise, for (u_x, u_y, v_x, v_y).
     round_shafts
-        Shaft channels whose runout was taken off at 1×.
+        Indices of the shaft channels whose runout was subtracted at 1×.
     """
 
     bearing: Bearing
@@ -104,18 +105,18 @@ class OrderLine:
 
     @property
     def frequency_hz(self) -> float:
-        """Mean over the segments."""
+        """Frequency of the line, mean over the segments."""
         return float(self.orders.frequency_hz[self.at])
 
     def n_segments(self, first: int, last: int) -> int:
-        """Segments in which two channels are usable; of polls, those that differ from the last."""
+        """Return the number of segments with two channels usable; for polls, of changed polls."""
         if self.bins is not None:
             return int(self.orders.n_segments[first, last])
         both = self.usable[:, first] & self.usable[:, last]
         return int(changed_polls(*np.abs(self.phasors_um_pk[both][:, [first, last]]).T).sum())
 
     def readings(self, quality_of: QualityOf) -> dict[str, Budgeted]:
-        """Amplitudes, roundness, coherence, equation (5) and transfer, by quantity."""
+        """Return amplitudes, roundness, coherence, equation (5) and `transfer`, by quantity."""
         found = {
             f"{name}_um_pk": self._amplitude(place, quality_of(place))
             for name, place in AMPLITUDES.items()
@@ -126,14 +127,17 @@ class OrderLine:
         return found
 
     def phases(self, quality_of: QualityOf) -> dict[str, Budgeted]:
-        """Phases of the mean 1× vectors at the mark, deg, positive where a vector leads."""
+        """Return the phases of the mean 1× vectors from the mark, deg, positive if leading."""
         return {
             f"{name}_phase_deg": self._phase(place, quality_of(place))
             for name, place in AMPLITUDES.items()
         }
 
     def axes_quality(self, rotation_sense: int) -> Quality:
-        """Whether shaft and bearing whirl with the rotation, where their line stands out."""
+        """Return the quality of the axes: good unless shaft or bearing whirl against the rotation.
+
+        Only lines above the noise floor are checked.
+        """
         return worst(
             self._pair_quality(x, y, rotation_sense)
             for x, y in ((SHAFT_X, SHAFT_Y), (BEARING_X, BEARING_Y))
@@ -141,7 +145,7 @@ class OrderLine:
 
     @property
     def is_of_shaft(self) -> bool:
-        """Whether the shaft moves at the line, in one direction at least."""
+        """Whether the line exceeds the noise floor in at least one shaft channel."""
         return self._stands_out(SHAFT_X) or self._stands_out(SHAFT_Y)
 
     @cached_property
@@ -150,14 +154,14 @@ class OrderLine:
         return bool((self.usable & self.has_phase).all(axis=1).any())
 
     def _runout_um_pk(self, place: int) -> float:
-        """Runout in a channel: it is locked to the shaft, so that the vortex is free of it."""
+        """Return the largest runout in a channel's line; the vortex line is free of runout."""
         is_shaft = place in (SHAFT_X, SHAFT_Y)
         free = not is_shaft or self.line != ORDER1 or place in self.round_shafts
         return 0.0 if free else self.bearing.runout_um_pk
 
     @cached_property
     def _phased(self) -> CrossSpectrum:
-        """Averages over the segments or polls in which the phases of two channels are known."""
+        """Cross-spectrum averaged over the segments or polls with known phases."""
         if self.bins is not None:
             return self.orders
         known = self.usable & self.has_phase
@@ -201,7 +205,7 @@ class OrderLine:
         if self.bins is not None:
             moves = bool(phased.n_segments[x, y]) and self._stands_out(x) and self._stands_out(y)
         else:
-            # runout is as round as the shaft's orbit, and turns as it does or against it
+            # runout may look like a circular orbit in either direction
             least_um_pk = max(self.floors_um_pk[x], self.floors_um_pk[y], self._runout_um_pk(x))
             moves = bool(min(power[x, y], power[y, x]) > least_um_pk**2)
         if not moves:
@@ -212,7 +216,7 @@ class OrderLine:
     def _direction(
         self, axes: str, shaft: int, bearing: int, quality: Quality | Reading
     ) -> dict[str, Budgeted]:
-        """Coherence, equation (5) and transfer of one direction."""
+        """Return coherence, equation (5) and `transfer` of one direction, by quantity."""
         coherence: Budgeted
         found: list[Budgeted]
         if isinstance(quality, Reading):
@@ -239,7 +243,7 @@ class OrderLine:
         }
 
     def _n_independent(self, shaft: int, bearing: int) -> float:
-        """Independent segments or polls with as much information as those of a direction."""
+        """Return the effective number of independent segments or polls of a direction."""
         if self.bins is not None:
             n_common = int(self.orders.n_segments[shaft, bearing])
             return independent_segments(n_common, self.settings.overlap)
@@ -288,7 +292,7 @@ class OrderLine:
         return (Reading(of_k.value, quality), of_k), (Reading(of_c.value, quality), of_c)
 
     def _exclusion_reason(self, shaft: int, bearing: int, n_segments: float, few: bool) -> Reason:
-        """Why no stiffness may be read from the line; OK if one may."""
+        """Return the reason why the line gives no stiffness; OK if it gives one."""
         quiet, at = Reason.INSUFFICIENT_EXCITATION, self.at
         if self.orders.power[at, shaft, bearing] <= 0.0:
             return quiet
@@ -297,35 +301,35 @@ class OrderLine:
         min_coherence, runout_um_pk = self.settings.min_coherence, self._runout_um_pk(shaft)
         if self.bins is None:
             reason = line_excitation(self.orders, at, shaft, bearing, 0.0, runout_um_pk)
-            if reason is Reason.OK:  # phases, where known, may change at random
+            if reason is Reason.OK:  # known phases may change at random
                 at_phases = self._phased, at, shaft, bearing
                 reason = line_excitation(*at_phases, min_coherence, runout_um_pk)
             return Reason.OK if reason is Reason.FEW_SEGMENTS else reason
-        # what is no line must not be read as the vortex's
+        # noise must not be mistaken for the vortex line
         if (few or self.line == VORTEX) and not self._stands_out(shaft):
             return quiet
         if few and not self._stands_out(bearing):
             return quiet
-        # few segments are coherent with anything
+        # few segments are coherent by chance
         least = 0.0 if few else max(min_coherence, chance_coherence(n_segments))
         reason = line_excitation(self.orders, at, shaft, bearing, least, runout_um_pk)
         return Reason.OK if few and reason is Reason.FEW_SEGMENTS else reason
 
     def _common(self, shaft: int, bearing: int) -> tuple[FloatArray, FloatArray]:
-        """Amplitudes of both where both are usable and the shaft moves."""
+        """Return shaft and bearing amplitudes where both are usable and the shaft moves."""
         amplitudes = np.abs(self.phasors_um_pk)
         both = self.usable[:, shaft] & self.usable[:, bearing] & (amplitudes[:, shaft] > 0.0)
         return amplitudes[both, shaft], amplitudes[both, bearing]
 
     def _across(self, shaft: int) -> float:
-        """Shaft motion across a direction per motion along it; 1 where that is not known."""
+        """Return the ratio of transverse shaft motion to motion in a direction; 1 if unknown."""
         power = self.orders.power[self.at]
         across = SHAFT_Y if shaft == SHAFT_X else SHAFT_X
         along, beside = float(power[shaft, across]), float(power[across, shaft])
         return (beside / along) ** 0.5 if along > 0.0 else 1.0
 
     def _stands_out(self, place: int) -> bool:
-        """Whether the line stands above its surroundings, less those of the other order line."""
+        """Whether the line exceeds the noise floor around it, which excludes the order lines."""
         if self.bins is None:
             return False
         lines_hz = self.orders.frequency_hz
@@ -338,7 +342,7 @@ NOT_MEASURED: Budgeted = (missing(Reason.NOT_MEASURED), None)
 
 
 def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
-    """Where to mark a line in a spectrum; None if there is none, or it is not the one meant.
+    """Return the frequency of a line to mark in a spectrum; None without a line in its band.
 
     Parameters
     ----------
@@ -350,14 +354,14 @@ def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
 
 
 def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: FloatArray) -> float:
-    """Median power of a channel around a line, µm².
+    """Return the median power of a channel around a line, µm².
 
     Parameters
     ----------
     bins
         Cross-spectrum at evenly spaced frequencies.
     lines_hz
-        Lines whose main lobes are left out.
+        Frequencies of lines whose main lobes are excluded.
     """
     bin_hz = bins.frequency_hz[1] - bins.frequency_hz[0]
     number = np.arange(bins.frequency_hz.size)
@@ -371,18 +375,18 @@ def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: Float
 def other_line_hz(
     bins: CrossSpectrum, turn_hz: float, band_hz: tuple[float, float], min_line_to_floor: float
 ) -> float | None:
-    """Frequency of a line below 1×, outside the vortex band, that shaft and bearing share.
+    """Return the frequency of a coherent line of shaft and bearing below 1×, off the vortex band.
 
     Parameters
     ----------
     bins
         Cross-spectrum at evenly spaced frequencies.
     band_hz
-        In which the vortex is looked for.
+        Vortex band.
 
     Returns
     -------
-    None if no such line stands out.
+    None if no such line exceeds the noise floor.
     """
     bin_hz = float(bins.frequency_hz[1] - bins.frequency_hz[0])
     margin_hz = (MAIN_LOBE + 1) * bin_hz

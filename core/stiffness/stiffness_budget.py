@@ -1,4 +1,4 @@
-"""Film stiffness at one line with its budget: equation (5) by amplitudes, `transfer` by phasors."""
+"""Film stiffness at one line and its uncertainty budget: equation (5) and `transfer`."""
 
 import math
 from collections.abc import Callable
@@ -30,7 +30,10 @@ COHERENCE = "coherence not known"
 
 
 def gain_lines(value: float, accuracy: BearingAccuracy) -> tuple[BudgetLine, BudgetLine]:
-    """Results are proportional to bearing motion and inversely to shaft motion."""
+    """Return the uncertainty contributions of the gains of shaft and bearing transducers.
+
+    Stiffness and damping are proportional to bearing motion over shaft motion.
+    """
     return (
         systematic_line(SHAFT_GAIN, accuracy.shaft_gain, -value),
         systematic_line(BEARING_GAIN, accuracy.bearing_gain, value),
@@ -40,17 +43,17 @@ def gain_lines(value: float, accuracy: BearingAccuracy) -> tuple[BudgetLine, Bud
 def effective_stiffness_n_per_m(
     bearing_um_pk: float, shaft_um_pk: float, bracket_stiffness_n_per_m: float
 ) -> float:
-    """Effective stiffness ``|k + iωc|`` of an oil film at one spectral line.
+    """Return the effective stiffness ``|k + iωc|`` of an oil film at one spectral line.
 
     Parameters
     ----------
     bearing_um_pk
         Absolute displacement of the bearing.
     shaft_um_pk
-        Displacement of the shaft relative to the bearing, same direction and line. The two
-        amplitudes may carry any unit and detector as long as it is the same.
+        Displacement of the shaft relative to the bearing, same direction and line. Other units and
+        detectors are possible if both amplitudes have the same.
     bracket_stiffness_n_per_m
-        Radial stiffness k_b of the bracket. Its inertia is left out, which biases the result by
+        Radial stiffness k_b of the bracket. Its inertia is neglected, which biases the result by
         m_b ω² / k_b (+0.4 % on the paper's machine at rated speed).
 
     Raises
@@ -65,7 +68,7 @@ def effective_stiffness_n_per_m(
 
 
 def motion_across(spectrum: CrossSpectrum, line: int, shaft: int) -> complex:
-    """Coherent shaft motion across a direction per motion along it; 1 if that is not known."""
+    """Return the ratio of coherent transverse shaft motion to that in a direction; 1 if unknown."""
     across = SHAFT_Y if shaft == SHAFT_X else SHAFT_X
     power = float(spectrum.power[line, shaft, across])
     return complex(spectrum.matrix[line, across, shaft]) / power if power > 0.0 else 1.0
@@ -81,19 +84,17 @@ def ratio_budget(
     n_segments: float | None = None,
     runout_um_pk: float = 0.0,
 ) -> Budget | None:
-    """Uncertainty of equation (5), ``|X_b| / |U| k_b``.
+    """Return the stiffness by equation (5), ``|X_b| / |U| k_b``, with its uncertainty budget.
 
-    What is not coherent sits in one of the two amplitudes, and it is not known in which: the ratio
-    may be high or low by 1/γ - 1. The bracket's inertia is left out by equation (5) and stated as
-    what it may amount to.
+    The incoherent part may be in either amplitude: the ratio may be high or low by 1/γ - 1.
+    Equation (5) neglects the bracket's inertia; the budget contains its largest effect.
 
     Parameters
     ----------
     n_segments
-        Independent segments; by default those that were averaged.
+        Number of independent segments; by default the number of averaged segments.
     runout_um_pk
-        Largest runout of the shaft's surface at this line, not taken off: it counts at harmonics of
-        the running speed, not at the vortex.
+        Largest shaft runout contained in this line; zero off the harmonics of the running speed.
 
     Returns
     -------
@@ -129,23 +130,23 @@ def polls_ratio_budget(
     runout_um_pk: float = 0.0,
     across: float = 1.0,
 ) -> Budget | None:
-    """Uncertainty of equation (5) over the polls of a rack.
+    """Return the stiffness by equation (5) over the polls of a rack, with its uncertainty budget.
 
-    A rack may be asked more often than it measures, or average for longer than a poll period: the
-    spread of the polls is divided by their effective number.
+    A rack may be polled faster than it measures, or average over several poll periods. The scatter
+    of the polls is therefore divided by the root of their effective number.
 
     Parameters
     ----------
     shaft_um_pk, bearing_um_pk : (n_polls,)
-        Amplitudes of the same polls; shaft amplitudes above zero.
+        Amplitudes of the same polls; shaft amplitudes are positive.
     coherence
-        Squared, of the two; without phases the least that would be accepted of waveforms.
+        Squared coherence of shaft and bearing; without phases, the smallest accepted for waveforms.
     n_effective
-        Number of independent polls with as much information.
+        Effective number of independent polls.
     runout_um_pk
-        As for `ratio_budget`.
+        Largest shaft runout contained in this line, as in `ratio_budget`.
     across
-        Shaft amplitude across this direction over that along it.
+        Ratio of the transverse shaft amplitude to the amplitude in this direction.
 
     Returns
     -------
@@ -173,7 +174,11 @@ def _ratio_lines(
     across: float,
     coherence: tuple[str, float],
 ) -> tuple[BudgetLine, ...]:
-    """Systematic contributions to equation (5); runout and shaft motion, name and coherence."""
+    """Return the systematic contributions to equation (5).
+
+    `runout_of_um_pk` is the runout and the shaft's amplitude; `coherence` is the name of its
+    contribution and the squared coherence.
+    """
     runout_um_pk, shaft_um_pk = runout_of_um_pk
     inertia = bracket.max_mass_kg * (2.0 * math.pi * frequency_hz) ** 2 / bracket.stiffness_n_per_m
     return (
@@ -187,14 +192,14 @@ def _ratio_lines(
 
 
 def changed_polls(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> npt.NDArray[np.bool_]:
-    """Polls in which at least one of two amplitudes differs from the poll before, (n_polls,)."""
+    """Return a mask of the polls that differ from the previous poll in an amplitude, (n_polls,)."""
     changed = np.ones(shaft_um_pk.size, dtype=np.bool_)
     changed[1:] = (np.diff(shaft_um_pk) != 0.0) | (np.diff(bearing_um_pk) != 0.0)
     return changed
 
 
 def mass_half_width_kg(bracket: BracketDynamics, accuracy: BearingAccuracy) -> float:
-    """Half-width of the bracket's mass; without one, all that it may be thought to have."""
+    """Return the half-width of the bracket's mass; the largest plausible mass if it is unknown."""
     share = 1.0 if bracket.mass_kg is None else accuracy.bracket_mass
     return share * bracket.max_mass_kg
 
@@ -202,7 +207,7 @@ def mass_half_width_kg(bracket: BracketDynamics, accuracy: BearingAccuracy) -> f
 def damping_half_width_n_s_per_m(
     bracket: BracketDynamics, mass_kg: float, accuracy: BearingAccuracy
 ) -> float:
-    """Half-width of the bracket's damping."""
+    """Return the half-width of the bracket's damping."""
     return 2.0 * accuracy.bracket_damping * math.sqrt(bracket.stiffness_n_per_m * mass_kg)
 
 
@@ -216,19 +221,19 @@ def transfer_budgets(
     n_segments: float | None = None,
     runout_um_pk: float = 0.0,
 ) -> tuple[Budget, Budget] | None:
-    """Stiffness in N/m and damping in N·s/m of a film by `transfer`, with their uncertainty.
+    """Return stiffness in N/m and damping in N·s/m of a film by `transfer`, with their budgets.
 
-    H1 with the shaft's motion as input does not grow with bearing noise. It sees one direction at a
-    time, so that a film with cross-coupling shows in it as ``k_xx + k_xy · u_y / u_x``.
+    The H1 estimate with the shaft's motion as input is not biased by bearing noise. It contains one
+    direction only: with cross-coupling, it gives ``k_xx + k_xy · u_y / u_x``.
 
     Parameters
     ----------
     n_segments, runout_um_pk
-        As for `ratio_budget`; the phase of runout is not known: it reaches damping as well.
+        As in `ratio_budget`. The phase of runout is unknown, so it also contributes to damping.
 
     Returns
     -------
-    None without shaft motion or with fewer than two segments: one shows no coherence.
+    None without shaft motion or with fewer than two segments.
     """
     shaft_power = float(spectrum.power[line, shaft, bearing])
     counted = float(spectrum.n_segments[shaft, bearing]) if n_segments is None else n_segments
@@ -239,7 +244,7 @@ def transfer_budgets(
     impedance = complex(bracket.dynamic_stiffness_n_per_m(spectrum.frequency_hz[[line]])[0])
     h1 = impedance * ratio
     k, c = h1.real, h1.imag / omega
-    # Bendat and Piersol, Random Data, 4th ed., table 9.6, with n - 1 for what H1 itself takes up
+    # Bendat and Piersol, Random Data, 4th ed., table 9.6, with n - 1 degrees of freedom
     incoherent = 1.0 - spectrum.coherence_at(line, shaft, bearing)
     left = incoherent * float(spectrum.power[line, bearing, shaft]) / shaft_power
     std = abs(impedance) * math.sqrt(left / (2.0 * (counted - 1.0)))
@@ -247,10 +252,10 @@ def transfer_budgets(
     damping = damping_half_width_n_s_per_m(bracket, bracket.max_mass_kg, accuracy)
     across = abs(motion_across(spectrum, line, shaft))
     film = complex(k, omega * c)
-    any_phase = abs(film) * (1.0 + 1.0j)  # all of it may be in the real or in the imaginary part
+    any_phase = abs(film) * (1.0 + 1.0j)  # of unknown phase: real or imaginary
 
     def budget(value: float, std: float, part: Callable[[complex], float]) -> Budget:
-        """Budget of a part of the film's dynamic stiffness, a linear function of it."""
+        """Return the budget of a linear function of the film's dynamic stiffness."""
         return Budget(
             value,
             (

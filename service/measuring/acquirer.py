@@ -1,4 +1,4 @@
-"""Acquisition: blocks and link news from sources, and the bounded queue of blocks."""
+"""Acquisition: reading of sample blocks and link states from sources, and the queue of blocks."""
 
 import asyncio
 import random
@@ -21,12 +21,12 @@ from service.runtime.polls import TimedSource
 
 @dataclass(frozen=True)
 class LinkNews:
-    """Link state of a unit, reported at each change and at each failed attempt.
+    """Link state of a unit, reported at each change and at each failed attempt to connect.
 
     Parameters
     ----------
     reason
-        Why no samples arrive; None while they do.
+        Reason why no samples arrive; None while connected.
     """
 
     unit: str
@@ -82,7 +82,7 @@ class Bus:
             yield await self._queue.get()
 
     def done(self) -> None:
-        """Report that the analysis of the newest yielded block has finished."""
+        """Mark the block yielded last as analysed."""
         self._queue.task_done()
         self._published_s.popleft()
 
@@ -92,7 +92,7 @@ class Bus:
 
 
 class ConnectGate:
-    """Limiter of the rate of connection attempts, over all links; ``per_s`` is per second."""
+    """Rate limiter of connection attempts over all links; ``per_s`` is the rate per second."""
 
     def __init__(self, per_s: float, clock: Clock) -> None:
         self._interval_s = 1.0 / per_s
@@ -111,29 +111,29 @@ class ConnectGate:
 log = structlog.get_logger()
 
 CONNECTS_PER_S = 50.0
-"""Maximum rate over all units, for a hundred devices that come back at the same time."""
+"""Maximum rate of connection attempts over all units, if many devices return at the same time."""
 
 CONFIG_RETRY_S = 15.0
-"""Retry period of a device that does not fit the settings: replacing it takes longer."""
+"""Retry period of a device that does not fit the settings; replacing it takes longer."""
 
 ENDED = "the recording has ended"
 
 Publish = Callable[[SampleBlock], Awaitable[None]]
-"""Receives a block; the source waits for it."""
+"""Coroutine function that receives a block; the source waits until it returns."""
 
 
 class Acquirer:
-    """Reads the sources of all units.
+    """Reader of the sources of all units, which reconnects after lost links.
 
     Parameters
     ----------
     publish
-        Receives blocks.
+        Function that receives each block.
     report
-        Receives link news.
+        Function that receives each link state.
     beats
-        Heartbeats of the task of each unit: they continue while a device is away, and stop if its
-        driver hangs.
+        Heartbeats of the task of each unit; they continue while a device is disconnected and stop
+        if its driver hangs.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class Acquirer:
         self._beats = beats or Heartbeats(clock)
 
     async def run(self) -> None:
-        """Read until all sources have ended. A bug in the task of one ends all."""
+        """Read until all sources have ended; an unexpected exception in one task ends all."""
         async with asyncio.TaskGroup() as sources:
             for unit, watched in self._units.items():
                 name = f"acquire {unit}"
@@ -177,7 +177,7 @@ class Acquirer:
                 return
 
     async def _read(self, unit: str, source: SampleSource, pulse: Pulse) -> None:
-        resume = pulse.rest  # without heartbeats of its own, a source may wait without limit
+        resume = pulse.rest  # a source without own heartbeats may wait without limit
         if isinstance(source, TimedSource):
             source.set_pulse(pulse)
             resume = pulse.beat
@@ -187,7 +187,7 @@ class Acquirer:
                 if self._live.set_link(unit, LinkState.CONNECTED):
                     log.info("connected", unit=unit)
                     self._report(LinkNews(unit, LinkState.CONNECTED))
-                pulse.rest()  # a full queue is a fault of the analysis
+                pulse.rest()  # waiting for a full queue is not a fault of the source
                 await self._publish(block)
                 resume()
 
@@ -200,5 +200,5 @@ class Acquirer:
 def _retry_s(error: AcquisitionError, retry_s: float) -> float:
     if isinstance(error, ConfigError):
         return CONFIG_RETRY_S
-    # devices that vanished together must not be reconnected at the same moment
+    # devices that were lost together must not be reconnected at the same moment
     return retry_s * random.uniform(0.5, 1.0)  # noqa: S311  not a secret

@@ -1,4 +1,4 @@
-"""Alarms of all units and of the service: life cycle, listeners, start."""
+"""Alarm engine: alarms of all units and of the service, listeners, and restart."""
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -56,23 +56,25 @@ log = structlog.get_logger()
 TICK_S = 0.5
 
 WITHOUT_LINK = (LINK_LOST, MESSAGES_REFUSED)
-"""Kinds whose condition is also known while no samples arrive."""
+"""Alarm kinds whose condition is known also while no samples arrive."""
 
 LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
 
 Listener = Callable[[SampleBlock, Sequence[AlarmNews]], None]
-"""Receives every block with the alarm news that it caused."""
+"""Function that receives each block with the alarm news that it caused."""
 
 
 class AlarmEngine:
-    """Owner of all alarms; works on the event loop and never waits.
+    """Engine that updates all alarms; it runs on the event loop without blocking it.
 
     Parameters
     ----------
     units
         Alarms of each unit.
     put
-        Stores findings.
+        Function that queues findings for the store.
+    listener
+        Function that receives each block with its alarm news.
     service
         Alarms about the service itself.
     chatter
@@ -100,10 +102,10 @@ class AlarmEngine:
         self._time = HostTime(clock)
         self._observer: Callable[[Sequence[AlarmNews]], None] | None = None
         self.revision = 0
-        """Number that changes with every change of an alarm."""
+        """Revision number, increased with every change of an alarm."""
 
     def set_observer(self, observer: Callable[[Sequence[AlarmNews]], None]) -> None:
-        """Call a function with all news as soon as they arise."""
+        """Set the function that is called immediately with all alarm news."""
         self._observer = observer
 
     def restore(
@@ -111,12 +113,12 @@ class AlarmEngine:
         alarms: Iterable[Alarm],
         memories: Mapping[str, AlarmMemory] = MappingProxyType({}),
     ) -> None:
-        """Continue from stored alarms, before anything else is taken.
+        """Restore stored alarms, before the first block.
 
         Parameters
         ----------
         memories
-            State of alarms without a gap in the samples since, by unit.
+            Alarm states, by unit; only of units without a gap in the samples since.
         """
         now_ns, found = self._clock.now_ns(), list(alarms)
         for board in self._reported:
@@ -130,18 +132,18 @@ class AlarmEngine:
         self._publish(self._service.restore(others, now_ns))
 
     def add_alarms(self, board: ReportedAlarms, stored: Iterable[Alarm]) -> None:
-        """Take over alarms of another process from their stored state."""
+        """Add alarms taken over from another process, with their stored state."""
         self._reported.append(board)
         self._publish(board.restore(stored, self._clock.now_ns()))
         self.revision += 1
 
     def remove_alarms(self, board: ReportedAlarms) -> None:
-        """Hand alarms over to another process."""
+        """Remove alarms that another process takes over."""
         self._reported.remove(board)
         self.revision += 1
 
     def refuse(self, unit: str, reason: str) -> None:
-        """Report a message of a unit that was refused."""
+        """Report a refused message of a unit."""
         if self._stream is not None:
             report_refused(self._stream, unit, reason)
 
@@ -150,11 +152,11 @@ class AlarmEngine:
         return self._units[unit].is_connected
 
     def memory(self, unit: str) -> AlarmMemory:
-        """Return the state of the alarms of a unit, from which another process continues."""
+        """Return the state of a unit's alarms, for restoring in another process."""
         return self._units[unit].memory
 
     def recall(self, events: Iterable[AlarmEvent]) -> None:
-        """Add past events, oldest first, to those that are examined for chattering alarms."""
+        """Add past events, oldest first, to the detection of chattering alarms."""
         for event in events:
             self._chatter.note(event, event.time_ns)
 
@@ -164,12 +166,12 @@ class AlarmEngine:
         assessments: Sequence[Assessment],
         films: Mapping[str, Judgement] = MappingProxyType({}),
     ) -> list[AlarmNews]:
-        """Judge a block and its results; return the news, to be stored with them.
+        """Update the alarms of a unit from a block and its results; return the news.
 
         Parameters
         ----------
         films
-            Conditions of films by id of the alarm.
+            Conditions of films by alarm id.
         """
         own = self._units[block.unit]
         if assessments or films:
@@ -182,25 +184,25 @@ class AlarmEngine:
         return news
 
     def link(self, unit: str, is_connected: bool, reason: str | None = None) -> None:
-        """Report whether samples of a unit arrive."""
+        """Update the link alarm of a unit from its link state."""
         self.revision += 1
         self._publish(self._units[unit].link(is_connected, reason, self._host_ns()))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Judge periodically, until cancelled."""
+        """Call `tick` periodically until cancelled."""
         while True:
             pulse.beat(TICK_S)
             await self._clock.sleep(TICK_S)
             self.tick()
 
     def tick(self) -> None:
-        """Judge lost links, the service and expired shelving once."""
+        """Update the alarms that depend on time: lost links, service health, expired shelving."""
         now_ns = self._host_ns()
         for board in self._boards:
             self._publish(board.tick(now_ns))
 
     def operate(self, id_: str, action: Action) -> Alarm:
-        """Apply an action of a person; return the alarm after it.
+        """Apply an operator's action and return the updated alarm.
 
         Raises
         ------
@@ -215,7 +217,7 @@ class AlarmEngine:
         return board.alarm(id_)
 
     def alarm(self, id_: str) -> Alarm:
-        """Return an alarm. Raises `LookupError` if it does not exist."""
+        """Return the alarm with an id; raise `LookupError` if it does not exist."""
         return self._board_of(id_).alarm(id_)
 
     def is_chattering(self, alarm: Alarm) -> bool:
@@ -223,7 +225,7 @@ class AlarmEngine:
         return self._chatter.is_chattering(alarm.identity.id, self._clock.now_ns())
 
     def set_reference(self, reference: VectorReference) -> None:
-        """Compare 1× vectors with a new reference; one of an unknown unit is ignored."""
+        """Set the reference of a bearing's 1× vectors; references of unknown units are ignored."""
         if reference.unit in self._units:
             self._units[reference.unit].refer_to(reference)
 
@@ -233,7 +235,7 @@ class AlarmEngine:
         return [alarm for board in self._boards for alarm in board.alarms]
 
     def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether the condition of an alarm is known now; most need a connected unit."""
+        """Return whether an alarm's condition is known now; most kinds need a connected unit."""
         if alarm.identity.kind in WITHOUT_LINK:
             return True
         if alarm.identity.unit not in self._units:
@@ -241,11 +243,11 @@ class AlarmEngine:
         return alarm.condition.is_known and self.is_connected(alarm.identity.unit)
 
     def count(self) -> AlarmCount:
-        """Return the number of alarms."""
+        """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""
         return count_of(self.alarms, self.is_judged)
 
     def _host_ns(self) -> int:
-        """Return the time of the host; if its clock was set, stop all delays."""
+        """Return the host's time; pause the alarm delays if the clock was set."""
         now_ns, was_set = self._time.look()
         if was_set:
             for board in self._boards:
@@ -253,7 +255,7 @@ class AlarmEngine:
         return now_ns
 
     def _publish(self, news: list[AlarmNews]) -> None:
-        """Announce and store news without a block."""
+        """Announce and store alarm news that no block caused."""
         self._announce(news)
         if news:
             self._put(Findings(alarms=news))
@@ -288,17 +290,17 @@ def _log(event: AlarmEvent) -> None:
 
 @dataclass(frozen=True)
 class PlantPart:
-    """Units of one process, and whether it leads.
+    """Part of a plant that one process is responsible for.
 
     Parameters
     ----------
     own
-        Its units, unless it has all.
+        Units of this process; empty if it is the only process.
     elsewhere
         Units of other processes.
     leads
-        Whether it raises alarms about the service and closes alarms of units that are no longer
-        in the plant file; one process does.
+        Whether this process raises the alarms about the service and closes alarms of units that
+        are no longer in the plant file; exactly one process leads.
     """
 
     own: frozenset[str] = frozenset()
@@ -311,7 +313,7 @@ class PlantPart:
 
 
 WHOLE = PlantPart()
-"""The only process of a plant."""
+"""Whole plant in one process."""
 
 MAX_RECALLED = 10_000
 """Maximum number of events that are examined for chattering alarms after a start."""
@@ -329,18 +331,18 @@ async def alarm_engine(
     part: PlantPart = WHOLE,
     memories: Mapping[str, AlarmMemory] = MappingProxyType({}),
 ) -> AlarmEngine:
-    """Build the engine and continue from stored alarms.
+    """Build the alarm engine and restore the stored alarms.
 
     Parameters
     ----------
     rows
         Channel of each row of the blocks, for units whose rows are not their channels.
     look
-        Returns the health of the service.
+        Function that returns the health of the service.
     part
         Part of the plant that this process is responsible for.
     memories
-        State of alarms without a gap in the samples since, by unit.
+        Alarm states, by unit; only of units without a gap in the samples since.
 
     Raises
     ------
@@ -377,7 +379,7 @@ async def alarm_engine(
 
 
 def _rules(plant: PlantFile, unit: UnitSettings, origin: Origin) -> UnitRules:
-    """Return the rules of a unit, with one for its films if they are watched."""
+    """Return the alarm rules of a unit, with a rule for its films if they are monitored."""
     is_watched = isinstance(film_rules_of(unit, plant.films), FilmRules)
     films = rule_of(0.0, 0.0, is_latching=plant.films.latching) if is_watched else None
     return replace(rules_of(unit, plant.alarms, origin), films=films)

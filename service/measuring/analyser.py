@@ -1,4 +1,4 @@
-"""Analysis of blocks into findings, and the state of a unit that moves to another process."""
+"""Analysis of blocks to findings, and transfer of a unit's state to another process."""
 
 import asyncio
 from collections.abc import Mapping
@@ -25,16 +25,16 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class UnitMemory:
-    """State of a unit between two blocks.
+    """State of a unit's analysis between two blocks, for transfer to another process.
 
     Parameters
     ----------
     films
-        State of its films, if they are watched.
+        State of the unit's films; None if they are not monitored.
     count
-        Sample count of its blocks.
+        Current sample count of the unit's blocks.
     version
-        Version of this class.
+        Version of this format.
     """
 
     monitor: MonitorState
@@ -50,13 +50,13 @@ NO_MEMORIES: Mapping[str, UnitMemory] = MappingProxyType({})
 NOTHING = Findings()
 
 TURNS = 3
-"""Turns of the event loop between two bearings: those from a request to its response."""
+"""Iterations of the event loop between two bearings, enough to respond to a request."""
 
 
 class Analyser:
-    """Analyses the blocks of all units, one after the other.
+    """Analysis of the blocks of all units, one block at a time.
 
-    If a device restarts its count within an epoch, its blocks get a new epoch here.
+    If a device restarts its sample count within an epoch, the analyser assigns a new epoch.
     """
 
     def __init__(
@@ -76,13 +76,16 @@ class Analyser:
         self._monitors[block.unit].require(block)
 
     async def take(self, block: SampleBlock, sampled_s: float) -> None:
-        """Analyse a block and store its findings; its samples arrived at ``sampled_s``."""
+        """Analyse a block and queue its findings for the store.
+
+        ``sampled_s`` is the monotonic time of the block's samples.
+        """
         findings = await self.analyse(block, sampled_s)
         if findings != NOTHING:
             self._recorder.put(findings)
 
     async def analyse(self, block: SampleBlock, sampled_s: float) -> Findings:
-        """Analyse a block, whose samples arrived at ``sampled_s``; return its findings."""
+        """Analyse a block and return its findings; ``sampled_s`` is as in `take`."""
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].placed(block)
         found = []
@@ -102,12 +105,13 @@ class Analyser:
     async def replay(
         self, block: SampleBlock, sampled_s: float, account: SampleAccount | None = None
     ) -> None:
-        """Analyse a block whose findings are already stored; publish no findings.
+        """Analyse a block again whose findings are already stored; publish no findings.
 
         Parameters
         ----------
         account
-            Stored account of the samples of the unit; the monitor counts these a second time.
+            Stored account of the unit's samples, shown instead of the monitor's, which counts
+            replayed samples twice.
         """
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].replayed(block)
@@ -117,11 +121,11 @@ class Analyser:
         self._live.set_received(block, account or monitor.account, sampled_s)
 
     def state(self, unit: str) -> MonitorState:
-        """Return the state of a monitor without its newest samples."""
+        """Return the state of a unit's monitor without its newest samples."""
         return self._monitors[unit].state
 
     def memory(self, unit: str) -> UnitMemory:
-        """Return the state of a unit that another process needs besides its newest samples."""
+        """Return the state of a unit for another process, which also needs the newest samples."""
         return UnitMemory(
             self.state(unit),
             self._alarms.memory(unit),
@@ -130,21 +134,21 @@ class Analyser:
         )
 
     def rewind(self, unit: str, memory: UnitMemory) -> None:
-        """Restore the monitor of a unit, which then expects its newest samples again."""
+        """Prepare the monitor of a unit for the replay of its newest samples."""
         self._monitors[unit].go_on(None)
         self._monitors[unit].rewind(memory.monitor)
         self._counts[unit].restore(memory.count)
 
     def settle(self, unit: str, memory: UnitMemory) -> None:
-        """Restore the monitor of a unit after these samples."""
+        """Restore the state of a unit's monitor after the replay."""
         self._monitors[unit].settle(memory.monitor)
 
     def refuse(self, unit: str, reason: str) -> None:
-        """Report a message of a unit that was refused."""
+        """Report a refused message of a unit."""
         self._alarms.refuse(unit, reason)
 
     def note_link(self, news: LinkNews) -> None:
-        """Report the state of a link to the alarms."""
+        """Update the link alarm of a unit."""
         self._alarms.link(news.unit, news.is_connected, news.reason)
 
     def is_connected(self, unit: str) -> bool:
@@ -153,7 +157,7 @@ class Analyser:
 
 
 async def _yield() -> None:
-    """Let other tasks run: a bearing takes milliseconds."""
+    """Let other tasks run between two bearings; one bearing takes milliseconds."""
     for _ in range(TURNS):
         await asyncio.sleep(0)
 
@@ -162,7 +166,7 @@ BUS_CAPACITY = 512
 
 
 class Runner:
-    """Acquisition, analysis and storage in one process. A bug in one task ends all."""
+    """Acquisition, analysis and storage in one process; an exception in one task ends all."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Learning of baselines from stored readings, and doubts about what was learned."""
+"""Learning of baselines from stored readings, and checks of learned baselines."""
 
 from collections.abc import Mapping
 from functools import partial, reduce
@@ -23,17 +23,17 @@ PADWATCH = "padwatch"
 """Author of baselines that are learned and accepted automatically."""
 
 SURE = 3.0
-"""Minimum of a drift in standard uncertainties: a smaller one may be chance."""
+"""Smallest significant drift in standard uncertainties; a smaller drift may be chance."""
 
 
 class Learner:
-    """Learns baselines; has no state and may be used in any thread."""
+    """Learner of baselines and shaft responses; stateless and thread-safe."""
 
     def __init__(self, store: FilmStore, settings: FilmAlarmSettings) -> None:
         self._store, self._settings = store, settings
 
     def is_due(self, place: FilmPlace, now_ns: int) -> bool:
-        """Return whether a bearing is to be learned now, for the first time or again."""
+        """Return whether a baseline of a bearing is due, the first one or a new version."""
         versions = self.versions(place)
         since_ns = self._since_ns(place, versions)
         if versions.is_frozen or since_ns is None:
@@ -54,7 +54,7 @@ class Learner:
         return now_ns - newest.created_ns >= self._settings.learn_every_days * DAY_NS
 
     def versions(self, place: FilmPlace) -> Versions:
-        """Return the state of the baselines of a bearing."""
+        """Return the state of a bearing's baseline versions."""
         return versions_after(self._store.steps(place.unit, place.bearing))
 
     def learn(
@@ -129,9 +129,9 @@ class Learner:
         return steps
 
     def _disagreement(self, baseline: BearingBaseline, versions: Versions) -> str | None:
-        """Return the difference from the first accepted version, if it is too large.
+        """Return a text about the difference from the first accepted version; None if it is small.
 
-        A comparison with the last version would accept a film that softens slowly.
+        A comparison with the previous version would accept a film that softens slowly.
         """
         origin = baseline.origin
         if versions.first_accepted is None:
@@ -151,7 +151,10 @@ def drifted(
     baseline: BearingBaseline,
     limit: float,
 ) -> str | None:
-    """Return the change of a film during learning, if it is significant: it may show a fault."""
+    """Return a text about the change of a film during learning; None if it is not significant.
+
+    A significant change may be a fault.
+    """
     for quantity in baseline.quantities:
         found = learning_drift(history, is_healthy, quantity)
         if found and abs(found.change) >= max(limit, SURE * found.std):
@@ -176,13 +179,13 @@ def _step(baseline: BearingBaseline, step: BaselineStep, reason: str) -> StoredS
 
 
 def healthy(film: FilmHistory) -> npt.NDArray[np.bool_]:
-    """Return which readings are settled and without an alarm."""
+    """Return a mask of the readings that are settled and without an alarm."""
     is_healthy: npt.NDArray[np.bool_] = film.is_settled & ~np.any(film.level > 0, axis=0)
     return is_healthy
 
 
 def common_rows(found: Mapping[str, FilmHistory]) -> dict[str, npt.NDArray[np.bool_]]:
-    """Return for each history which readings are at times that all histories contain."""
+    """Return, by bearing, a mask of the readings at times that all histories contain."""
     times = {bearing: film.history.time_ns for bearing, film in found.items()}
     common = reduce(partial(np.intersect1d, assume_unique=True), times.values())
     return {bearing: np.isin(time_ns, common) for bearing, time_ns in times.items()}

@@ -1,4 +1,4 @@
-"""Commands of operators, carried out in the measuring process."""
+"""Operators' commands, executed in the measuring process."""
 
 import asyncio
 
@@ -12,14 +12,14 @@ from service.measuring.recorder import NotStoredError, Recorder
 from service.store.port import StoreError
 
 STORED_WITHIN_S = 10.0
-"""Maximum wait for the disk."""
+"""Maximum wait until an action is on the disk, s."""
 
 ANSWERS_WITHIN_S = 10.0
-"""Maximum wait for the empty transaction before an action."""
+"""Maximum wait for the empty transaction before an action, s."""
 
 
 class LocalCommands:
-    """Applies commands to the alarms and films of this process."""
+    """Operators' commands, applied to the alarms and films of this process."""
 
     def __init__(self, alarms: AlarmEngine, films: FilmMonitor, recorder: Recorder) -> None:
         self._alarms, self._films, self._recorder = alarms, films, recorder
@@ -64,5 +64,5 @@ class LocalCommands:
         await self._films.act(place, action, actor, reason)
 
     async def refer_to(self, reference: VectorReference) -> None:
-        """Compare 1× vectors with a new reference."""
+        """Set the reference of a bearing's 1× vectors."""
         self._alarms.set_reference(reference)

@@ -1,4 +1,4 @@
-"""Recorder of findings: in order, in batches, with retries and a file of refused rows."""
+"""Recorder: writes findings to the store in order and in batches, with retries."""
 
 import asyncio
 import json
@@ -29,7 +29,7 @@ from service.store.store import Store
 FILE = "parked.jsonl"
 
 MAX_BYTES = 16_000_000
-"""Maximum size of the file and of its predecessor: a damaged page refuses every result."""
+"""Maximum size of the file and of its predecessor; on a damaged database all rows are refused."""
 
 
 class ParkedRows:
@@ -39,12 +39,12 @@ class ParkedRows:
         self.path = path
 
     def add(self, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
-        """Append rows with the reason of each, and sync them to the disk.
+        """Append pairs of row and reason, and sync the file to the disk.
 
         Raises
         ------
         OSError
-            If the disk refuses.
+            If the file cannot be written.
         """
         lines = [
             json.dumps(
@@ -78,7 +78,7 @@ log = structlog.get_logger()
 RETRY_S = 1.0
 
 MAX_NEWS = 100_000
-"""Maximum number of alarm news in the queue; about 100 MB."""
+"""Maximum number of queued `AlarmNews`; about 100 MB."""
 
 GIVEN_UP = "given_up"
 
@@ -91,7 +91,7 @@ class NotStoredError(Exception):
 
 @dataclass(frozen=True)
 class Findings:
-    """Findings from one block, stored together or not at all."""
+    """Results, gaps and news from one block, stored in one transaction."""
 
     assessments: Sequence[Assessment] = ()
     gaps: Sequence[UnitGap] = ()
@@ -101,7 +101,7 @@ class Findings:
 
     @property
     def parts(self) -> Iterator["Findings"]:
-        """Each row by itself, in an order in which they can be stored."""
+        """Findings with one row each, in an order in which they can be stored."""
         yield from (Findings(alarms=[news]) for news in self.alarms)
         yield from (Findings([assessment]) for assessment in self.assessments)
         yield from (Findings(gaps=[gap]) for gap in self.gaps)
@@ -111,14 +111,14 @@ class Findings:
 
     @property
     def row(self) -> object:
-        """The only row of a part."""
+        """First row of the findings; the only row of a part."""
         return next(iter((*self.alarms, *self.assessments, *self.gaps, *self.films, self.position)))
 
 
 class Recorder:
-    """Writes findings to the store in a thread, so that a slow disk does not delay samples.
+    """Queue of findings that a thread writes to the store; a slow disk does not delay samples.
 
-    A row that the database refuses is written to a file, and the others are stored.
+    Rows refused by the database are written to a file; all other rows are stored.
 
     Parameters
     ----------
@@ -126,13 +126,13 @@ class Recorder:
         File of refused rows.
     capacity
         Maximum number of queued findings; above it the oldest are dropped and counted in
-        :attr:`LiveView.n_unstored`. Alarm news has a queue of its own, up to `MAX_NEWS`.
+        :attr:`LiveView.n_unstored`. Alarm news has its own queue, up to `MAX_NEWS`.
     on_stored
-        Called after alarm news was written.
+        Function that is called after alarm news was written.
     timed
-        Context manager around each write, in the thread.
+        Factory of a context manager around each write, in the thread.
     finds_again
-        Whether the next process repeats the findings that were not written, from a stream.
+        Whether the next process reproduces the findings that were not written, from a stream.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class Recorder:
         self._news = asyncio.Event()
         self._progress = asyncio.Condition()
         self._outcomes: dict[int, asyncio.Future[str | None]] = {}
-        # not the default threads, which may all be busy with requests
+        # the default threads may all be busy with requests
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="recorder")
 
     @property
@@ -167,13 +167,13 @@ class Recorder:
 
     @property
     def behind_s(self) -> float:
-        """Time for which the queue has waited without any write."""
+        """Time that queued findings have waited without any write, s; 0 if the queue is empty."""
         if not (self._waiting or self._alarms):
             return 0.0
         return self._clock.monotonic_s() - self._waits_since_s
 
     def put(self, findings: Findings) -> None:
-        """Queue findings."""
+        """Queue findings for writing."""
         if not (self._waiting or self._alarms):
             self._waits_since_s = self._clock.monotonic_s()
         if findings.assessments or findings.gaps or findings.position:
@@ -191,7 +191,7 @@ class Recorder:
         Raises
         ------
         NotStoredError
-            If it was dropped or refused.
+            If the alarm news was dropped or refused.
         """
         if not self._alarms:
             return
@@ -202,14 +202,14 @@ class Recorder:
             raise NotStoredError(refusal)
 
     async def reached(self, position: StreamPosition) -> None:
-        """Wait without limit until a queued position is on the disk."""
+        """Wait without limit until a queued stream position is on the disk."""
         async with self._progress:
             await self._progress.wait_for(
                 lambda: all(findings.position is not position for findings in self._waiting)
             )
 
     async def require_store(self) -> None:
-        """Write an empty transaction.
+        """Check the store by writing an empty transaction.
 
         Raises
         ------
@@ -220,7 +220,7 @@ class Recorder:
         await loop.run_in_executor(self._thread, self._store.append, [], [])
 
     async def settled(self) -> None:
-        """Wait until the queue is on the disk, or the store has failed."""
+        """Wait until the queue is written or the store has failed."""
         async with self._progress:
             await self._progress.wait_for(
                 lambda: self._live.store_error or not (self._waiting or self._alarms)
@@ -238,7 +238,7 @@ class Recorder:
                     await self._clock.sleep(RETRY_S)
 
     async def flush(self) -> None:
-        """Write the queue once, at the end of the process."""
+        """Try once to write the queue, at the end of the process."""
         if (self._waiting or self._alarms) and not await self._write():
             counts = {"n_findings": len(self._waiting), "n_alarm_news": len(self._alarms)}
             if self._finds_again:
@@ -283,7 +283,7 @@ class Recorder:
         return True
 
     def _append(self, batch: Iterable[Findings]) -> list[tuple[object, str]]:
-        """Store findings; park the rows that are refused and return them with the reasons."""
+        """Store findings; write refused rows to the file and return them with the reasons."""
         refused: list[tuple[object, str]] = []
         with self._timed():
             self._append_parts([part for findings in batch for part in findings.parts], refused)
@@ -295,7 +295,7 @@ class Recorder:
         return refused
 
     def _append_parts(self, parts: Sequence[Findings], refused: list[tuple[object, str]]) -> None:
-        """Store parts in one transaction; if that is refused, store each half."""
+        """Store parts in one transaction; if the transaction is refused, store each half."""
         try:
             self._store.append(
                 [row for part in parts for row in part.assessments],
@@ -327,7 +327,7 @@ class Recorder:
             log.error("results cannot be stored", n_parked=len(refused), reason=reason)
 
     def _resolve(self, news: AlarmNews, refusal: str | None) -> None:
-        """Report to waiting callers whether alarm news was stored."""
+        """Resolve the future of alarm news; `refusal` is None if it was stored."""
         outcome = self._outcomes.pop(id(news), None)
         if outcome is not None and not outcome.done():
             outcome.set_result(refusal)

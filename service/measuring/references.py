@@ -1,4 +1,4 @@
-"""References of the shaft centre and of 1×: in force, given, or from newest readings."""
+"""Gap references and 1× vector references: in force, given by a user, or from the newest result."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -27,18 +27,18 @@ log = structlog.get_logger()
 LOOK_EVERY_S = 2.0
 
 Key = tuple[str, str]
-"""Unit and bearing."""
+"""Unit id and bearing id."""
 
 
 def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:
-    """Return whether x and y have an opposite probe."""
+    """Return whether the axes x and y have an opposite probe."""
     return bearing.opposite_x is not None, bearing.opposite_y is not None
 
 
 def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
-    """Return a bearing with a stored reference in place of that of the plant file.
+    """Return a bearing with its gap reference replaced by a stored reference.
 
-    Without gaps of the opposite probes, those of the plant file remain.
+    If the stored reference has no gaps of opposite probes, those of the plant file remain.
     """
     opposite = reference.opposite_reference_um
     if opposite is None or not any(opposite_axes(bearing)):
@@ -51,7 +51,7 @@ def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
 
 
 class HasUnit(Protocol):
-    """A monitor, or the description of a unit that another process monitors."""
+    """Protocol of objects with a replaceable unit description, such as a monitor."""
 
     unit: Unit
 
@@ -61,7 +61,7 @@ class HasUnit(Protocol):
 
 
 class ReferencesInForce:
-    """References in force: the newest stored ones, else those of the plant file.
+    """Gap references in force: the newest stored reference, else that of the plant file.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class ReferencesInForce:
         self._trouble = TroubleLog("references cannot be read", "references can be read again")
 
     def of(self, unit: str, bearing: str) -> GapReference | None:
-        """Return the stored reference of a bearing; None if that of the plant file is in force."""
+        """Return the stored reference of a bearing; None if the plant file's is in force."""
         return self._in_force.get((unit, bearing))
 
     def bearing(self, unit: str, bearing: str) -> Bearing:
@@ -91,14 +91,14 @@ class ReferencesInForce:
         return described if reference is None else with_reference(described, reference)
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Read stored references periodically, until cancelled."""
+        """Read the stored references periodically until cancelled."""
         while True:
             pulse.beat(LOOK_EVERY_S)
             await self._clock.sleep(LOOK_EVERY_S)
             await self.look()
 
     async def look(self) -> None:
-        """Read stored references once; after an error, those in force remain."""
+        """Read the stored references once; after an error, references in force are unchanged."""
         try:
             found = await asyncio.to_thread(self._store.references)
         except StoreError as error:
@@ -136,14 +136,14 @@ class ReferencesInForce:
 
 
 MAX_AGE_S = 600.0
-"""Maximum age of gaps that are taken as the present ones."""
+"""Maximum age, s, of a result whose gaps are used as a reference."""
 
 NEAR_GAPS = ("gap_x_um", "gap_y_um")
 OPPOSITE_GAPS = ("opposite_gap_x_um", "opposite_gap_y_um")
 
 GivenPair = tuple[float | None, float | None]
 Gaps = tuple[MicrometrePair, MicrometrePair | None]
-"""Gaps of the probes on the positive axes, and of the opposite probes if there are any."""
+"""Gaps (x, y) of the probes on the positive axes; gaps of the opposite probes or None."""
 
 
 class ReferenceRefusedError(Exception):
@@ -179,7 +179,7 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
     Raises
     ------
     ReferenceRefusedError
-        If there is none, it is older than ten minutes, or its gaps are not usable.
+        If there is no result, its age exceeds ten minutes, or its gaps are not usable.
     """
     if newest is None:
         raise ReferenceRefusedError("there is no stored result yet")
@@ -203,7 +203,7 @@ def doubts(newest: StoredReadings) -> list[str]:
 
 
 def _across(bearing: Bearing, near: MicrometrePair, found: GivenPair) -> MicrometrePair | None:
-    """Return the gaps of the opposite probes; that of an axis without one is not used."""
+    """Return the gaps of the opposite probes; the value of an axis without one is a placeholder."""
     if not any(opposite_axes(bearing)):
         return None
     unused = bearing.opposite_reference_um or near
@@ -233,7 +233,7 @@ def _usable(newest: StoredReadings, name: str) -> float:
 
 
 NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMENTS)
-"""Reasons for which an amplitude cannot be a reference."""
+"""Quality reasons with which an amplitude cannot be a reference."""
 
 
 class VectorRefusedError(Exception):

@@ -1,4 +1,4 @@
-"""Alarms whose conditions are reported from outside the monitors."""
+"""Alarms whose conditions are reported by components other than the monitors."""
 
 from collections.abc import Iterable, Sequence
 
@@ -11,7 +11,7 @@ from service.settings.alarm_kinds import ANALYSIS_GONE, MESSAGES_REFUSED, STREAM
 
 
 class ReportedAlarms(AlarmBoard):
-    """Alarms whose conditions are reported from outside and judged at the next tick."""
+    """Alarms whose conditions are reported by other components and evaluated at the next tick."""
 
     def __init__(self, watches: Iterable[Watch]) -> None:
         self._watches = {watch.id: watch for watch in watches}
@@ -30,7 +30,7 @@ class ReportedAlarms(AlarmBoard):
         self._once.add(id_)
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Judge the reported conditions."""
+        """Update the alarms from the reported conditions."""
         for id_, condition in self._found.items():
             self.update(self._watches[id_], condition, host_ns)
         self._found |= dict.fromkeys(self._once, WITHIN)
@@ -39,23 +39,23 @@ class ReportedAlarms(AlarmBoard):
 
 
 SHARED = "shared work"
-"""Name in place of a unit for reports and commands about shared alarms. No unit can have it."""
+"""Name used instead of a unit in reports and commands about shared alarms; not a valid unit id."""
 
 
 def is_shared(alarm: Alarm) -> bool:
-    """Return whether an alarm belongs to the process that does the shared work."""
+    """Return whether an alarm belongs to the process with the shared work."""
     return alarm.identity.kind == ANALYSIS_GONE
 
 
 def gone_alarms(units: Iterable[str]) -> ReportedAlarms:
-    """Return the alarms about units without analysis."""
+    """Return the alarms about units that no process analyses."""
     return ReportedAlarms(Watch(identity_of(unit), rule_of(0.0, 0.0), unit) for unit in units)
 
 
 def report_silence(
     alarms: ReportedAlarms, silent: Sequence[str], alive: Sequence[str], after_s: float
 ) -> None:
-    """Report which units are analysed, and which have been silent for too long."""
+    """Update the alarms of units that are analysed, and of units not analysed for `after_s` s."""
     reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
     gone = Judgement(AlarmLevel.DANGER, reason=reason)
     for units, condition in ((silent, gone), (alive, WITHIN)):
@@ -64,15 +64,15 @@ def report_silence(
 
 
 def identity_of(unit: str) -> AlarmIdentity:
-    """Return the alarm about a unit without analysis."""
+    """Return the identity of the alarm about a unit that no process analyses."""
     return AlarmIdentity(PLANT, unit, ANALYSIS_GONE)
 
 
 REFUSED_FOR_S = 600.0
-"""Duration of the alarm after the last refused message."""
+"""Duration of the alarm after the last refused message, s."""
 
 MAX_REASON = 200
-"""Maximum length of a reason; a refused message may contain anything."""
+"""Maximum length of a reason, which may contain arbitrary text of a refused message."""
 
 
 def stream_alarms(units: Iterable[str]) -> ReportedAlarms:

@@ -33,20 +33,20 @@ class ServiceHealth:
     Parameters
     ----------
     readings
-        Readings that the table of alarm kinds names: a number for the limits of the kind, the text
-        of a fault, or None.
+        Readings by their names in the table of alarm kinds: a number to compare with limits, the
+        text of a fault, or None.
     store_error
-        Why the store refused the newest write; None if it did not.
+        Reason why the store refused the newest write; None if it was accepted.
     store_behind_s
-        Time for which findings have waited without any being written.
+        Time that queued findings have waited without any write.
     n_unstored, unstored_reason
-        Findings since the start that were not stored, and why the newest of them was not.
+        Number of findings since the start that were not stored, and the newest reason.
     n_recordings_damaged
-        Recordings that were found damaged or missing since the start.
+        Number of recordings found damaged or missing since the start.
     accounts
-        Account of samples of each unit that has sent samples since the start.
+        Sample account of each unit that has sent samples since the start.
     disk
-        Judges the fullest disk, given the level of the condition before.
+        Function that evaluates the fullest disk, given the previous level of the condition.
     """
 
     readings: Mapping[str, float | str | None] = field(default_factory=dict)
@@ -69,9 +69,9 @@ class StreamStatus:
     Parameters
     ----------
     trouble
-        Returns why no blocks arrive; None if they do.
+        Function that returns the reason why no blocks arrive; None if they arrive.
     behind_s
-        Returns the age of the block analysed last.
+        Function that returns the age of the block analysed last.
     """
 
     trouble: Callable[[], str | None]
@@ -81,7 +81,7 @@ class StreamStatus:
 log = structlog.get_logger()
 
 STEP_S = 0.5
-"""Change of the clock at once that shows it was set; a disciplined clock is slewed."""
+"""Smallest step of the clock, s, that is treated as a set clock; NTP slews smaller errors."""
 
 
 class HostTime:
@@ -92,10 +92,7 @@ class HostTime:
         self._seen: tuple[int, float] | None = None
 
     def look(self) -> tuple[int, bool]:
-        """Return UTC nanoseconds, and whether the clock was set since the last call.
-
-        The difference then counts for no delay.
-        """
+        """Return UTC nanoseconds, and whether the clock was set since the last call."""
         now_ns, steady_s = self._clock.now_ns(), self._clock.monotonic_s()
         before, self._seen = self._seen, (now_ns, steady_s)
         if before is None:
@@ -108,10 +105,10 @@ class HostTime:
 
 
 FULL_SHARE = 0.9
-"""Filled share of the queue at which acquisition is about to wait."""
+"""Filled fraction of the queue above which acquisition is about to wait."""
 
 LOSS_MINUTES = 10
-"""Window of the share of lost samples, and duration of an alarm about lost results."""
+"""Window of the fraction of lost samples, and duration of an alarm about lost results."""
 
 AT_ONCE, STEADY = rule_of(0.0, 0.0), rule_of(5.0, 30.0)
 
@@ -125,13 +122,13 @@ class ServiceRules:
     store_behind
         Limit of the time that results wait for the store, s.
     waiting
-        Limits of the filled share of the queue to the analysis.
+        Limits of the filled fraction of the queue to the analysis.
     delay
-        Limit of the time that samples wait in it, s.
+        Limit of the waiting time of samples in the queue, s.
     loss
-        Limit of the share of lost samples of a unit in ten minutes.
+        Limit of the fraction of lost samples of a unit in ten minutes.
     at_once, steady, lasting
-        Rules without limits: without delay, with delays, and lasting for ten minutes.
+        Rules without limits: no delays, delays of 5 s and 30 s, and an off-delay of ten minutes.
     """
 
     store_behind: LimitRule = field(default_factory=lambda: LimitRule(Limits(10.0), AT_ONCE))
@@ -146,7 +143,7 @@ class ServiceRules:
 
 
 def service_rules_of(alarms: AlarmSettings) -> ServiceRules:
-    """Return the rules of the plant file."""
+    """Return the service rules from the alarm settings of the plant file."""
     share, delay_s = alarms.max_waiting_share, alarms.max_analysis_delay_s
     waiting = Limits(share, FULL_SHARE if share < FULL_SHARE else None, share / 5)
     return ServiceRules(
@@ -158,12 +155,12 @@ def service_rules_of(alarms: AlarmSettings) -> ServiceRules:
 
 
 def loss_key(unit: str) -> str:
-    """Return the key of the alarm about lost samples of a unit."""
+    """Return the key of a unit's lost-samples alarm."""
     return f"{SAMPLES_LOST}:{unit}"
 
 
 def reporting_unit(identity: AlarmIdentity) -> str:
-    """Return the unit whose process reports an alarm, also an alarm of the plant."""
+    """Return the unit whose process reports an alarm; for a lost-samples alarm, its subject."""
     return identity.subject if identity.kind == SAMPLES_LOST else identity.unit
 
 
@@ -173,17 +170,17 @@ LOOK_EVERY_NS = 10 * NS_PER_S
 
 
 class SampleLoss:
-    """Share of the samples of a unit that were lost or rejected in the last ten minutes.
+    """Fraction of a unit's samples that were lost or rejected in the last ten minutes.
 
-    Repeated samples count as lost if they outnumber the new ones: only a device that restarts its
-    count with its clock set back repeats samples for minutes.
+    Repeated samples count as lost if they outnumber new samples: only a device that restarts its
+    sample count with its clock set back repeats samples for minutes.
     """
 
     def __init__(self) -> None:
         self._seen: deque[tuple[int, int, int, int]] = deque()
 
     def share(self, account: SampleAccount, now_ns: int) -> float:
-        """Update with the account of the unit and return the share."""
+        """Update from the unit's sample account and return the lost fraction."""
         offered = account.n_offered
         lost = account.n_gap + sum(account.rejected.values())
         if self._seen and offered < self._seen[-1][1]:
@@ -198,24 +195,24 @@ class SampleLoss:
         return (lost - lost_then + n_dropped) / max(n_new + n_dropped, 1)
 
     def is_complete(self, now_ns: int) -> bool:
-        """Return whether the account covers the last ten minutes, or nearly."""
+        """Return whether the account covers the last ten minutes, up to one update period."""
         return bool(self._seen) and now_ns - self._seen[0][0] >= LOSS_NS - LOOK_EVERY_NS
 
 
 class ServiceAlarms(AlarmBoard):
-    """Alarms without a unit, and alarms of units that are no longer in the plant file.
+    """Alarms about the service, and alarms of units that are no longer in the plant file.
 
     Parameters
     ----------
     units
-        Units whose lost samples are judged.
+        Units with an alarm about lost samples.
     rules
         Rules of the alarms.
     look
-        Returns the health of the service; without it nothing is judged.
+        Function that returns the health of the service; None disables the alarms.
     leads
-        Whether this process judges what concerns the whole plant; each process judges the lost
-        samples of its own units.
+        Whether this process evaluates the alarms of the whole plant; each process evaluates the
+        lost samples of its own units.
     """
 
     def __init__(
@@ -228,7 +225,7 @@ class ServiceAlarms(AlarmBoard):
     ) -> None:
         self._look, names = look, list(units) if look else []
         subjects = {loss_key(unit): (unit, SERVICE_KINDS[SAMPLES_LOST]) for unit in names}
-        # refused messages and units without analysis are judged by unit, elsewhere
+        # `ReportedAlarms` has the alarms about refused messages and units without analysis
         self._judged = [
             kind
             for kind in SERVICE_KINDS.values()
@@ -248,10 +245,10 @@ class ServiceAlarms(AlarmBoard):
     def restore(
         self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
     ) -> list[AlarmNews]:
-        """Continue from stored alarms.
+        """Restore stored alarms.
 
         Earlier losses are unknown, so an active alarm about lost samples stays active until this
-        process has seen ten minutes without losses.
+        process has observed ten minutes.
         """
         news = super().restore(stored, host_ns, memory)
         self._inherited = {
@@ -262,7 +259,7 @@ class ServiceAlarms(AlarmBoard):
         return news
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Judge the health of the service."""
+        """Update the alarms from the health of the service."""
         if self._look is not None:
             health = self._look()
             for kind in self._judged:
@@ -293,7 +290,7 @@ class ServiceAlarms(AlarmBoard):
         return self._compared(name, reading)
 
     def _increase(self, name: str, n_found: int, level: AlarmLevel, reason: str) -> Judgement:
-        """Judge a count that should not increase."""
+        """Return the condition of a count that should not increase."""
         n_more, self._counted[name] = n_found - self._counted.get(name, 0), n_found
         return Judgement(level, value=float(n_found), reason=reason) if n_more > 0 else WITHIN
 

@@ -1,4 +1,4 @@
-"""Simulated machines as sources: with constant films, or with a life of wear and damage."""
+"""Simulated machines as sources: with constant films, or with a lifetime of wear and damage."""
 
 from collections.abc import Mapping
 
@@ -31,28 +31,28 @@ from service.settings.sources.simulated import (
 from service.settings.units import UnitSettings
 
 NOISES = {"gap_noise_um_rms", "velocity_noise_mm_s_rms", "acceleration_noise_m_s2_rms"}
-"""Keys of the noise of transducers; by default it is that of real ones."""
+"""Setting keys of the transducer noise; without them, noise of real transducers is used."""
 
 MAX_MISFIT = 0.005
-"""Maximum relative difference between the settings of a unit and its life."""
+"""Maximum relative difference between the settings of a unit and its simulated lifetime."""
 
 
 def simulated_history(
     unit: UnitSettings, now_ns: int, years: float = 1.0
 ) -> Mapping[str, StiffnessHistory]:
-    """Return the readings of a unit's life until now, by bearing; none if it has no life.
+    """Return simulated past readings by bearing; empty if the unit has no simulated lifetime.
 
     Parameters
     ----------
     now_ns
-        Start of the simulated machine, whose samples continue these readings.
+        End of the readings and start time of the simulated machine, whose samples continue them.
 
     Raises
     ------
     ConfigError
-        If the settings of the unit do not fit its life.
+        If the settings of the unit do not fit its simulated lifetime.
     ValueError
-        If the life is shorter.
+        If the simulated lifetime is shorter than `years`.
     """
     simulation = unit.simulation
     if simulation is None or simulation.life_seed is None:
@@ -89,7 +89,7 @@ def _noise(simulation: SimulationSettings) -> TransducerNoise:
 
 
 def _refuse_misfit(unit: UnitSettings, simulation: SimulationSettings) -> None:
-    """Raise `ConfigError` if the settings of a unit do not fit its life."""
+    """Raise `ConfigError` if the settings of a unit do not fit its simulated lifetime."""
     speed_rpm = rated_speed_rpm(simulation.life_seed or 0)
     _compare(unit, "rated_speed_rpm", unit.rated_speed_rpm, speed_rpm)
     if unit.rated_power_mw is not None:
@@ -109,14 +109,14 @@ def _compare(unit: UnitSettings, key: str, found: float, wanted: float) -> None:
 
 
 def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:
-    """Return the simulated machine of a unit, whose first sample is now.
+    """Return the simulated machine of a unit; its first sample is at the present time.
 
     Raises
     ------
     LookupError
-        If the unit has none.
+        If the unit has no simulation settings.
     ConfigError
-        If the settings of the unit do not fit its life.
+        If the settings of the unit do not fit its simulated lifetime.
     """
     simulation, now_ns = unit.simulation, clock.now_ns()
     if simulation is None:
@@ -138,7 +138,7 @@ def scenario_of(simulation: SimulationSettings) -> Scenario:
     Raises
     ------
     LookupError
-        If it has a life instead.
+        If the unit has a simulated lifetime instead.
     """
     if simulation.speed_rpm is None or simulation.power_mw is None:
         raise LookupError("a simulated unit with a life has no constant scenario")

@@ -1,4 +1,4 @@
-"""State of units for publication, from the live objects of the analysing process."""
+"""Snapshots of unit states for publication, from the live objects of the analysing process."""
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
@@ -14,7 +14,7 @@ from service.settings.units import UnitSettings
 
 
 def bearing_state(assessment: Assessment) -> BearingState:
-    """Return a result without its arrays."""
+    """Return the state of a bearing: its result without arrays."""
     names = [each.name for each in fields(BearingState)]
     return BearingState(**{name: getattr(assessment, name) for name in names})
 
@@ -22,7 +22,7 @@ def bearing_state(assessment: Assessment) -> BearingState:
 def unit_state(
     settings: UnitSettings, live: LiveView, alarms: AlarmEngine, films: FilmMonitor
 ) -> UnitState:
-    """Return the state of a unit."""
+    """Return the state of a unit: results, alarms, films and baseline versions."""
     unit, bearings = settings.id, [bearing.id for bearing in settings.bearing]
     own = alarm_state(
         [alarm for alarm in alarms.alarms if reporting_unit(alarm.identity) == unit], alarms
@@ -39,7 +39,7 @@ def unit_state(
 
 
 def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
-    """Return a state with alarms only."""
+    """Return a unit state with alarms only."""
     return UnitState(
         bearings={},
         alarms=tuple(own),
@@ -51,12 +51,12 @@ def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
 
 
 def plant_signs(live: LiveView) -> UnitSigns:
-    """Return the signs of the process itself."""
+    """Return the live signs of the process itself: unstored findings and store error."""
     return UnitSigns(UnitStatus(), None, {}, live.n_unstored, live.store_error)
 
 
 def unit_signs(settings: UnitSettings, live: LiveView) -> UnitSigns:
-    """Return link state and ages of a unit."""
+    """Return the live signs of a unit: link state and ages of samples and results."""
     unit = settings.id
     ages_s = {bearing.id: live.current(unit, bearing.id).age_s for bearing in settings.bearing}
     return UnitSigns(

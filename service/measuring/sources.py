@@ -41,7 +41,7 @@ ModbusSettings = (
 
 
 def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
-    """Return the adapter's settings of a device with a register map."""
+    """Return the adapter settings of a device with a register map."""
     return PolledSettings(
         **link_fields(device),
         poll_period_s=device.poll_period_s,
@@ -52,7 +52,7 @@ def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
 def modbus_source(
     source: ModbusSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
 ) -> SampleSource:
-    """Return the source of a Modbus device; its monitor is that of `monitor_for`."""
+    """Return the sample source of a Modbus device; see `monitor_for` for the matching monitor."""
     ids = [channel.id for channel in unit.channels]
     match source:
         case ModbusPolledSettings():
@@ -83,7 +83,10 @@ def modbus_source(
 
 
 def monitor_for(source: SourceSettings, unit: Unit, settings: AnalysisSettings) -> UnitMonitor:
-    """Return the monitor of a unit; a poll of a polled device is a sample or a set of vectors."""
+    """Return the monitor of a unit that matches the kind of its source.
+
+    A poll of a polled device is a sample or a set of vectors.
+    """
     match source:
         case ModbusVectorSettings():
             unit = replace(unit, rate_hz=source.rate_hz)
@@ -97,12 +100,12 @@ def monitor_for(source: SourceSettings, unit: Unit, settings: AnalysisSettings) 
 
 @dataclass(frozen=True)
 class WatchedUnit:
-    """Source of a unit, and the monitor of its blocks.
+    """Sample source of a unit, and the monitor of its blocks.
 
     Parameters
     ----------
     retry_s
-        Maximum wait before a lost link is tried again: the poll period of the source, so that
+        Maximum wait before a lost link is reconnected: the poll period of the source, so that
         samples arrive within two periods after the device is back.
     """
 
@@ -112,16 +115,16 @@ class WatchedUnit:
 
 
 DEFAULT_RETRY_S = 0.5
-"""Retry period of sources that are not polled."""
+"""Retry period of sources that are not polled, s."""
 
 QUEUE_RETRY_S = 0.25
-"""Retry period of queues, which are polled 200 times a second."""
+"""Retry period of FIFO sources, s; they are polled 200 times per second."""
 
 
 def watched_units(
     plant: PlantFile, source: Callable[[UnitSettings], SampleSource]
 ) -> dict[str, WatchedUnit]:
-    """Return source and monitor of every unit of a plant."""
+    """Return the source and the monitor of every unit of a plant, by unit."""
     return {
         unit.id: WatchedUnit(source(unit), monitor_of(unit, plant.analysis), retry_s(unit))
         for unit in plant.unit
@@ -129,12 +132,12 @@ def watched_units(
 
 
 def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
-    """Return the monitor of a unit of a plant file."""
+    """Return the monitor of a unit from its settings in the plant file."""
     return monitor_for(unit.source, machine_of(unit), analysis_of(analysis))
 
 
 def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
-    """Return all units with the sources of the plant file."""
+    """Return the units of the plant file with their sources and monitors, by unit."""
     return watched_units(plant, lambda unit: TimedSource(partial(source_of, unit), clock))
 
 
@@ -148,7 +151,7 @@ def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
 
 
 def retry_s(unit: UnitSettings) -> float:
-    """Return the wait before a lost link of a unit is tried again."""
+    """Return the maximum wait before a lost link of a unit is reconnected, s."""
     if isinstance(unit.source, ModbusFifoSettings):
         return QUEUE_RETRY_S
     period_s: float = getattr(unit.source, "poll_period_s", DEFAULT_RETRY_S)
@@ -156,7 +159,7 @@ def retry_s(unit: UnitSettings) -> float:
 
 
 def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
-    """Return the source of a unit, joined with that of its slow values if there is one."""
+    """Return the sample source of a unit, joined with its slow source if configured."""
     calibration, slow = calibration_of(unit), unit.slow_source
     if slow is None:
         return _main_source(unit, calibration, clock)

@@ -1,4 +1,4 @@
-"""Durations of evaluations and commits."""
+"""Measured durations of assessments and commits."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -12,10 +12,11 @@ from service.runtime.metrics import Durations
 from service.runtime.polls import TimedSource
 
 ASSESSMENT_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0)
-"""An assessment takes some milliseconds."""
+"""Histogram bounds of the duration of an assessment, which takes some milliseconds."""
 
 COMMIT_BOUNDS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
-"""A commit waits for the disk, and for at most five seconds for the lock of the database."""
+"""Histogram bounds of the duration of a commit, which waits for the disk and up to five seconds
+for the database lock."""
 
 
 class Timings:
@@ -36,12 +37,12 @@ class Timings:
 
 
 class TimedMonitor(UnitMonitor):
-    """A monitor that measures the durations of its assessments.
+    """Unit monitor that measures the durations of its assessments.
 
     Parameters
     ----------
     monitor
-        Monitor whose state is taken over; it must not be used afterwards.
+        Monitor whose state is moved to this object; it must not be used afterwards.
     """
 
     def __init__(self, monitor: UnitMonitor, timings: Timings) -> None:
@@ -67,6 +68,6 @@ def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, Watch
 
 
 def timed_sources(units: Mapping[str, WatchedUnit]) -> dict[str, TimedSource]:
-    """Return the timed sources by unit."""
+    """Return the sources that measure their polls, by unit."""
     sources = {unit: watched.source for unit, watched in units.items()}
     return {unit: each for unit, each in sources.items() if isinstance(each, TimedSource)}
