@@ -230,7 +230,7 @@ class Commands(Tables):
     """Queue of operator commands; each command is executed at most once."""
 
     def ask(self, command: Command) -> None:
-        """Add a command and delete expired rows; adding the same command again has no effect."""
+        """Add a command and delete old ones; adding the same command again has no effect."""
         with self._writing() as writer:
             writer.execute(FORGET, (command.asked_ns - KEPT_NS,))
             writer.execute(INSERT, astuple(command))
