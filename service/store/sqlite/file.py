@@ -114,7 +114,7 @@ OF_THE_ROW = frozenset({11, 18, 19, 20})
 ``SQLITE_TOOBIG``, ``SQLITE_CONSTRAINT``, ``SQLITE_MISMATCH``)."""
 
 BY_TRIGGER = 1811
-"""Extended result code of an error raised by a trigger (``SQLITE_CONSTRAINT_TRIGGER``)."""
+"""Extended result code of an error raised by a trigger, which no insertion of padwatch causes."""
 
 PAGE_ROOM = 65_536
 """Distance from the limit of file sizes, bytes, at which a transaction may no longer fit."""
