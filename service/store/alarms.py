@@ -33,7 +33,7 @@ ALARM_COLUMNS = (
     *("shelf_until_ns", "outage_actor", "outage_reason", "outage_since_ns", *POINT_COLUMNS),
 )
 UPSERT = upsert("alarm", ALARM_COLUMNS, ("id",)) + " WHERE alarm.n_events <= excluded.n_events"
-"""The condition on ``n_events`` keeps a later state when an earlier state is written again."""
+"""Statement that writes the state of an alarm; an earlier state does not replace a later one."""
 
 EVENT_COLUMNS = (
     *("alarm", "number", "unit", "subject", "kind", "change", "level", "state_before"),

@@ -198,7 +198,7 @@ def _copy(database: Path, aside: Path) -> Content:
         source.execute("BEGIN")  # rows are counted and copied in the same state
         content = content_of(source)
         source.backup(target)
-        target.execute("PRAGMA journal_mode = DELETE")  # one file, without a log beside it
+        target.execute("PRAGMA journal_mode = DELETE")  # one file, without a WAL file
     return content
 
 
@@ -217,7 +217,8 @@ def _name(now_ns: int) -> str:
 
 
 LOGS = ("-wal", "-shm")
-"""Suffixes of the WAL files that SQLite keeps beside an open database, also after a crash."""
+"""Suffixes of the WAL and shared-memory files, which SQLite keeps beside an open database and
+leaves after a crash."""
 
 
 @dataclass(frozen=True)

@@ -46,7 +46,7 @@ class Connection(Protocol):
     """Database connection within a transaction; used by one thread at a time."""
 
     def execute(self, statement: str, parameters: Parameters = ..., /) -> Rows:
-        """Run a statement. Its result may be held in memory as a whole, so limit its rows."""
+        """Run a statement. The whole result may be held in memory, so queries must be bounded."""
         ...
 
     def executemany(self, statement: str, parameters: Iterable[Parameters], /) -> Rows:

@@ -41,7 +41,7 @@ class FilmQuery:
     states
         Operating states to include; empty for all.
     newest
-        Maximum number of readings, of all that match the newest ones; None for all.
+        Maximum number of readings; older matching readings are omitted. None for all.
     """
 
     unit: str

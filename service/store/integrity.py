@@ -53,7 +53,7 @@ class Integrity:
 
     @property
     def damaged(self) -> Sequence[Place]:
-        """Damaged rows found since the start; a limited number is listed."""
+        """Damaged rows found since the start, at most `seals.MAX_PLACES`."""
         return self._damage.places
 
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:

@@ -34,7 +34,7 @@ class RetentionLoop:
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Run forever."""
+        """Delete old data periodically; never returns."""
         while True:
             if not await self.round(pulse):
                 await rest(RETENTION_PERIOD_S, self._clock, pulse)
@@ -84,7 +84,7 @@ class RollupLoop:
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Run forever."""
+        """Aggregate readings periodically; never returns."""
         while True:
             pulse.beat(ROLLUP_PERIOD_S)
             if not await self._round(pulse):
@@ -126,7 +126,7 @@ class ScrubLoop:
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Run forever."""
+        """Check rows periodically; never returns."""
         while True:
             pulse.beat(LOOK_S)
             if await self.look(pulse):

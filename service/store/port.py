@@ -48,7 +48,7 @@ class TrendQuery:
     max_points
         If the range has more readings, they are aggregated into buckets of equal width.
     hole_ns
-        Maximum interval between two readings without a hole between them.
+        Longest interval between consecutive readings that is not a hole in the trend.
     states
         Operating states to include; empty for all.
     is_page

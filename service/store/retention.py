@@ -80,7 +80,7 @@ BELIEVED = """
     ) AS start_ns FROM series) AS believed
 """
 BELIEVED_HOURS = (HOUR_NS // NS_PER_S, 23)
-"""Parameters of `BELIEVED`, which selects the 24th newest hour with results of any bearing.
+"""Parameters of `BELIEVED`: roll-up width, and offset of the 24th newest hour with results.
 The query has no DISTINCT, since SQLite 3.40 then returns the oldest hour if there are fewer."""
 
 
@@ -197,7 +197,7 @@ class RetentionStore(Tables):
             return [int(row[0]) for row in reader.execute("SELECT id FROM series ORDER BY id")]
 
     def believed_ns(self) -> int | None:
-        """Return the start of the 24th newest hour with results; None with fewer hours."""
+        """Return the latest of the bearings' 24th newest hours with results; None without one."""
         with self._reading() as reader:
             found: int | None = reader.execute(BELIEVED, BELIEVED_HOURS).fetchone()[0]
         return found

@@ -191,7 +191,8 @@ OTHERWISE_KEPT = frozenset({"spectrum", "high_water", "rollup_redo"})
 SCHEMA = "CREATE TABLE IF NOT EXISTS seal_schema (id INTEGER PRIMARY KEY, number INTEGER)"
 SEALED_AT = "SELECT number FROM seal_schema WHERE id = 1"
 SET_SEALED_AT = "INSERT OR REPLACE INTO seal_schema VALUES (1, ?)"
-"""Writes the schema and format of the checksums; after a migration they are recomputed."""
+"""Statement that writes the schema and format of the checksums, which are recomputed after a
+migration, since it may change rows."""
 PER_FORMAT = 1_000_000
 """Factor of the format in the stored number, ``format * PER_FORMAT + schema``."""
 
@@ -346,7 +347,7 @@ class Walk:
 
 
 def walks(table: SealedTable) -> tuple[Walk, Walk]:
-    """Return the walk over the rows, to find altered rows, and over the checksums, for missing."""
+    """Return the walk over the rows, which finds altered rows, and over the checksums (missing)."""
     keys, of_seals = _keys(table, "r."), _keys(table, "s.")
     row = f"SELECT 1 FROM main.{table.name} AS r WHERE {table.matched('s.', 'r.')}"  # noqa: S608
     rows = f"SELECT {keys}, {table.is_whole('r.')} FROM main.{table.name} AS r"  # noqa: S608

@@ -78,7 +78,7 @@ UPDATE_BEAT = """
     last_sample_ns = :last_sample_ns, signs = :signs
     WHERE unit = :unit AND process = :process AND revision = :revision
 """
-"""Statement that does not write the state document, which is large."""
+"""Statement that updates a report without its state document, which is large."""
 
 UPSERT_REPORT = upsert("unit_status", [*REPORT_COLUMNS, "process"], ("unit",))
 SELECT_BEATS = (
@@ -106,7 +106,7 @@ class UnitStates(Tables):
             return [UnitBeat(*row) for row in reader.execute(SELECT_BEATS)]
 
     def states(self, units: Collection[str]) -> dict[str, tuple[str, int, bytes]]:
-        """Return the process, revision and state document of each unit that has a report."""
+        """Return process, revision and state document of the given units that have a report."""
         with self._reading() as reader:
             found = {unit: reader.execute(SELECT_STATE, (unit,)).fetchone() for unit in units}
         return {
@@ -236,7 +236,7 @@ class Commands(Tables):
             writer.execute(INSERT, astuple(command))
 
     def open(self, units: Collection[str]) -> list[OpenCommand]:
-        """Return the commands of some units that have no final answer, oldest first."""
+        """Return the commands of the given units that have no final answer, oldest first."""
         with self._reading() as reader:
             rows = reader.execute(SELECT_OPEN, (MAX_OPEN,)).fetchall()
         found = [OpenCommand(Command(*row[:-1]), row[-1]) for row in rows]
@@ -307,7 +307,7 @@ WRITE_POSITION = upsert("stream_position", POSITION_COLUMNS, ("unit",)) + (
     " WHERE stream_position.stream <> excluded.stream"
     " OR stream_position.sequence < excluded.sequence"
 )
-"""The condition prevents a delayed process from setting a position back."""
+"""Statement that writes a stream position; a delayed process cannot set a position back."""
 
 READ_POSITION = f"SELECT {', '.join(POSITION_COLUMNS)} FROM stream_position WHERE unit = ?"  # noqa: S608
 

@@ -198,7 +198,8 @@ TRIM = """
         ORDER BY id DESC LIMIT 1 OFFSET :n_kept
     )
 """
-"""Deletes by order of insertion, so that a temporarily wrong clock does not delete new spectra."""
+"""Statement that deletes spectra by order of insertion, so that a temporarily wrong clock does not
+displace newer spectra."""
 
 IN_RANGE = """
     SELECT min(id), time_ns FROM spectrum WHERE series = ? AND time_ns >= ? AND time_ns < ?
@@ -217,7 +218,7 @@ JUDGED = tuple(
 def insert_spectra(
     writer: Connection, assessments: Iterable[Assessment], limits: SpectraLimits
 ) -> None:
-    """Insert the first spectrum of each interval of each tier, and delete the oldest spectra."""
+    """Insert the first spectrum of each interval of each tier; delete those beyond the maximum."""
     for assessment in assessments:
         spectrum = assessment.spectrum
         if spectrum.frequency_hz.size and spectrum.n_segments.diagonal().any():

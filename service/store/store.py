@@ -43,7 +43,7 @@ from service.store.trends import storable
 from service.store.waveforms import WaveformStore
 
 MAX_GAPS = 5000
-"""Maximum number of gaps that are returned."""
+"""Maximum number of gaps that `Store.gaps` returns."""
 
 INSERT_ASSESSMENT = """
     INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)
@@ -56,7 +56,7 @@ INSERT_GAP = """
     INSERT INTO gap (unit, epoch, first_index, n_samples, stop_ns, start_ns, is_estimated)
     VALUES (?,?,?,?,?,?,?) ON CONFLICT DO NOTHING
 """
-"""``OR IGNORE`` would silently drop rows that violate any other constraint."""
+"""Statement that inserts a gap; ``OR IGNORE`` would also hide violations of other constraints."""
 
 SELECT_GAPS = """
     SELECT epoch, first_index, n_samples, stop_ns, start_ns, is_estimated FROM gap WHERE unit = ?
@@ -178,7 +178,7 @@ class Store:
         Raises
         ------
         QueryTooLargeError
-            If there are more than `MAX_GAPS`.
+            If the range has more than `MAX_GAPS` gaps.
         """
         in_range = "AND stop_ns >= ? AND stop_ns < ? ORDER BY stop_ns, first_index LIMIT ?"
         bounds = (unit, storable(start_ns), storable(end_ns), MAX_GAPS + 1)
@@ -202,7 +202,7 @@ class Store:
             return Reach(epoch, stop_index, time_ns, tuple(_gap(row) for row in gaps))
 
     def newest(self, unit: str, bearing: str) -> StoredReadings | None:
-        """Return the newest readings of a bearing; None if there are none."""
+        """Return the newest readings of a bearing; None if the bearing has no readings."""
         with self._reader() as reader:
             row = reader.execute(SELECT_NEWEST, (unit, bearing)).fetchone()
         if row is None:

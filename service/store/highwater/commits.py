@@ -49,7 +49,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class MarkFinding:
-    """Difference between the mark in the file and that in the database.
+    """Difference between the high-water marks in the file and in the database.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ class Mark:
     n_commits
         Total number of committed transactions.
     nonce
-        Random identifier of the transaction; it distinguishes copies that were both written to.
+        Random identifier of the transaction; it differs between independently written copies.
     time_ns
         Time of writing, UTC.
     """

@@ -138,7 +138,7 @@ REMEMBER = """
 
 
 class Scrubber:
-    """Cyclic check of the checksums of all rows; resumes after a restart; not thread-safe.
+    """Cyclic checksum check of all rows, resumed after a restart; used by one thread at a time.
 
     Parameters
     ----------

@@ -128,9 +128,7 @@ class SqliteDatabase:
         for setting in (f"page_size = {PAGE_BYTES}", "auto_vacuum = INCREMENTAL"):
             connection.execute(f"PRAGMA {setting}")  # effective only in a new file
         had_trail = connection.execute(HAS_TRAIL).fetchone() is not None
-        migrate(
-            connection, str(self._path), origin
-        )  # first, so that a foreign file stays unchanged
+        migrate(connection, str(self._path), origin)  # first: a foreign file stays unchanged
         self.writer = Writer(self._path, connection, self.marks, self.seals.begin)
         with self.writer.transaction():
             self.marks.open(connection, in_file)
