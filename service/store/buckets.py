@@ -136,7 +136,7 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int 
     finest_ns
         Width of the finest available roll-ups, a divisor of a day.
     """
-    # an unaligned range may overlap one more bucket than its length requires
+    # a range that is not aligned with the buckets may overlap one more bucket
     needed = -(-(end_ns - start_ns) // max(max_points - 1, 1))
     for width in NICE_WIDTHS_NS:
         if width >= needed and width % finest_ns == 0:

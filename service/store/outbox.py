@@ -56,7 +56,7 @@ Address = Callable[[Alarm, AlarmEvent], Iterable[OutboxMessage]]
 
 
 def no_recipients(alarm: Alarm, event: AlarmEvent) -> Iterable[OutboxMessage]:  # noqa: ARG001
-    """Return no messages; for stores without receivers."""
+    """Return no messages; the default for stores without alarm message receivers."""
     return ()
 
 
@@ -194,7 +194,7 @@ class Outbox(Tables):
             writer.execute(FAIL, (answer[:MAX_ANSWER], message))
 
     def expire(self, receiver: str, before_ns: int, answer: str, now_ns: int) -> int:
-        """Expire waiting messages queued before a time, unless their alarm event is newer.
+        """Expire the waiting messages that were queued, and whose event occurred, before a time.
 
         Returns the number of expired messages.
         """

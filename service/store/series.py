@@ -82,7 +82,7 @@ class Layout:
 
     @classmethod
     def of(cls, quantities: tuple[str, ...]) -> "Layout":
-        """Return the layout of columns with the reasons of this version of padwatch."""
+        """Return the layout of some columns with all quality reasons of this padwatch version."""
         return cls(quantities, tuple(reason.value for reason in Reason))
 
     def dumps(self) -> tuple[str, str]:

@@ -58,7 +58,7 @@ class SpectraLimits:
 
     @property
     def tiers(self) -> tuple[tuple[Tier, TierLimits], ...]:
-        """Both tiers with their limits."""
+        """Dense and sparse tier with their limits."""
         return (Tier.DENSE, self.dense), (Tier.SPARSE, self.sparse)
 
 
@@ -162,7 +162,7 @@ def encode(amplitude_um_pk: FloatArray) -> bytes:
 
 
 def decode(amplitudes: bytes) -> FloatArray:
-    """Return the (N_CHANNELS, n_lines) amplitudes in the codes of `encode`."""
+    """Return the (N_CHANNELS, n_lines) amplitudes from their codes, the inverse of `encode`."""
     codes = np.frombuffer(amplitudes, dtype="<u2").reshape(N_CHANNELS, -1)
     found: FloatArray = LOWEST_UM * np.exp(STEP * (codes.astype(np.float64) - 1.0))
     found[codes == ZERO] = 0.0
@@ -270,7 +270,7 @@ class SpectraStore(Tables):
     """Store of the averaged spectra of bearings; they are written with the assessments."""
 
     def read(self, query: SpectraQuery) -> Spectra:
-        """Return the spectra of one bearing that match a query; damaged ones are only listed."""
+        """Return the intact spectra that match a query, and the times of damaged ones."""
         start_ns, end_ns = storable(query.start_ns), storable(query.end_ns)
         with self._reading() as reader:
             series = find_series(reader, query.unit, query.bearing)

@@ -209,5 +209,5 @@ def acting_as(who: Acting) -> Iterator[None]:
 
 
 def name_actor(actor: str) -> None:
-    """Set the actor of the current context, once the actor is authenticated."""
+    """Set the actor in the current context of actions, after authentication."""
     _ACTING.set(replace(acting(), actor=actor))

@@ -200,7 +200,7 @@ def _wrong_head(
 
 
 def place_of(entry: AuditEntry, last: int) -> str:
-    """Describe the defect of an entry with a wrong hash: altered, or with a wrong number."""
+    """Describe the defect of an entry with a wrong hash: altered, or stored as another number."""
     for number in range(1, last + 1):
         if recomputed(replace(entry, number=number)) == entry.hash:
             return f"entry {entry.number} is out of order: it holds entry {number}"

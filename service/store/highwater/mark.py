@@ -51,7 +51,7 @@ def encoded(mark: Mark) -> bytes:
 
 
 def decoded(slot: bytes) -> Mark | None:
-    """Return the mark in the bytes of `encoded`; None for invalid bytes."""
+    """Return the mark in a slot, the inverse of `encoded`; None if the slot is invalid."""
     text, checksum = slot[:TEXT_BYTES], slot[TEXT_BYTES:]
     if checksum != b"%08x\n" % zlib.crc32(text):
         return None

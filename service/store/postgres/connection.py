@@ -146,7 +146,7 @@ class PostgresConnection:
 
 
 def connected(address: PostgresAddress, purpose: str, settings: str) -> Session:
-    """Open a session with the settings of every session and additional settings."""
+    """Open a session with the common settings and additional SET statements."""
     session = psycopg.connect(address.full(purpose), autocommit=True, context=_Context)
     try:
         session.execute((SESSION + settings).encode())

@@ -225,7 +225,7 @@ def _around(span: Span, width_ns: int) -> Span:
 
 
 def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
-    """Yield the spans of contiguous buckets, given the sorted starts of all buckets."""
+    """Yield the span of each run of contiguous buckets, given the sorted bucket starts."""
     breaks = np.flatnonzero(np.diff(time_ns) > width_ns)
     if time_ns.size:
         firsts = np.concatenate([time_ns[:1], time_ns[breaks + 1]]).tolist()

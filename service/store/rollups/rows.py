@@ -126,7 +126,7 @@ def parts_of(columns: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
 
 
 def encoded(summaries: Summaries) -> list[bytes]:
-    """Return the binary record of each row."""
+    """Return each row of roll-up statistics as a binary record."""
     usable = summaries.count > 0
     packed = np.packbits(usable, axis=1)
     found: list[bytes] = [b""] * len(packed)
@@ -145,7 +145,7 @@ def encoded(summaries: Summaries) -> list[bytes]:
 
 
 def decoded(names: tuple[str, ...], time_ns: IntArray, rows: Sequence[bytes]) -> Summaries:
-    """Return the summaries in the binary records of `encoded`."""
+    """Return the roll-up statistics in binary records, the inverse of `encoded`."""
     shape, n_head = (len(rows), len(names)), len(names)
     count, level = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.uint8)
     mean, minimum, maximum = (np.full(shape, np.nan) for _ in range(3))
@@ -320,7 +320,7 @@ def _conditions(rows: Iterable[tuple[object, ...]]) -> Conditions:
 
 
 def _nothing(names: tuple[str, ...], start_ns: IntArray) -> Summaries:
-    """Return summaries without usable readings."""
+    """Return empty statistics (count 0, level BAD), which are filled by `_put`."""
     value = np.full((start_ns.size, len(names)), np.nan)
     level = np.full(value.shape, Level.BAD, dtype=np.uint8)
     count = np.zeros(value.shape, dtype=np.int64)
@@ -334,7 +334,7 @@ def _put(
     width_ns: int,
     rows: list[tuple[int, int, bytes]],
 ) -> None:
-    """Decode the rows of one layout and copy their columns into summaries."""
+    """Decode the stored rows of one layout and copy their columns into the statistics."""
     if not rows:
         return
     start_ns, slot = (np.array([row[i] for row in rows], dtype=np.int64) for i in (0, 1))
