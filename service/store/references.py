@@ -139,7 +139,7 @@ class _References(AuditedTables, Generic[_Reference]):
         return self._read(f"WHERE id IN ({newest}) ORDER BY {self.order}")
 
     def history(self, unit: str, bearing: str) -> list[_Reference]:
-        """Return the references of a bearing, newest first; at most the newest thousand."""
+        """Return the newest references of a bearing, newest first; at most `MAX_HISTORY`."""
         where = "WHERE unit = ? AND bearing = ? ORDER BY id DESC LIMIT ?"
         return self._read(where, unit, bearing, MAX_HISTORY)
 

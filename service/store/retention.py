@@ -170,7 +170,7 @@ class RetentionStore(Tables):
     Parameters
     ----------
     give_back
-        Function that releases some free pages to the file system; returns whether any are left.
+        Function that releases free pages to the file system; returns False if none were released.
     """
 
     def __init__(

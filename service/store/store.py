@@ -220,7 +220,7 @@ class Store:
         return self.gap_references.in_force()
 
     def reference_history(self, unit: str, bearing: str) -> list[GapReference]:
-        """Return the gap references of a bearing, newest first; at most the newest thousand."""
+        """Return the newest 1000 gap references of a bearing, newest first."""
         return self.gap_references.history(unit, bearing)
 
     def position(self, unit: str) -> StreamPosition | None:

@@ -99,7 +99,7 @@ FORGET = (
 
 
 class WaveformStore(Tables):
-    """Index of the recordings of all data folders; their files are not in the database."""
+    """Store of the index of recordings in all data folders; the database holds no waveforms."""
 
     def put(self, files: Sequence[WaveformFile]) -> None:
         """Write entries in one transaction; replace entries with the same place, kind and name.

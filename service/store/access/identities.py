@@ -29,7 +29,7 @@ class Permission(StrEnum):
 
 
 class Role(StrEnum):
-    """Role of an account or key, from the lowest to the highest."""
+    """Role of an account or an API key; roles are listed from the lowest to the highest."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"
@@ -180,7 +180,7 @@ class SessionLimits:
 
 MAX_DAYS = 3650
 SEEN_STEP_NS = 60 * 1_000_000_000
-"""Resolution of the stored time of last use; each update is a write to the disk."""
+"""Resolution of an API key's stored time of last use; each update is a write to the disk."""
 
 
 class KeyState(StrEnum):

@@ -163,7 +163,7 @@ class Writer:
             raise
 
     def give_back(self) -> bool:
-        """Truncate the file by some free pages; return False if too few pages are free.
+        """Truncate the file by some free pages; return False if none were released.
 
         A file created without incremental vacuum keeps its free pages for reuse.
         """

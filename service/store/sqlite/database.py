@@ -110,7 +110,7 @@ class SqliteDatabase:
             reader.text_factory = str
 
     def give_back(self) -> bool:
-        """Release some free pages of the file to the file system; return whether any are left."""
+        """Release free pages of the file to the file system; return False if none were released."""
         with self.writer.lock, self._store_errors():
             return self.writer.give_back()
 
