@@ -1,1 +1,1 @@
-"""Database of the plant: results, alarms, films, accounts, audit trail, retention and backup."""
+"""Database of a plant: results, alarms, oil films, accounts, audit trail, retention, backups."""

@@ -1,4 +1,4 @@
-"""Alarms: the current state of each, and all its events, numbered without gaps."""
+"""Alarms in the database: current state of each alarm, and its events, numbered without gaps."""
 
 from collections.abc import Iterable
 from dataclasses import asdict
@@ -33,7 +33,7 @@ ALARM_COLUMNS = (
     *("shelf_until_ns", "outage_actor", "outage_reason", "outage_since_ns", *POINT_COLUMNS),
 )
 UPSERT = upsert("alarm", ALARM_COLUMNS, ("id",)) + " WHERE alarm.n_events <= excluded.n_events"
-"""Writing an earlier state again, as after an interrupted write, does not replace a later one."""
+"""Statement that writes the state of an alarm; an earlier state does not replace a later one."""
 
 EVENT_COLUMNS = (
     *("alarm", "number", "unit", "subject", "kind", "change", "level", "state_before"),
@@ -63,7 +63,7 @@ def insert_alarms(
     audit: AuditChain,
     address: Address = no_recipients,
 ) -> None:
-    """Add events with their messages and audit entries, and update the alarms."""
+    """Insert alarm events with their messages and audit entries, and update the alarms."""
     for each in news:
         for event in each.events:
             if writer.execute(INSERT_EVENT, _event_row(event)).rowcount == 1:
@@ -71,23 +71,23 @@ def insert_alarms(
                 audit.add(writer, _actions(event, each))
         writer.execute(UPSERT, _alarm_row(each.alarm))
         if isinstance(each, ActedNews) and each.command is not None:
-            # in the same transaction: an unanswered command has changed nothing
+            # in the same transaction, so that an unanswered command has had no effect
             answer_command(writer, each.command, DONE, each.events[-1].time_ns)
 
 
 def select_alarms(reader: Connection) -> list[Alarm]:
-    """Return every alarm that ever had an event, in its current state."""
+    """Return the current state of every alarm that has had an event."""
     return [_alarm(row) for row in reader.execute(SELECT_ALARMS)]
 
 
 def select_events(reader: Connection, query: AlarmQuery) -> list[StoredEvent]:
-    """Return events, newest first."""
+    """Return the alarm events that match a query, newest first."""
     rows = reader.execute(SELECT_EVENTS, _arguments(query))
     return [StoredEvent(int(row[0]), _event(row[1:])) for row in rows]
 
 
 def _actions(event: AlarmEvent, news: AlarmNews) -> list[AuditAction]:
-    """Return the audit entry of an event that a person caused; none for other events."""
+    """Return the audit entry of an event caused by a person; an empty list for other events."""
     if not event.actor:
         return []
     alarm = news.alarm

@@ -1,4 +1,4 @@
-"""Audit trail in the database: a chain of entries, written with the changes that they record."""
+"""Audit trail in the database: hash chain of entries, written together with the changes."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -39,12 +39,12 @@ PAGE = 1000
 
 @dataclass(frozen=True)
 class AuditQuery:
-    """Query for entries, newest first; None matches everything.
+    """Query for audit entries, newest first; None matches everything.
 
     Parameters
     ----------
     before
-        Only entries with lower numbers.
+        Entry number; only entries with lower numbers are returned.
     limit
         Maximum number of entries.
     start_ns, end_ns
@@ -61,14 +61,14 @@ class AuditQuery:
 
 
 class AuditChain:
-    """End of a database's chain; all writing transactions are opened through it.
+    """Writer of the audit trail; all writing transactions of the store are opened through it.
 
     Parameters
     ----------
     head
-        File that names the newest entry.
+        Head file, with the number and hash of the newest entry.
     database
-        Database with the trail.
+        Database with the audit trail.
     """
 
     def __init__(self, head: Path, database: Database) -> None:
@@ -79,7 +79,7 @@ class AuditChain:
 
     @contextmanager
     def writing(self) -> Iterator[Connection]:
-        """Open a transaction, which is durable when left; then write the head."""
+        """Open a writing transaction; after it is committed, update the head file."""
         with self._lock:
             self._is_due = False
             with self._database.writing() as writer:
@@ -88,7 +88,7 @@ class AuditChain:
                 self._update_head()
 
     def add(self, writer: Connection, actions: Iterable[AuditAction]) -> None:
-        """Add entries within a transaction; the first one compares the head with the chain."""
+        """Append entries within a transaction; compare the head file with the chain first."""
         for action in actions:
             newest = newest_of(writer)
             if not self._is_due and self.head_error is None:
@@ -99,7 +99,7 @@ class AuditChain:
             _insert(writer, action, newest)
 
     def _difference(self, writer: Connection, newest: AuditHead) -> str | None:
-        """Return how the head contradicts the chain; a head that lags behind does not."""
+        """Return how the head file contradicts the chain; None if it agrees or only lags behind."""
         try:
             head = read_head(self._head)
         except HeadError as error:
@@ -114,9 +114,9 @@ class AuditChain:
         return f"entry {head.number} is not the one that the head names"
 
     def _update_head(self) -> None:
-        """Write the head in a transaction, so that it never goes back.
+        """Write the head file within a transaction, so that an older head cannot overwrite it.
 
-        If that fails, the entries stay on the disk and the head lags behind until it succeeds.
+        If the write fails, the entries stay stored and the head lags until a later write.
         """
         self.head_error = None
         try:
@@ -130,12 +130,12 @@ class AuditChain:
 
 
 class AuditedTables(Tables):
-    """Tables whose changes are recorded in the audit trail.
+    """Base class of the stores whose changes are recorded in the audit trail.
 
     Parameters
     ----------
     chain
-        Audit trail, which also opens writing transactions.
+        Audit trail, through which writing transactions are opened.
     """
 
     def __init__(self, chain: AuditChain, reading: Reading) -> None:
@@ -144,7 +144,7 @@ class AuditedTables(Tables):
 
 
 class AuditStore(AuditedTables):
-    """Audit trail. Changes of the store are recorded in their own transactions."""
+    """Store of the audit trail; other stores write their entries within their transactions."""
 
     @property
     def head_error(self) -> str | None:
@@ -152,47 +152,47 @@ class AuditStore(AuditedTables):
         return self._audit.head_error
 
     def record(self, actions: Sequence[AuditAction]) -> None:
-        """Write entries about actions that change nothing in the store; durable on return.
+        """Write audit entries about actions that do not change the store; durable on return.
 
         Raises
         ------
         StoreError
-            If they were not written.
+            If the entries were not written.
         """
         with self._writing() as writer:
             self._audit.add(writer, actions)
 
     def entries(self, query: AuditQuery) -> list[AuditEntry]:
-        """Return entries, newest first."""
+        """Return the audit entries that match a query, newest first."""
         with self._reading("replace") as reader:
             return [AuditEntry(*row) for row in reader.execute(SELECT, vars(query))]
 
 
 class Trail:
-    """Read-only audit trail of a database that may be in use.
+    """Read-only access to the audit trail of a database that may be in use.
 
     Parameters
     ----------
     reading
-        Open a read-only transaction that keeps every byte of text distinguishable.
+        Function that opens a read-only transaction in which text is decoded without loss.
     head
-        File that names the newest entry.
+        Head file, with the number and hash of the newest entry.
     is_shared
-        Whether other hosts, each with its own head, write to the trail as well.
+        Whether other hosts, each with its own head file, also write to the trail.
     """
 
     def __init__(self, reading: Connect, head: Path, *, is_shared: bool = False) -> None:
         self._reading, self._head, self._is_shared = reading, head, is_shared
 
     def verify(self) -> Verdict:
-        """Verify the whole trail without changing it.
+        """Verify the whole audit trail without changing it.
 
         Raises
         ------
         StoreError
-            If there is none, or it cannot be read.
+            If the trail does not exist or cannot be read.
         """
-        head = self._read_head()  # read first: it may lag behind the trail, but not lead
+        head = self._read_head()  # first: the head may lag behind the trail, but not lead
         with self._reading() as reader:
             last = newest_of(reader).number
             verdict = walk(
@@ -207,12 +207,12 @@ class Trail:
 
     @contextmanager
     def entries(self) -> Iterator[Iterator[AuditEntry]]:
-        """Open all entries, oldest first.
+        """Open an iterator over all entries, oldest first.
 
         Raises
         ------
         StoreError
-            If there are none, or they cannot be read.
+            If the trail does not exist or cannot be read.
         """
         with self._reading() as reader:
             yield _all(reader)
@@ -225,7 +225,7 @@ class Trail:
 
 
 def _all(reader: Connection) -> Iterator[AuditEntry]:
-    """Yield every entry, reading pages of bounded size."""
+    """Yield all entries, oldest first, from queries of `PAGE` rows."""
     after = -(2**63)
     while rows := reader.execute(SELECT_NEXT, (after, PAGE)).fetchall():
         yield from (AuditEntry(*row) for row in rows)
@@ -235,18 +235,18 @@ def _all(reader: Connection) -> Iterator[AuditEntry]:
 
 
 def newest_of(reader: Connection) -> AuditHead:
-    """Return number and hash of the newest entry."""
+    """Return the head of the stored trail: number and hash of its newest entry."""
     found = reader.execute(SELECT_NEWEST).fetchone()
     return AuditHead() if found is None else AuditHead(*found)
 
 
 def begin_head(path: Path) -> None:
-    """Write the head of an empty trail unless there is one.
+    """Write the head file of an empty trail; an existing file is kept.
 
     Raises
     ------
     OSError
-        If it cannot be written.
+        If the file cannot be written.
     """
     if not path.exists():
         write_head(path, AuditHead())
@@ -295,4 +295,4 @@ AUDIT_TABLES = """
     CREATE TRIGGER audit_kept BEFORE DELETE ON audit
     BEGIN SELECT RAISE(ABORT, 'entries of the audit trail are kept'); END;
 """
-"""Migration that creates the table."""
+"""Migration that creates the table of audit entries."""

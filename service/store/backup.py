@@ -1,4 +1,4 @@
-"""Backups of a SQLite database: made while the service runs, verified, and restored."""
+"""Backups of a SQLite database: online backup, verification, and restoration."""
 
 import fcntl
 import os
@@ -23,23 +23,23 @@ from service.store.sqlite.checking import structure_findings
 from service.store.sqlite.migrating import APPLICATION_IDS
 
 MAX_FINDINGS = 5
-"""Maximum number of defects in a message."""
+"""Maximum number of defects listed in an error message."""
 
 
 class BackupError(Exception):
-    """A copy cannot be made, is damaged, or cannot be restored; the message says why."""
+    """A backup cannot be made, is damaged, or cannot be restored; the message states the cause."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """Content of a database.
+    """Summary of the content of a database.
 
     Parameters
     ----------
     schema
-        Number of its schema.
+        Schema number.
     n_rows
-        Number of rows by table.
+        Number of rows by table name.
     """
 
     schema: int
@@ -47,7 +47,7 @@ class Content:
 
 
 def content_of(connection: sqlite3.Connection) -> Content:
-    """Return the content of a database, as of the connection's transaction."""
+    """Return the schema number and row counts of a database, within the current transaction."""
     names = connection.execute(
         "SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT GLOB 'sqlite_*'"
     ).fetchall()
@@ -59,12 +59,12 @@ def content_of(connection: sqlite3.Connection) -> Content:
 
 
 def checked(path: Path) -> Content:
-    """Verify a copy completely and return its content.
+    """Verify a backup completely and return its schema number and row counts.
 
     Raises
     ------
     BackupError
-        If it is damaged, not the database of a live plant, or of a newer schema.
+        If the backup is damaged, is not the database of a live plant, or has a newer schema.
     """
     if not path.is_file():
         raise BackupError(f"{path}: there is no such file")
@@ -105,12 +105,12 @@ def _number(connection: sqlite3.Connection, pragma: str) -> int:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Exclude other backups from a folder.
+    """Lock a folder against other backups within the block.
 
     Raises
     ------
     BackupError
-        If another backup is being written there.
+        If another backup is being written to the folder.
     """
     descriptor = os.open(folder, os.O_RDONLY)
     try:
@@ -129,12 +129,12 @@ NAME = re.compile(r"padwatch-\d{8}T\d{6}Z\.sqlite3")
 
 @dataclass(frozen=True)
 class Backup:
-    """Verified copy.
+    """Verified backup.
 
     Parameters
     ----------
     removed
-        Older copies that were removed.
+        Paths of older backups that were removed.
     """
 
     path: Path
@@ -144,21 +144,21 @@ class Backup:
 
 
 def back_up(database: Path, folder: Path, now_ns: int, n_kept: int) -> Backup:
-    """Copy a database by SQLite's online backup, verify the copy, and remove the oldest ones.
+    """Back up a database by SQLite's online backup, verify the copy, and remove the oldest copies.
 
-    Older copies are removed only after the new one is verified and on the disk.
+    Older copies are removed only after the new copy is verified and on the disk.
 
     Parameters
     ----------
     folder
-        Folder of the copies; created if missing.
+        Folder of the backups; created if missing.
     n_kept
-        Number of copies to keep, at least 1.
+        Number of backups to keep, at least 1.
 
     Raises
     ------
     BackupError
-        If there is no verified copy; the folder is then unchanged.
+        If no verified backup was made; the folder is then unchanged.
     """
     if not database.is_file():
         raise BackupError(f"{database}: there is no such database")
@@ -189,21 +189,21 @@ def _back_up(database: Path, folder: Path, now_ns: int, n_kept: int) -> Backup:
 
 
 def _copy(database: Path, aside: Path) -> Content:
-    """Copy one state of a database; return its content."""
+    """Copy a database in one transaction; return its schema number and row counts."""
     uri = f"{database.absolute().as_uri()}?mode=ro"
     with (
         closing(sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S)) as source,
         closing(sqlite3.connect(aside, isolation_level=None)) as target,
     ):
-        source.execute("BEGIN")  # counting and copying see the same moment
+        source.execute("BEGIN")  # rows are counted and copied in the same state
         content = content_of(source)
         source.backup(target)
-        target.execute("PRAGMA journal_mode = DELETE")  # one file, without a log beside it
+        target.execute("PRAGMA journal_mode = DELETE")  # one file, without a WAL file
     return content
 
 
 def _make_room(newest: Path, n_kept: int) -> tuple[Path, ...]:
-    """Remove the oldest copies, but never the newest."""
+    """Remove the oldest backups beyond the number to keep, but never the newest."""
     others = (path for path in newest.parent.iterdir() if NAME.fullmatch(path.name))
     older = sorted((path for path in others if path != newest), reverse=True)
     for path in older[n_kept - 1 :]:
@@ -217,17 +217,18 @@ def _name(now_ns: int) -> str:
 
 
 LOGS = ("-wal", "-shm")
-"""Suffixes of the files that SQLite keeps beside an open database, or leaves after a crash."""
+"""Suffixes of the WAL and shared-memory files, which SQLite keeps beside an open database and
+leaves after a crash."""
 
 
 @dataclass(frozen=True)
 class Restored:
-    """Result of restoring a copy.
+    """Result of restoring a backup.
 
     Parameters
     ----------
     before
-        New path of the previous database; None if there was none.
+        New path of the previous database; None if no database existed.
     """
 
     database: Path
@@ -236,13 +237,13 @@ class Restored:
 
 
 def restore(copy: Path, database: Path, now_ns: int) -> Restored:
-    """Replace a database by a copy in one step; the previous database is kept beside it.
+    """Replace a database atomically by a backup; the previous database is kept beside it.
 
     Raises
     ------
     BackupError
-        If the copy is damaged or of a newer schema, or the database is in use; then nothing has
-        changed.
+        If the backup is damaged or has a newer schema, or the database is in use; nothing is
+        changed then.
     """
     content = checked(copy)
     if database.exists() and copy.samefile(database):
@@ -272,7 +273,7 @@ def _replace(copy: Path, database: Path, now_ns: int) -> Path | None:
 
 
 def _keep(database: Path, now_ns: int) -> Path | None:
-    """Give the existing database a second name, and move its logs, which do not fit the copy."""
+    """Hard-link the existing database to a second name; move its WAL files to that name."""
     if not database.exists():
         return None
     moment = datetime.fromtimestamp(s_from_ns(now_ns), UTC)
@@ -288,7 +289,7 @@ def _keep(database: Path, now_ns: int) -> Path | None:
 
 @contextmanager
 def _unused(database: Path) -> Iterator[None]:
-    """Lock a database against use; one that is too damaged to be locked is ignored."""
+    """Lock a database exclusively; skip the lock if the database is too damaged."""
     if not database.exists():
         yield
         return
@@ -297,7 +298,7 @@ def _unused(database: Path) -> Iterator[None]:
             connection.execute("PRAGMA locking_mode = EXCLUSIVE")
             connection.execute("BEGIN EXCLUSIVE")
             connection.execute("COMMIT")
-            connection.execute("PRAGMA journal_mode = DELETE")  # moves the log into the database
+            connection.execute("PRAGMA journal_mode = DELETE")  # moves the WAL into the database
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
                 raise BackupError(
@@ -305,20 +306,20 @@ def _unused(database: Path) -> Iterator[None]:
                 ) from error
             raise
         except sqlite3.DatabaseError:
-            pass  # damaged: the reason for restoring a copy
+            pass  # damaged, hence the restoration
         yield
 
 
 @dataclass(frozen=True)
 class AccessBefore:
-    """Access to the database that a copy replaces.
+    """Accounts and revoked keys of the database that a backup replaces.
 
     Parameters
     ----------
     accounts
-        Names of its accounts.
+        Names of the accounts.
     revoked
-        Identifiers of its revoked keys.
+        Identifiers of the revoked keys.
     """
 
     accounts: frozenset[str]
@@ -327,16 +328,16 @@ class AccessBefore:
 
 @dataclass(frozen=True)
 class AccessAfter:
-    """Access to the copy.
+    """Accounts and keys of a restored database.
 
     Parameters
     ----------
     accounts, keys
-        Names of accounts; names and identifiers of valid keys.
+        Names of the accounts; names and identifiers of the valid keys.
     returned
-        Accounts that the previous database did not have, perhaps because they were removed.
+        Accounts that the previous database did not have, for example removed accounts.
     revoked
-        Identifiers of keys that were revoked again.
+        Identifiers of the keys that were revoked again after the restoration.
     """
 
     accounts: tuple[str, ...]
@@ -346,7 +347,7 @@ class AccessAfter:
 
 
 def access_before(database: Path) -> AccessBefore | None:
-    """Return the access to a database; None if there is none, or it is unreadable."""
+    """Return the accounts and revoked keys of a database; None if it is missing or unreadable."""
     uri = f"{database.absolute().as_uri()}?mode=ro"
     try:
         with closing(sqlite3.connect(uri, uri=True)) as reader:
@@ -360,12 +361,12 @@ def access_before(database: Path) -> AccessBefore | None:
 
 
 def revoke_again(access: AccessStore, before: AccessBefore | None, now_ns: int) -> AccessAfter:
-    """End all sessions of a copy, and revoke the keys that were revoked since it was made.
+    """End all sessions of a restored database; revoke the keys revoked since the backup.
 
     Raises
     ------
     StoreError
-        If the copy cannot be written.
+        If the restored database cannot be written.
     """
     access.sessions.end_all()
     ids = before.revoked if before else frozenset()

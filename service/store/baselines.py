@@ -1,4 +1,4 @@
-"""Baselines of bearings, the steps taken with them, and responses of shafts."""
+"""Tables of baselines, baseline steps and shaft responses."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -17,10 +17,10 @@ PADWATCH = "padwatch"
 
 
 class BaselineStep(StrEnum):
-    """Step taken with the baselines of a bearing.
+    """Step in the life cycle of the baselines of a bearing.
 
-    The newest `ACCEPTED` or `WITHDRAWN` determines the version in force, the newest `FROZEN` or
-    `THAWED` whether learning continues. `RENEWED` sets the time from which readings are learned.
+    The newest `ACCEPTED` or `WITHDRAWN` determines the version in force. The newest `FROZEN` or
+    `THAWED` determines whether learning is suspended. `RENEWED` starts learning from a new time.
     """
 
     LEARNED = "learned"
@@ -34,14 +34,14 @@ class BaselineStep(StrEnum):
 
 @dataclass(frozen=True)
 class StoredStep:
-    """One step in the history of a bearing's baselines.
+    """Stored step in the life cycle of the baselines of a bearing.
 
     Parameters
     ----------
     version
         Version of the baseline; None for `RENEWED`.
     from_ns
-        Time from which readings are learned, for `RENEWED`.
+        Time from which readings are used for learning; only for `RENEWED`.
     """
 
     unit: str
@@ -56,7 +56,7 @@ class StoredStep:
 
 @dataclass(frozen=True)
 class BaselineEntry:
-    """Stored baseline without its content."""
+    """Metadata of a stored baseline, without the baseline itself."""
 
     unit: str
     bearing: str
@@ -76,15 +76,15 @@ class Versions:
     Parameters
     ----------
     in_force
-        Version that readings are compared with; None if there is none.
+        Version with which readings are compared; None if no version is in force.
     rejected
         Versions that must not be put in force.
     is_frozen
         Whether learning is suspended until an engineer resumes it.
     renewed_ns
-        Time from which readings are learned; None for all.
+        Time from which readings are used for learning; None for all readings.
     first_accepted
-        First version that was put in force since then.
+        First version that was put in force since the last renewal.
     """
 
     in_force: int | None = None
@@ -95,7 +95,7 @@ class Versions:
 
 
 def versions_after(steps: Iterable[StoredStep]) -> Versions:
-    """Return the state of a bearing's baselines after all its steps, oldest first."""
+    """Return the state of a bearing's baselines after the given steps, oldest step first."""
     in_force: int | None = None
     first: int | None = None
     rejected: set[int] = set()
@@ -133,10 +133,10 @@ SET_RESPONSE = upsert("shaft_response", ("unit", "created_ns", "document"), ("un
 
 
 class BaselineTables(AuditedTables):
-    """Baselines, their steps, and shaft responses; a change is on the disk on return."""
+    """Store of baselines, their steps and shaft responses; changes are on the disk on return."""
 
     def add_baseline(self, baseline: BearingBaseline, steps: Sequence[StoredStep]) -> None:
-        """Write a learned baseline with its first steps; writing them again has no effect."""
+        """Write a learned baseline with its first steps; writing the same again has no effect."""
         origin, document = baseline.origin, to_json(baseline)
         key = (origin.unit, origin.bearing, origin.version)
         learned = (baseline.learned_from_ns, baseline.learned_until_ns)
@@ -149,7 +149,7 @@ class BaselineTables(AuditedTables):
                 self._add_steps(writer, steps)
 
     def baselines(self, unit: str, bearing: str) -> list[BaselineEntry]:
-        """Return all baselines of a bearing, newest first."""
+        """Return the metadata of all baselines of a bearing, newest first."""
         with self._reading() as reader:
             return [
                 BaselineEntry(unit, bearing, Estimator(estimator), *rest)
@@ -157,12 +157,12 @@ class BaselineTables(AuditedTables):
             ]
 
     def baseline(self, unit: str, bearing: str, version: int) -> BearingBaseline | None:
-        """Return one baseline with its content.
+        """Return a baseline; None if the version is unknown.
 
         Raises
         ------
         StoreError
-            If its document is invalid.
+            If the document of the baseline is invalid.
         """
         with self._reading() as reader:
             found = reader.execute(SELECT_DOCUMENT, (unit, bearing, version)).fetchone()
@@ -173,28 +173,28 @@ class BaselineTables(AuditedTables):
             raise StoreError(f"{name}: {error}") from error
 
     def add_steps(self, steps: Sequence[StoredStep]) -> None:
-        """Write steps; writing them again has no effect."""
+        """Write baseline steps; writing the same steps again has no effect."""
         with self._writing() as writer:
             if not _are_stored(writer, steps):
                 self._add_steps(writer, steps)
 
     def steps(self, unit: str, bearing: str) -> list[StoredStep]:
-        """Return the steps taken with the baselines of a bearing, oldest first."""
+        """Return the baseline steps of a bearing, oldest first."""
         with self._reading() as reader:
             return _select_steps(reader, unit, bearing)
 
     def set_response(self, unit: str, response: ShaftResponse, now_ns: int) -> None:
-        """Write the response of a unit's shaft to its films, replacing the previous one."""
+        """Write the shaft response of a unit; it replaces the previous response."""
         with self._writing() as writer:
             writer.execute(SET_RESPONSE, (unit, now_ns, to_json(response)))
 
     def responses(self) -> dict[str, ShaftResponse]:
-        """Return the responses of shafts by unit.
+        """Return the shaft responses by unit.
 
         Raises
         ------
         StoreError
-            If a document is invalid.
+            If the document of a response is invalid.
         """
         with self._reading() as reader:
             rows = reader.execute("SELECT unit, document FROM shaft_response").fetchall()
@@ -222,7 +222,7 @@ def _select_steps(reader: Connection, unit: str, bearing: str) -> list[StoredSte
 
 
 def _actions(writer: Connection, steps: Sequence[StoredStep]) -> list[AuditAction]:
-    """Return audit entries about steps before they are written; automatic learning has none."""
+    """Return the audit entries about steps that will be written; none for automatic learning."""
     actions = []
     for place in dict.fromkeys((step.unit, step.bearing) for step in steps):
         done = _select_steps(writer, *place)

@@ -1,4 +1,4 @@
-"""Buckets of readings over time: count, mean, extremes, worst quality."""
+"""Statistics of readings in buckets of time: count, mean, extremes, worst quality."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,17 +21,17 @@ ROWS = ("time_ns", *STATISTICS)
 
 @dataclass(frozen=True)
 class Summaries:
-    """Summaries of readings, a row for each time and a column for each quantity.
+    """Statistics of readings; one row per time and one column per quantity.
 
     Parameters
     ----------
     names
-        Names of the columns.
+        Names of the quantities.
     time_ns : (n,)
-        Times of the readings, or starts of their spans.
+        Times of single readings, or starts of aggregated time spans.
     count, mean, minimum, maximum, level : (n, n_names)
-        Number and statistics of usable readings, NaN if there are none; worst quality of all
-        readings.
+        Number and statistics of usable readings, NaN without usable readings; worst quality level
+        of all readings.
     """
 
     names: tuple[str, ...]
@@ -46,34 +46,34 @@ class Summaries:
     def of(
         cls, names: tuple[str, ...], time_ns: IntArray, value: FloatArray, level: LevelArray
     ) -> "Summaries":
-        """Return single readings as summaries; values are NaN where there is none."""
+        """Return single readings as summaries; values are NaN for unusable readings."""
         count = np.isfinite(value).astype(np.int64)
         return cls(names, time_ns, count, value, value, value, level)
 
     @classmethod
     def joined(cls, parts: Sequence["Summaries"]) -> "Summaries":
-        """Concatenate the rows of summaries with the same columns, at least one."""
+        """Concatenate the rows of one or more summaries with the same columns."""
         rows = {name: np.concatenate([getattr(part, name) for part in parts]) for name in ROWS}
         return cls(parts[0].names, **rows)
 
     @classmethod
     def together(cls, parts: Sequence["Summaries"]) -> "Summaries":
-        """Concatenate summaries, at least one, in order of time."""
+        """Concatenate the rows of one or more summaries and sort them by time."""
         found = cls.joined(parts)
         return found.at(np.argsort(found.time_ns, kind="stable"))
 
     def at(self, rows: IntArray | npt.NDArray[np.bool_]) -> "Summaries":
-        """Select rows, in the given order."""
+        """Return the rows with the given indices or mask, in that order."""
         return Summaries(self.names, **{name: getattr(self, name)[rows] for name in ROWS})
 
     def only(self, names: tuple[str, ...]) -> "Summaries":
-        """Select columns, in the given order."""
+        """Return the columns with the given names, in that order."""
         columns = [self.names.index(name) for name in names]
         chosen = {name: getattr(self, name)[:, columns] for name in STATISTICS}
         return Summaries(names, self.time_ns, **chosen)
 
     def in_spans(self, width_ns: int) -> "Summaries":
-        """Aggregate rows, which are in order, into aligned spans of a width."""
+        """Return the rows, sorted by time, aggregated over aligned time spans of a width."""
         if self.time_ns.size == 0:
             return self
         number = self.time_ns // width_ns
@@ -81,14 +81,14 @@ class Summaries:
         return self.summed(starts, number[starts] * width_ns)
 
     def summed(self, starts: IntArray, time_ns: IntArray) -> "Summaries":
-        """Aggregate runs of rows.
+        """Return the aggregate of each run of consecutive rows.
 
         Parameters
         ----------
         starts : (m,)
-            First row of each run.
+            Index of the first row of each run.
         time_ns : (m,)
-            Times of the results.
+            Time of each aggregated row.
         """
         count = np.add.reduceat(self.count, starts, axis=0)
         weighed = np.where(self.count > 0, self.mean * np.maximum(self.count, 1), 0.0)
@@ -122,21 +122,21 @@ NICE_WIDTHS_S = (
 )
 NICE_WIDTHS_NS = tuple(width * 1_000_000_000 for width in NICE_WIDTHS_S)
 LEVEL_OF: dict[int, Level | None] = {-1: None} | {int(level): level for level in Level}
-"""Level of a number; a table, since thousands are converted at a time."""
+"""Quality level by number, None for -1; a lookup table, for speed."""
 
 MAX_DAYS = (2**63 - 1) // DAY_NS
-"""Maximum width that fits in nanoseconds; two of them cover all time since 1970."""
+"""Maximum bucket width in days, which fits in 64-bit nanoseconds."""
 
 
 def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int = 1) -> int:
-    """Return the narrowest round width at which a range has at most ``max_points`` buckets.
+    """Return the narrowest round bucket width with at most ``max_points`` buckets in a range.
 
     Parameters
     ----------
     finest_ns
-        Width of the available roll-ups; it divides a day.
+        Width of the finest available roll-ups, a divisor of a day.
     """
-    # an aligned range may touch one more bucket than its length holds
+    # a range that is not aligned with the buckets may overlap one more bucket
     needed = -(-(end_ns - start_ns) // max(max_points - 1, 1))
     for width in NICE_WIDTHS_NS:
         if width >= needed and width % finest_ns == 0:
@@ -145,7 +145,7 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int 
 
 
 def single_points(readings: Summaries, hole_ns: int) -> Trend:
-    """Return single readings; a point without a value marks each hole, to break the line."""
+    """Return the trend of single readings; a point without a value marks each hole."""
     holes = np.flatnonzero(np.diff(readings.time_ns) > hole_ns) + 1
     time_ns = np.insert(readings.time_ns, holes, readings.time_ns[holes - 1] + hole_ns // 2)
     series = {}
@@ -158,7 +158,7 @@ def single_points(readings: Summaries, hole_ns: int) -> Trend:
 
 
 def page(readings: Summaries, max_points: int, hole_ns: int) -> Trend:
-    """Return the first readings, and the time at which the next page begins."""
+    """Return the trend of the first ``max_points`` readings, with the start of the next page."""
     if readings.time_ns.size <= max_points:
         return single_points(readings, hole_ns)
     shown = single_points(readings.at(np.arange(max_points)), hole_ns)
@@ -166,7 +166,7 @@ def page(readings: Summaries, max_points: int, hole_ns: int) -> Trend:
 
 
 def bucketed(readings: Summaries, width_ns: int) -> Trend:
-    """Aggregate summaries into aligned buckets; those without readings are empty."""
+    """Return the trend of readings in aligned buckets; buckets without readings are empty."""
     if readings.time_ns.size == 0:
         nothing = {name: TrendSeries([], [], [], [], []) for name in readings.names}
         return Trend(width_ns, [], nothing)

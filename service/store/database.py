@@ -1,6 +1,6 @@
-"""Interface of SQLite and PostgreSQL to the SQL of the store.
+"""Database interface of the store, implemented for SQLite and PostgreSQL.
 
-SQL is written once. Rules for statements that run on both databases:
+Each SQL statement is written once and runs on both databases. Rules for statements:
 
 - parameters are ``?`` with a tuple, or ``:name`` with a mapping; booleans are stored as 0 and 1, so
   compare them with numbers (``is_active = 1``);
@@ -8,9 +8,9 @@ SQL is written once. Rules for statements that run on both databases:
   ``CAST(:low AS DOUBLE PRECISION) IS NULL``;
 - ``ON CONFLICT``, never ``INSERT OR REPLACE``; the old value is ``table.column`` in it;
 - no ``rowid``, ``typeof``, ``instr``, ``GLOB``, ``min`` or ``max`` of two values, ``LIMIT -1``;
-- rows from which other rows are computed are read through the view ``whole_`` and the table's name,
-  which omits damaged rows also in a writing transaction;
-- a number assigned by the database is read by ``RETURNING`` or by a separate query.
+- rows from which other rows are computed are read from the view named ``whole_`` plus the table
+  name, which omits damaged rows also in a writing transaction;
+- a row number assigned by the database is read by ``RETURNING`` or by a separate query.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -20,11 +20,11 @@ from typing import Any, Literal, Protocol
 Parameters = tuple[Any, ...] | Mapping[str, Any]
 
 Unreadable = Literal["strict", "replace", "surrogateescape"]
-"""Treatment of stored text that is not UTF-8, as the error handlers of `bytes.decode`."""
+"""Error handler of `bytes.decode` for stored text that is not UTF-8."""
 
 
 class Rows(Protocol):
-    """Result of a statement."""
+    """Result rows of an SQL statement."""
 
     @property
     def rowcount(self) -> int:
@@ -43,10 +43,10 @@ class Rows(Protocol):
 
 
 class Connection(Protocol):
-    """Connection within a transaction; used by one thread at a time."""
+    """Database connection within a transaction; used by one thread at a time."""
 
     def execute(self, statement: str, parameters: Parameters = ..., /) -> Rows:
-        """Run a statement. All rows may be held in memory, so queries must be bounded."""
+        """Run a statement. The whole result may be held in memory, so queries must be bounded."""
         ...
 
     def executemany(self, statement: str, parameters: Iterable[Parameters], /) -> Rows:
@@ -55,76 +55,76 @@ class Connection(Protocol):
 
 
 Connect = Callable[[], AbstractContextManager[Connection]]
-"""Open a writing transaction, which is durable once it is left without an error."""
+"""Function that opens a writing transaction; durable once its block ends without an error."""
 
 
 class Reading(Protocol):
-    """Open a read-only transaction, which sees one state of a database."""
+    """Function that opens a read-only transaction on one consistent state of a database."""
 
     def __call__(self, unreadable: Unreadable = "strict", /) -> AbstractContextManager[Connection]:
-        """Open it."""
+        """Open the transaction."""
         ...
 
 
 class Hold(Protocol):
-    """Name held exclusively as long as `is_held` is true."""
+    """Exclusive lock on a name; valid while `is_held` is true."""
 
     @property
     def is_held(self) -> bool:
-        """Check whether the name is still held; a lost name stays lost."""
+        """Whether the lock is still held; a lost lock is never regained."""
         ...
 
 
 class Database(Protocol):
-    """One database. All its errors are raised as `StoreError`, with advice."""
+    """Database of the store; all its errors are raised as `StoreError` with advice."""
 
     @property
     def kind(self) -> str:
-        """``sqlite`` or ``postgresql``."""
+        """Kind of the database: ``sqlite`` or ``postgresql``."""
         ...
 
     def writing(self) -> AbstractContextManager[Connection]:
-        """Open the only writing transaction of all processes.
+        """Open a writing transaction; only one is open at a time among all processes.
 
-        Data read within it stays unchanged until it ends. An error within it undoes all of it. A
-        `StoreError` at its end may leave open whether it was committed, so writing the same data
+        Data that the transaction reads do not change until it ends. An error rolls it back. If
+        the commit raises `StoreError`, its outcome may be unknown; therefore writing the same data
         again must have no effect.
         """
         ...
 
     def reading(self, unreadable: Unreadable = "strict") -> AbstractContextManager[Connection]:
-        """Open a read-only transaction, which sees one state of the database."""
+        """Open a read-only transaction on one consistent state of the database."""
         ...
 
     def ever_had(self, connection: Connection, table: str) -> bool:
-        """Return whether a table that numbers its rows ever had one, even if deleted since."""
+        """Return whether a table with numbered rows ever had a row, including deleted rows."""
         ...
 
     def hold(self, name: str) -> AbstractContextManager[Hold]:
-        """Hold a name exclusively among all processes that use this database.
+        """Return a lock on a name, exclusive among all processes that use this database.
 
         The holder checks `Hold.is_held` before every action that only one process may take: if the
-        connection to the database is lost, another process may take the name.
+        connection to the database is lost, another process may acquire the lock.
 
         Raises
         ------
         StoreError
-            If another process holds it; the message names that process if it is known.
+            If another process holds the lock; the message names the process if it is known.
         """
         ...
 
     def close(self) -> None:
-        """Release all connections; closing twice has no effect."""
+        """Close all connections; closing twice has no effect."""
         ...
 
 
 class Tables:
-    """Tables of one subject in a database.
+    """Base class of the stores that read and write some tables of a database.
 
     Parameters
     ----------
     writing, reading
-        Open a writing and a read-only transaction.
+        Functions that open a writing and a read-only transaction.
     """
 
     def __init__(self, writing: Connect, reading: Reading) -> None:
@@ -132,12 +132,12 @@ class Tables:
 
 
 def insert(table: str, columns: Sequence[str]) -> str:
-    """Return the statement that inserts a row."""
+    """Return the SQL statement that inserts a row into a table."""
     marks = ", ".join("?" * len(columns))
     return f"INSERT INTO {table} ({', '.join(columns)}) VALUES ({marks})"  # noqa: S608
 
 
 def upsert(table: str, columns: Sequence[str], key: Sequence[str]) -> str:
-    """Return the statement that inserts a row, or replaces the row with the same key."""
+    """Return the SQL statement that inserts a row, or replaces the row with the same key."""
     changes = ", ".join(f"{name} = excluded.{name}" for name in columns if name not in key)
     return f"{insert(table, columns)} ON CONFLICT ({', '.join(key)}) DO UPDATE SET {changes}"

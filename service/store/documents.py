@@ -1,4 +1,4 @@
-"""Baselines, shaft responses and decisions as JSON documents, validated when they are read."""
+"""JSON documents of baselines, shaft responses and decisions, validated when they are read."""
 
 import json
 from dataclasses import asdict
@@ -17,7 +17,7 @@ _Model = TypeVar("_Model", bound=BaseModel)
 
 
 class _Document(BaseModel):
-    """Envelope of a document; its configuration also applies to the dataclasses in `content`."""
+    """Envelope of a JSON document; its pydantic configuration also applies to `content`."""
 
     model_config = ConfigDict(strict=True, extra="forbid", allow_inf_nan=False)
 
@@ -40,12 +40,12 @@ class _DecisionDocument(_Document):
 
 
 def to_json(value: BearingBaseline | ShaftResponse | Decision) -> str:
-    """Return the document of a value.
+    """Return a value as a JSON document.
 
     Raises
     ------
     ValueError
-        If a number in it is not finite.
+        If a number in the value is not finite.
     """
     names = {BearingBaseline: BASELINE, ShaftResponse: RESPONSE, Decision: DECISION}
     whole = {"format": names[type(value)], "format_version": FORMAT_VERSION}
@@ -53,24 +53,24 @@ def to_json(value: BearingBaseline | ShaftResponse | Decision) -> str:
 
 
 def baseline_from_json(text: str) -> BearingBaseline:
-    """Return the baseline of a document.
+    """Return the baseline in a JSON document.
 
     Raises
     ------
     ValueError
-        If the text is not JSON or of another format, or a key is missing, unknown, repeated or of
-        the wrong type; the message names the key.
+        If the text is not JSON or has another format, or a key is missing, unknown or repeated, or
+        its value has the wrong type; the message names the key.
     """
     return _read(_BaselineDocument, text).content
 
 
 def response_from_json(text: str) -> ShaftResponse:
-    """Return the response of a document; raises like `baseline_from_json`."""
+    """Return the shaft response in a JSON document; raises like `baseline_from_json`."""
     return _read(_ResponseDocument, text).content
 
 
 def decision_from_json(text: str) -> Decision:
-    """Return the decision of a document; raises like `baseline_from_json`."""
+    """Return the decision in a JSON document; raises like `baseline_from_json`."""
     return _read(_DecisionDocument, text).content
 
 
@@ -82,7 +82,7 @@ def _read(model: type[_Model], text: str) -> _Model:
         where = ".".join(str(part) for part in first["loc"]) or "document"
         words = first["msg"].removeprefix("Value error, ")
         raise ValueError(f"{where}: {words} (found {first['input']!r:.50})") from error
-    json.loads(text, object_pairs_hook=_refuse_repeated_keys)  # pydantic accepts the last value
+    json.loads(text, object_pairs_hook=_refuse_repeated_keys)  # pydantic accepts repeated keys
     return found
 
 

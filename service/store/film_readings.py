@@ -1,4 +1,4 @@
-"""Film readings: one row per reading, one column per number."""
+"""Table of film readings, with one column per number, and table of decisions."""
 
 import math
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ from service.store.trends import BETWEEN_BOUNDS, IN_STATES, condition_arguments,
 
 
 class Provenance(StrEnum):
-    """Origin of readings: samples of a machine, or a simulation without samples."""
+    """Origin of film readings: measured from samples, or simulated without samples."""
 
     MEASURED = "measured"
     SIMULATED = "simulated"
@@ -39,9 +39,9 @@ class FilmQuery:
     start_ns, end_ns
         Half-open time range.
     states
-        Operating states; empty for all.
+        Operating states to include; empty for all.
     newest
-        Maximum number of readings, the newest being returned; None for all.
+        Maximum number of readings; older matching readings are omitted. None for all.
     """
 
     unit: str
@@ -57,17 +57,17 @@ class FilmQuery:
 
 @dataclass(frozen=True, eq=False)
 class FilmHistory:
-    """Readings of one film with the findings made when they were judged.
+    """Readings of one film with the findings of the change detection at that time.
 
     Parameters
     ----------
     state, is_settled, is_simulated : (n,)
     verdict, level : (2, n)
-        Members of `Verdict`, and of `AlarmLevel` or 0.
+        Numbers of `Verdict`; numbers of `AlarmLevel`, 0 for no alarm.
     change, change_std, deviation, deviation_std : (2, n)
-        In ln; NaN if unknown.
+        Changes of the natural logarithm of stiffness; NaN if unknown.
     baseline_version : (n,)
-        0 for none.
+        Version of the baseline, 0 for no baseline.
     """
 
     history: StiffnessHistory
@@ -88,7 +88,7 @@ class FilmHistory:
 
 @dataclass(frozen=True)
 class StoredDecision:
-    """State of the decision about one direction, with its estimator and baseline."""
+    """Decision about one direction of a film, with the estimator and the baseline version."""
 
     direction: str
     estimator: Estimator
@@ -131,7 +131,7 @@ READ_NUMBERS = (
         for d in DIRECTIONS
     ),
 )
-"""Columns that are read back into arrays."""
+"""Numeric columns that are read into the arrays of `FilmHistory`."""
 
 SELECT = f"""
     SELECT {", ".join(READ_NUMBERS)}, provenance FROM film_reading
@@ -148,7 +148,7 @@ def insert_film_news(
     news: Iterable[FilmNews],
     provenance: Provenance = Provenance.MEASURED,
 ) -> None:
-    """Add readings, and replace the decisions of their films."""
+    """Insert film readings, and replace the decisions about their films."""
     for each in news:
         reading = each.reading
         series = series_of(writer, reading.unit, reading.bearing)
@@ -199,12 +199,12 @@ def _or_null(value: float) -> float | None:
 
 
 def select_decisions(reader: Connection, unit: str, bearing: str) -> list[StoredDecision]:
-    """Return the last state of the decisions about a bearing.
+    """Return the stored decision about each direction of a bearing.
 
     Raises
     ------
     StoreError
-        If a document is invalid.
+        If the document of a decision is invalid.
     """
     rows = reader.execute(
         "SELECT direction, estimator, baseline_version, document FROM film_decision"
@@ -222,11 +222,11 @@ def select_decisions(reader: Connection, unit: str, bearing: str) -> list[Stored
 
 
 def select_film_history(reader: Connection, query: FilmQuery) -> FilmHistory:
-    """Return readings of one film, oldest first."""
+    """Return the readings of one film that match a query, oldest first."""
     rows = reader.execute(SELECT, _arguments(query)).fetchall()[::-1]
     numbers = np.array([row[:-1] for row in rows], dtype=np.float64)
     column = dict(zip(READ_NUMBERS, numbers.reshape(-1, len(READ_NUMBERS)).T, strict=True))
-    time_ns = np.array([row[0] for row in rows], dtype=np.int64)  # floats are not exact
+    time_ns = np.array([row[0] for row in rows], dtype=np.int64)  # not exact as floats
     return _history(time_ns, column, np.array([row[-1] == Provenance.SIMULATED for row in rows]))
 
 

@@ -1,4 +1,4 @@
-"""Films in the database: readings, decisions, baselines and a simulated past."""
+"""Store of oil films: readings, decisions, baselines and simulated past results."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -49,10 +49,10 @@ REASONS = {
 
 
 class FilmStore(BaselineTables):
-    """Readings, decisions and baselines of films; a change is on the disk on return."""
+    """Store of film readings, decisions and baselines; changes are on the disk on return."""
 
     def add_simulated(self, readings: Iterable[FilmNews]) -> None:
-        """Write readings of a simulation, marked as such."""
+        """Write simulated film readings, with the provenance "simulated"."""
         with self._writing() as writer:
             insert_film_news(writer, readings, Provenance.SIMULATED)
 
@@ -64,12 +64,12 @@ class FilmStore(BaselineTables):
         films: FilmHistory,
         values: Mapping[str, FloatArray],
     ) -> None:
-        """Write a bearing's simulated past: readings of its film, and results for its trends.
+        """Write the simulated past of a bearing: film readings, and results for its trends.
 
         Parameters
         ----------
         values
-            Trends by column of the store's layout; (n,) each, NaN where there is no number.
+            Trend values by layout column, shape (n,) each; NaN for missing values.
         """
         time_ns = films.history.time_ns
         with self._writing() as writer:
@@ -82,7 +82,7 @@ class FilmStore(BaselineTables):
             writer.execute(MARK_PAST, span)
 
     def past_end_ns(self, unit: str, bearing: str) -> int | None:
-        """Return the end of a bearing's simulated past; None if it has none."""
+        """Return the end time of a bearing's simulated past; None if it has no simulated past."""
         with self._reading() as reader:
             row = reader.execute(
                 "SELECT end_ns FROM simulated_past JOIN series ON series.id = simulated_past.series"
@@ -92,12 +92,12 @@ class FilmStore(BaselineTables):
         return None if row is None else int(row[0])
 
     def history(self, query: FilmQuery) -> FilmHistory:
-        """Return readings of one film, oldest first."""
+        """Return the readings of one film that match a query, oldest first."""
         with self._reading() as reader:
             return select_film_history(reader, query)
 
     def first_ns(self, unit: str, bearing: str, estimator: Estimator) -> int | None:
-        """Return the time of the first reading of a film; None if it has none."""
+        """Return the time of the first reading of a film; None if it has no readings."""
         with self._reading() as reader:
             found = reader.execute(
                 "SELECT min(time_ns) FROM film_reading WHERE estimator = ? AND series ="
@@ -107,7 +107,7 @@ class FilmStore(BaselineTables):
         return None if found[0] is None else int(found[0])
 
     def decisions(self, unit: str, bearing: str) -> list[StoredDecision]:
-        """Return the last state of the decisions about a bearing."""
+        """Return the stored decision about each direction of a bearing."""
         with self._reading() as reader:
             return select_decisions(reader, unit, bearing)
 
@@ -201,7 +201,7 @@ DIRECTION_COLUMNS = """
     cause_{d} TEXT,
     cause_reason_{d} TEXT,
 """
-"""Columns of a reading in one direction in this version of the schema."""
+"""SQL columns of a film reading in one direction, as created by this migration."""
 
 FILM_TABLES = f"""
     ALTER TABLE assessment ADD COLUMN operating_state INTEGER;
@@ -277,4 +277,4 @@ FILM_TABLES = f"""
     CREATE TRIGGER baseline_step_kept BEFORE DELETE ON baseline_step
     BEGIN SELECT RAISE(ABORT, 'steps of baselines are kept'); END;
 """
-"""Migration that creates the tables."""
+"""Migration that creates the tables of film readings, decisions, baselines and responses."""

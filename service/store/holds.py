@@ -1,4 +1,4 @@
-"""Conditions of a data folder: local file system, permissions, and one service per database."""
+"""Checks of a data folder: local file system, permissions, and lock file of the database."""
 
 import fcntl
 import os
@@ -24,8 +24,8 @@ OVER_A_NETWORK = frozenset(
         *("fuse.s3fs", "fuse.sshfs", "fuse.vmhgfs-fuse"),
     )
 )
-"""Network file systems: their locks and shared memory do not exclude other machines, and an
-acknowledged write may not be on a disk."""
+"""Kernel names of network file systems. Their locks and shared memory do not exclude other
+machines, and an acknowledged write may not be on a disk."""
 
 _MEMORY = "is in memory: all results are lost when the machine restarts"
 _CONTAINER = "belongs to a container: results are lost when it is replaced; mount a volume"
@@ -50,11 +50,11 @@ class FileSystem:
     Parameters
     ----------
     kind
-        Name used by the kernel; empty if unknown.
+        File system type used by the kernel; empty if unknown.
     is_remote
-        Whether results must not be stored there.
+        Whether it is a network file system, which must not be used for results.
     warning
-        Possible loss of results there; empty if they are safe.
+        Reason why results may be lost on it; empty if they are safe.
     """
 
     kind: str
@@ -70,16 +70,16 @@ def _mounts() -> str:
 
 
 def file_system_of(folder: Path, mounts: Callable[[], str] = _mounts) -> FileSystem:
-    """Return the file system of a folder, which need not exist yet.
+    """Return the file system of a folder; the folder need not exist.
 
     Parameters
     ----------
     mounts
-        Returns the kernel's table of mounts.
+        Function that returns the text of the kernel's mount table.
     """
     place, found = folder.resolve(), ""
     depth = -1
-    # of equal mount points the later one hides the earlier one
+    # a later mount hides an earlier one at the same mount point
     for line in mounts().splitlines():
         before, _, after = line.partition(" - ")
         fields, kinds = before.split(" "), after.split(" ")
@@ -106,14 +106,14 @@ def _unescaped(text: str) -> str:
 
 
 BESIDE = ("-wal", "-shm", ".lock")
-"""Suffixes of the files beside the database."""
+"""Suffixes of the auxiliary files beside the database."""
 
 
 def why_unusable(path: Path) -> str | None:
-    """Return why a database cannot be stored at a path; None if no obstacle is found.
+    """Return the reason why a database cannot be stored at a path; None if the path is usable.
 
-    A missing folder is created. An empty file is a new database; the high-water mark beside it
-    shows whether it replaces another one.
+    A missing folder is created. An empty file is accepted as a new database; the high-water mark
+    beside it reveals whether another database was replaced.
     """
     folder = path.parent
     try:
@@ -165,11 +165,11 @@ _PID_BYTES = 20
 
 
 class AlreadyRunningError(StoreError):
-    """Another service uses the database; the message names its process."""
+    """Another service uses the database; the message states its process id."""
 
 
 def lock_path(database: Path) -> Path:
-    """Return the path of the file that a service locks while it uses a database."""
+    """Return the path of the lock file of a database."""
     return database.with_name(database.name + SUFFIX)
 
 
@@ -177,19 +177,19 @@ def lock_path(database: Path) -> Path:
 def exclusive_use(
     database: Path, look: Callable[[Path], FileSystem] = file_system_of
 ) -> Iterator[None]:
-    """Exclude other services from a database.
+    """Lock a database against other services within the block.
 
-    The lock ends with the process; the file stays and has no meaning of its own.
+    The lock ends with the process; the lock file stays and has no further meaning.
 
     Parameters
     ----------
     look
-        Returns the file system of a folder.
+        Function that returns the file system of a folder.
 
     Raises
     ------
     AlreadyRunningError
-        If another process uses the database.
+        If another process holds the lock.
     StoreError
         If the folder is not writable, or is on a network file system.
     """
@@ -208,7 +208,7 @@ def exclusive_use(
 
 
 def _require_local(folder: Path, found: FileSystem) -> None:
-    """Refuse a folder on a network file system; warn of one that may lose results."""
+    """Reject a network file system; log a warning for a file system that may lose results."""
     if found.is_remote:
         raise StoreError(
             f"{folder} is on a network file system ({found.kind}), where two services may write at"
@@ -227,7 +227,7 @@ def _take(descriptor: int, database: Path) -> None:
 
 
 def take_lock(descriptor: int) -> str | None:
-    """Lock a file and write the process number to it; return that of another holder, if any."""
+    """Lock a file and write this process id to it; return the id of another holder, or None."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

@@ -1,4 +1,4 @@
-"""Integrity of a database: whether it is the newest copy, and which of its rows are damaged."""
+"""Integrity of a database: detection of an outdated copy and of damaged rows."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,20 +9,20 @@ from service.store.seals import DamageLog, Place
 
 
 class Integrity:
-    """Integrity of a database. That of a server checks itself and has no findings here.
+    """Integrity state of a database; no findings for PostgreSQL, which checks its data itself.
 
     Parameters
     ----------
     chain
         Audit trail.
     marks
-        High-water mark beside a database file.
+        High-water mark beside the database file.
     damage
-        Damaged rows found since the start.
+        Log of the damaged rows found since the start.
     check_some
-        Check some further rows; return True when all rows have been checked once.
+        Function that checks the next rows; returns True when all rows have been checked once.
     require_file
-        Raise `StoreError` if the database file was removed or replaced since it was opened.
+        Function that raises `StoreError` if the database file was removed or replaced.
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class Integrity:
 
     @property
     def found(self) -> Sequence[MarkFinding]:
-        """Differences from the high-water mark at opening, until `adopt` accepts them."""
+        """Differences from the high-water mark at opening; empty after `adopt`."""
         return () if self._marks is None else self._marks.found
 
     @property
@@ -48,16 +48,16 @@ class Integrity:
 
     @property
     def n_damaged(self) -> int:
-        """Number of damaged rows found since the start, which queries leave out."""
+        """Number of damaged rows found since the start; queries omit these rows."""
         return self._damage.n_damaged
 
     @property
     def damaged(self) -> Sequence[Place]:
-        """Damaged rows found since the start, as far as they are listed."""
+        """Damaged rows found since the start, at most `seals.MAX_PLACES`."""
         return self._damage.places
 
     def adopt(self, now_ns: int) -> Sequence[MarkFinding]:
-        """Accept the database as the newest, record that in the audit trail, return `found`.
+        """Accept the database as the newest copy, add an audit entry, and return `found`.
 
         Raises
         ------

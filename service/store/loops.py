@@ -1,4 +1,4 @@
-"""Background loops of the store: roll-ups, retention, and checks of all rows."""
+"""Background loops of the store: roll-ups, retention, and row checksums."""
 
 import asyncio
 
@@ -11,17 +11,17 @@ from service.store.retention import Ages, RetentionStore
 from service.store.rollups.gathering import RollupStore
 
 RETENTION_PERIOD_S = 600.0
-"""Pause when no data are due for deletion."""
+"""Pause of the retention loop when no data are due for deletion."""
 
 RETENTION_REST_SHARE = 9.0
-"""Ratio of pause to work: the loop takes a tenth of one core, and others can write."""
+"""Ratio of pause to work; the loop uses a tenth of one core, and others can write."""
 
 
 class RetentionLoop:
-    """Loop that deletes old data, some of each bearing in turn, with pauses.
+    """Loop that deletes old data in small steps, one bearing after the other, with pauses.
 
-    Ages are counted from the newest time with a day of results up to it, so that a clock that is
-    set years ahead deletes nothing within a day.
+    The age of data is relative to the 24th newest hour with results, or to the clock if earlier. A
+    clock that is set years ahead therefore causes no deletion within the first day.
     """
 
     def __init__(self, store: RetentionStore, limits: Ages, clock: Clock) -> None:
@@ -34,13 +34,13 @@ class RetentionLoop:
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Run forever."""
+        """Delete old data periodically; never returns."""
         while True:
             if not await self.round(pulse):
                 await rest(RETENTION_PERIOD_S, self._clock, pulse)
 
     async def round(self, pulse: Pulse = UNHEARD) -> bool:
-        """Delete once from each bearing; return whether any data were due."""
+        """Delete some old data of each bearing; return whether any data were due."""
         found = False
         try:
             believed_ns = await asyncio.to_thread(self._store.believed_ns)
@@ -68,10 +68,10 @@ class RetentionLoop:
 
 
 ROLLUP_PERIOD_S = 20.0
-"""Pause when no readings are due."""
+"""Pause of the roll-up loop when no readings are due for aggregation."""
 
 ROLLUP_REST_SHARE = 3.0
-"""Ratio of pause to work: aggregating an old database takes a quarter of one core."""
+"""Ratio of pause to work; aggregating an old database uses a quarter of one core."""
 
 
 class RollupLoop:
@@ -84,14 +84,14 @@ class RollupLoop:
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Run forever."""
+        """Aggregate readings periodically; never returns."""
         while True:
             pulse.beat(ROLLUP_PERIOD_S)
             if not await self._round(pulse):
                 await self._clock.sleep(ROLLUP_PERIOD_S)
 
     async def _round(self, pulse: Pulse) -> bool:
-        """Aggregate once for each bearing that is due; return whether there was any."""
+        """Aggregate some readings of each bearing that is due; return whether any was due."""
         now_ns = self._clock.now_ns()
         try:
             due = await asyncio.to_thread(self._rollups.due, now_ns)
@@ -109,15 +109,15 @@ class RollupLoop:
 
 
 SCRUB_REST_SHARE = 49.0
-"""Ratio of pause to work: the loop takes a fiftieth of one core."""
+"""Ratio of pause to work; the loop uses a fiftieth of one core."""
 
 MIN_REST_S = 0.2
 SCRUB_PERIOD_S = 86_400.0
-"""Pause after all rows have been checked."""
+"""Pause of the scrub loop after all rows have been checked."""
 
 
 class ScrubLoop:
-    """Loop that searches for damaged rows, a few at a time, with pauses."""
+    """Loop that checks the checksums of all rows, some at a time, with pauses."""
 
     def __init__(self, integrity: Integrity, clock: Clock) -> None:
         self._integrity, self._clock = integrity, clock
@@ -126,7 +126,7 @@ class ScrubLoop:
         )
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Run forever."""
+        """Check rows periodically; never returns."""
         while True:
             pulse.beat(LOOK_S)
             if await self.look(pulse):

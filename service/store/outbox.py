@@ -1,4 +1,4 @@
-"""Messages to receivers, queued in the transaction that stores the reported event."""
+"""Outbox of alarm messages, which are queued in the transaction that stores the alarm event."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from service.store.database import Connection, Tables
 
 
 class MessageState(StrEnum):
-    """State of a message; all but `WAITING` are final."""
+    """Delivery state of a message; all states but `WAITING` are final."""
 
     WAITING = "waiting"
     DELIVERED = "delivered"
@@ -19,27 +19,27 @@ class MessageState(StrEnum):
 
 
 DEAD = (MessageState.REFUSED, MessageState.EXPIRED)
-"""States of messages that are never delivered."""
+"""Final states of undelivered messages."""
 
 
 @dataclass(frozen=True)
 class OutboxMessage:
-    """Message about an event of an alarm to one receiver.
+    """Message about an alarm event to one receiver.
 
     Parameters
     ----------
     event_id
-        Identifier of the event, the same for all receivers and attempts.
+        Identifier of the alarm event, the same for all receivers and attempts.
     body
-        Message as JSON.
+        Content of the message as JSON.
     queued_ns
-        Host time of queueing.
+        Time of queueing by the host clock.
     is_urgent
         Whether the message ends quiet hours.
     is_active
         Whether the receiver regards the alarm as active after the message.
     closes
-        Whether the message is only for a receiver that regards the alarm as active.
+        Whether the message is sent only to a receiver that regards the alarm as active.
     """
 
     receiver: str
@@ -52,28 +52,28 @@ class OutboxMessage:
 
 
 Address = Callable[[Alarm, AlarmEvent], Iterable[OutboxMessage]]
-"""Function that returns the messages about an event of an alarm."""
+"""Function that returns the outbox messages about an alarm event."""
 
 
 def no_recipients(alarm: Alarm, event: AlarmEvent) -> Iterable[OutboxMessage]:  # noqa: ARG001
-    """Return no messages."""
+    """Return no messages; the default for stores without alarm message receivers."""
     return ()
 
 
 @dataclass(frozen=True)
 class StoredMessage:
-    """Message in the outbox.
+    """Message in the outbox, with its delivery state.
 
     Parameters
     ----------
     id
         Number of the message, in the order of queueing.
     n_attempts
-        Number of failed attempts.
+        Number of delivery attempts.
     answer
         Result of the last attempt.
     done_ns
-        Time of delivery or of giving up; None while the message waits.
+        Time of delivery, refusal or expiry; None while the message waits.
     """
 
     id: int
@@ -90,7 +90,7 @@ class StoredMessage:
 
 @dataclass(frozen=True)
 class Backlog:
-    """Messages of one receiver.
+    """Delivery statistics of one receiver.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Backlog:
 
 
 MAX_ANSWER = 500
-"""Maximum length of a stored answer."""
+"""Maximum length of a stored answer, in characters."""
 
 INSERT = """
     INSERT INTO outbox
@@ -124,7 +124,7 @@ INSERT = """
         ORDER BY number DESC LIMIT 1
     ) = 1
 """
-"""A closing message is queued only if the previous one left the alarm active."""
+"""Statement that queues a message; with ``closes`` only if the last message was active."""
 
 COLUMNS = "id, receiver, event_id, body, queued_ns, is_urgent, state, n_attempts, answer, done_ns"
 SELECT_WAITING = f"""
@@ -150,7 +150,8 @@ EXPIRE = """
         AND alarm_event.number = outbox.number AND alarm_event.time_ns >= ?
     )
 """
-"""A recent event does not expire, even if a clock that was not yet set queued it in 1970."""
+"""Statement that expires old messages, but not messages about recent events: their stored time of
+queueing is wrong if the host clock was not yet set."""
 
 REVIVE = """
     UPDATE outbox SET state = 'waiting', done_ns = NULL, queued_ns = ?
@@ -164,47 +165,50 @@ COUNT = """
 def insert_messages(
     writer: Connection, event: AlarmEvent, messages: Iterable[OutboxMessage]
 ) -> None:
-    """Queue the messages about an event that has just been stored for the first time."""
+    """Queue the messages about a newly stored alarm event."""
     of = {"alarm": event.identity.id, "number": event.number}
     writer.executemany(INSERT, [{**vars(message), **of} for message in messages])
 
 
 class Outbox(Tables):
-    """Durable messages; a change is on the disk when its method returns."""
+    """Store of the outbox messages; changes are on the disk when a method returns."""
 
     def waiting(self, receiver: str, limit: int) -> list[StoredMessage]:
-        """Return the first messages that wait for a receiver, in order."""
+        """Return the oldest waiting messages to a receiver, in the order of queueing."""
         with self._reading() as reader:
             return [_message(row) for row in reader.execute(SELECT_WAITING, (receiver, limit))]
 
     def urgent(self, receiver: str) -> bool:
-        """Return whether any message that waits for a receiver ends quiet hours."""
+        """Return whether any waiting message to a receiver is urgent."""
         with self._reading() as reader:
             return bool(reader.execute(SELECT_URGENT, (receiver,)).fetchone()[0])
 
     def finish(self, message: int, state: MessageState, answer: str, now_ns: int) -> None:
-        """Record that a message was delivered or refused; repeating it has no effect."""
+        """Set the final state of a waiting message; no effect on other messages."""
         with self._writing() as writer:
             writer.execute(FINISH, (state.value, answer[:MAX_ANSWER], now_ns, message))
 
     def fail(self, message: int, answer: str) -> None:
-        """Record a failed attempt; the message keeps waiting."""
+        """Record a failed delivery attempt; the message stays in the queue."""
         with self._writing() as writer:
             writer.execute(FAIL, (answer[:MAX_ANSWER], message))
 
     def expire(self, receiver: str, before_ns: int, answer: str, now_ns: int) -> int:
-        """Give up messages whose queueing and event are older than a time; return their number."""
+        """Expire the waiting messages that were queued, and whose event occurred, before a time.
+
+        Returns the number of expired messages.
+        """
         given = (answer[:MAX_ANSWER], now_ns, receiver, before_ns, before_ns)
         with self._writing() as writer:
             return writer.execute(EXPIRE, given).rowcount
 
     def revive(self, receiver: str, now_ns: int) -> int:
-        """Queue refused and expired messages again, in their old order; return their number."""
+        """Queue refused and expired messages again, in the original order; return their number."""
         with self._writing() as writer:
             return writer.execute(REVIVE, (now_ns, receiver)).rowcount
 
     def backlogs(self) -> list[Backlog]:
-        """Return the backlog of every receiver that ever had a message."""
+        """Return the delivery statistics of every receiver that has had a message."""
         with self._reading() as reader:
             names = reader.execute("SELECT DISTINCT receiver FROM outbox ORDER BY receiver")
             return [_backlog(reader, str(name)) for (name,) in names.fetchall()]
@@ -262,4 +266,4 @@ OUTBOX_TABLES = """
     BEFORE UPDATE OF receiver, event_id, alarm, number, body ON outbox
     BEGIN SELECT RAISE(ABORT, 'messages are kept as they were queued'); END;
     """
-"""Migration that creates the table: a message for each event and receiver."""
+"""Migration that creates the outbox table, with one message per alarm event and receiver."""

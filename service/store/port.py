@@ -1,4 +1,4 @@
-"""Errors of the store, and the queries and results that its callers share."""
+"""Errors, queries and query results of the store."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from core.samples.gaps import Gap
 
 
 class StoreError(Exception):
-    """The database cannot be used; the message says why and what to do."""
+    """The database cannot be used; the message states the cause and the remedy."""
 
 
 class RefusedRowError(StoreError):
@@ -18,12 +18,12 @@ class RefusedRowError(StoreError):
 
 
 class QueryTooLargeError(Exception):
-    """A query exceeds the amount of data that one call returns; the message says by how much."""
+    """A query exceeds the amount of data that one call returns; the message states the limit."""
 
 
 @dataclass(frozen=True)
 class ValueRange:
-    """Inclusive bounds of a value; None leaves a side open."""
+    """Inclusive lower and upper bound of a value; None for no bound."""
 
     low: float | None = None
     high: float | None = None
@@ -31,7 +31,7 @@ class ValueRange:
 
 @dataclass(frozen=True)
 class UnitGap:
-    """Gap in the samples of one unit."""
+    """Gap in the samples of a unit, with the id of the unit."""
 
     unit: str
     gap: Gap
@@ -46,13 +46,13 @@ class TrendQuery:
     start_ns, end_ns
         Half-open time range.
     max_points
-        Readings beyond this number are aggregated into buckets of equal width.
+        If the range has more readings, they are aggregated into buckets of equal width.
     hole_ns
-        Readings further apart than this are separated by a hole.
+        Longest interval between consecutive readings that is not a hole in the trend.
     states
-        Operating states; empty for all.
+        Operating states to include; empty for all.
     is_page
-        Return single readings, oldest first; those beyond ``max_points`` belong to the next page.
+        Return single readings, oldest first; readings after ``max_points`` are on the next page.
     """
 
     unit: str
@@ -70,7 +70,7 @@ class TrendQuery:
 
 @dataclass(frozen=True)
 class TrendSeries:
-    """One quantity, a value for each bucket; None where no reading was usable."""
+    """Statistics of one quantity by bucket; None for buckets without a usable reading."""
 
     minimum: Sequence[float | None]
     maximum: Sequence[float | None]
@@ -86,11 +86,11 @@ class Trend:
     Parameters
     ----------
     bucket_ns
-        Width of the buckets, whose time is their start; None for single readings.
+        Width of the buckets, whose starts are in ``time_ns``; None for single readings.
     next_ns
         Time of the first reading of the next page; None on the last page.
     coarse_until_ns
-        End of the time for which only buckets are stored; None if the range begins after it.
+        Time up to which single readings were deleted; None if the range begins after it.
     """
 
     bucket_ns: int | None
@@ -102,7 +102,7 @@ class Trend:
 
 @dataclass(frozen=True)
 class StoredReadings:
-    """Readings of one bearing at one time, by the quantities that were stored then."""
+    """Stored readings of one bearing at one time, by quantity."""
 
     time_ns: int
     readings: Mapping[str, Reading]
@@ -110,20 +110,20 @@ class StoredReadings:
 
 @dataclass(frozen=True)
 class AlarmQuery:
-    """Query for events of alarms, newest first; None matches everything.
+    """Query for alarm events, newest first; None matches everything.
 
-    The operating condition is that under which the occurrence was raised.
+    Operating states and value ranges refer to the operating point at which the alarm was raised.
 
     Parameters
     ----------
     before
-        Only events with lower numbers.
+        Event number; only events with lower numbers are returned.
     limit
         Maximum number of events.
     start_ns, end_ns
         Half-open time range.
     states
-        Operating states; empty for all.
+        Operating states to include; empty for all.
     """
 
     before: int = 2**63 - 1
@@ -141,7 +141,7 @@ class AlarmQuery:
 
 @dataclass(frozen=True)
 class StoredEvent:
-    """Event of an alarm with its number in the store; numbers increase."""
+    """Alarm event with its number in the store; later events have higher numbers."""
 
     id: int
     event: AlarmEvent

@@ -1,4 +1,4 @@
-"""References of probe gaps and of 1× vectors: rows are only added, the newest one is in force."""
+"""Tables of gap references and 1× vector references; the newest reference is in force."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -17,13 +17,13 @@ MAX_AUTHOR = 80
 MAX_NOTE = 500
 
 MAX_HISTORY = 1000
-"""Maximum number of references of one bearing that are returned."""
+"""Maximum number of references of one bearing that `history` returns."""
 
 MicrometrePair = tuple[float, float]
 
 
 class ReferenceSource(StrEnum):
-    """Origin of the gaps of a reference."""
+    """Origin of the gap values of a reference: entered by a person, or measured."""
 
     GIVEN = "given"
     MEASURED = "measured"
@@ -31,25 +31,25 @@ class ReferenceSource(StrEnum):
 
 @dataclass(frozen=True)
 class GapReference:
-    """Probe gaps of a bearing with the shaft centred; followed by newer ones, never changed.
+    """Probe gaps of a bearing with the shaft centred; stored references are never changed.
 
     Parameters
     ----------
     set_ns
-        Time at which it was set, UTC.
+        Time at which the reference was set, UTC.
     author
-        Person who set it, 1 to 80 printable characters.
+        Person who set the reference, 1 to 80 printable characters.
     gap_reference_um
         Probe gaps (x, y), above 0 up to 10 000 µm.
     opposite_reference_um
-        Gaps of the probes across the shaft, where the bearing has them.
+        Gaps (x, y) of the opposite probes; None if the bearing has no opposite probes.
     note
-        At most 500 printable characters; may be empty.
+        Note of the author, at most 500 printable characters; may be empty.
 
     Raises
     ------
     ValueError
-        If a value is outside its limits; the message gives both.
+        If a value is outside its limits; the message states the value and the limit.
     """
 
     unit: str
@@ -88,12 +88,12 @@ def _check_text(what: str, text: str, n_most: int) -> None:
 
 @dataclass(frozen=True)
 class SetVectorReference:
-    """Reference vectors of 1× as set; followed by newer ones, never changed.
+    """1× vector reference with its author and time; stored references are never changed.
 
     Parameters
     ----------
     set_ns
-        Time at which they were set, UTC.
+        Time at which the reference was set, UTC.
     """
 
     reference: VectorReference
@@ -109,18 +109,18 @@ class _References(AuditedTables, Generic[_Reference]):
     table: str
     columns: tuple[str, ...]
     key: tuple[str, ...]
-    """First columns, which identify what a reference is in force for."""
+    """Key columns, the first of `columns`; one reference is in force per key."""
 
     order: str
-    """Order of the references in force."""
+    """Columns by which `in_force` orders the references."""
 
     def add(self, reference: _Reference) -> None:
-        """Write a reference, which is in force from then on; writing it again has no effect.
+        """Write a reference, which becomes the one in force; writing it again has no effect.
 
         Raises
         ------
         StoreError
-            If it was not written, or that is unknown.
+            If the reference was not written, or the outcome is unknown.
         """
         row = self._row(reference)
         key = " AND ".join(f"{name} = ?" for name in self.key)
@@ -134,12 +134,12 @@ class _References(AuditedTables, Generic[_Reference]):
                 writer.execute(insert(self.table, self.columns), row)
 
     def in_force(self) -> list[_Reference]:
-        """Return the references in force: the last one set, whatever its time."""
+        """Return the reference in force of each key: the last one written, whatever its time."""
         newest = f"SELECT max(id) FROM {self.table} GROUP BY {', '.join(self.key)}"  # noqa: S608
         return self._read(f"WHERE id IN ({newest}) ORDER BY {self.order}")
 
     def history(self, unit: str, bearing: str) -> list[_Reference]:
-        """Return the references of a bearing, newest first; at most the newest thousand."""
+        """Return the newest references of a bearing, newest first; at most `MAX_HISTORY`."""
         where = "WHERE unit = ? AND bearing = ? ORDER BY id DESC LIMIT ?"
         return self._read(where, unit, bearing, MAX_HISTORY)
 
@@ -163,7 +163,7 @@ class _References(AuditedTables, Generic[_Reference]):
 
 
 class GapReferenceStore(_References[GapReference]):
-    """Gap references, in force for a bearing."""
+    """Table of the gap references of all bearings; one reference is in force per bearing."""
 
     table = "gap_reference"
     columns = (
@@ -209,7 +209,7 @@ def _gaps(reference: GapReference) -> dict[str, object]:
 
 
 class VectorReferenceStore(_References[SetVectorReference]):
-    """Reference vectors of 1×, in force for a bearing in an operating state."""
+    """Table of the 1× vector references; one is in force per bearing and operating state."""
 
     table = "vector_reference"
     columns = ("unit", "bearing", "state", "set_ns", "author", "note", "vectors")
@@ -270,4 +270,4 @@ VECTOR_REFERENCE_TABLES = """
     CREATE TRIGGER vector_reference_kept BEFORE DELETE ON vector_reference
     BEGIN SELECT RAISE(ABORT, 'references are kept'); END;
 """
-"""Migration that creates the table."""
+"""Migration that creates the table of 1× vector references."""

@@ -1,9 +1,11 @@
-"""Retention: rules by which old results are deleted, or kept as roll-ups only.
+"""Retention: rules for the deletion of old results and roll-ups.
 
-A new rule is a setting in `RetentionSettings` and an entry in `BEARING_RULES` or `PLANT_RULES`.
+A new rule consists of a setting in `RetentionSettings` and an entry in `BEARING_RULES` or
+`PLANT_RULES`.
 
-Readings and roll-ups are deleted in bounded steps, and only if all wider roll-ups have been
-recomputed and agree with them. An hour that disagrees is aggregated again while its readings exist.
+Readings and roll-ups are deleted in small steps. Before a deletion, all wider roll-ups are compared
+with roll-ups recomputed from the data. An hour that differs is aggregated again if its readings are
+still stored.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,16 +31,16 @@ from service.store.rollups.writing import (
 from service.store.trends import Span
 
 MAX_READINGS = 1000
-"""Readings per step, which blocks other writers for some tens of milliseconds."""
+"""Maximum number of readings per step; a step blocks other writers for tens of milliseconds."""
 
 MAX_HOURS = 6
-"""Hours of roll-ups per step."""
+"""Maximum number of hours of roll-ups that are deleted per step."""
 
 MAX_FILM_READINGS = 5000
 MAX_MESSAGES = 500
 
 MEAN_TOLERANCE = 1e-9
-"""Relative to the extremes: sums depend on the order of their terms."""
+"""Tolerance of means, relative to the extremes; rounding depends on the order of summation."""
 
 NEXT_READINGS = """
     SELECT time_ns FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?
@@ -65,8 +67,9 @@ OLD_MESSAGES = """
         AND alarm_event.number = old.number AND alarm_event.time_ns >= ?
     ) ORDER BY id LIMIT ?
 """
-"""The last message about each alarm stays, since later messages depend on it. Messages about recent
-events stay as well: a host whose clock began in 1970 has recorded an early time of sending."""
+"""Query of old messages. It excludes the last message about each alarm, on which later messages
+depend, and messages about recent events: their stored sending time may be too early if the host
+clock started in 1970."""
 
 DELETE_MESSAGE = "DELETE FROM outbox WHERE id = ?"
 BELIEVED = """
@@ -77,15 +80,15 @@ BELIEVED = """
     ) AS start_ns FROM series) AS believed
 """
 BELIEVED_HOURS = (HOUR_NS // NS_PER_S, 23)
-"""The 24th newest hour with results of any bearing; each is found at the end of an index.
-Not by DISTINCT, for which SQLite 3.40 returns the oldest hour if there are fewer."""
+"""Parameters of `BELIEVED`: roll-up width, and offset of the 24th newest hour with results.
+The query has no DISTINCT, since SQLite 3.40 then returns the oldest hour if there are fewer."""
 
 
 class Step(Enum):
-    """Result of a step of deletion."""
+    """Result of one deletion step."""
 
     NONE = "none"
-    """Nothing is due."""
+    """No rows are due for deletion."""
 
     DONE = "done"
     """Rows were deleted."""
@@ -95,7 +98,7 @@ class Step(Enum):
 
 
 def _delete_readings(writer: Connection, series: int, before_ns: int) -> Step:
-    """Delete the next old single readings of a bearing."""
+    """Delete the next single readings of a bearing before a time, in whole hours."""
     deleted = select_deleted(writer, series)
     limit_ns = _floor(min(before_ns, select_mark(writer, series)))
     span = _next_readings(writer, series, (deleted.readings_ns, limit_ns))
@@ -108,10 +111,11 @@ def _delete_readings(writer: Connection, series: int, before_ns: int) -> Step:
 
 
 def _delete_rollups(width_s: int, writer: Connection, series: int, before_ns: int) -> Step:
-    """Delete the next old roll-ups of a width.
+    """Delete the next roll-ups of one width of a bearing before a time.
 
-    Roll-ups that disagree with wider ones stay and block later ones: finer data are gone, so they
-    cannot be aggregated again, and one time marks the end of what was deleted.
+    Roll-ups that differ from wider ones are kept and block the deletion of later ones. They cannot
+    be aggregated again, since finer data are deleted, and only one time per width is stored up to
+    which data were deleted.
     """
     width_ns, deleted = width_s * NS_PER_S, select_deleted(writer, series)
     finer_s = {wider // NS_PER_S: finer // NS_PER_S for finer, wider in pairwise((0, *WIDTHS_NS))}
@@ -146,27 +150,27 @@ BEARING_RULES: Mapping[str, Callable[[Connection, int, int], Step]] = {
     "ten_minutes_days": partial(_delete_rollups, 600),
     "films_days": _delete_films,
 }
-"""Deletion of the data of a bearing before a time, by the setting of their age; finest first."""
+"""Functions that delete data of a bearing before a time, by age setting; finest data first."""
 
 PLANT_RULES: Mapping[str, Callable[[Connection, int], Step]] = {"messages_days": _delete_messages}
-"""Deletion of other data before a time, by the setting of their age."""
+"""Functions that delete data of the whole plant before a time, by age setting."""
 
 Ages = Mapping[str, int]
-"""Age in ns beyond which data are deleted, by setting; data without an entry are kept for ever."""
+"""Maximum age of data in ns, by setting; data without an entry are never deleted."""
 
 
 def ages_of(settings: RetentionSettings) -> Ages:
-    """Return the ages of the settings that limit one."""
+    """Return the maximum ages of the settings that are greater than zero."""
     return {name: round(days * DAY_NS) for name, days in settings if days > 0.0}
 
 
 class RetentionStore(Tables):
-    """Deletion of old data in bounded, atomic steps.
+    """Deletion of old data in small, atomic steps.
 
     Parameters
     ----------
     give_back
-        Returns some free space to the disk; the result is whether there is more.
+        Function that releases free pages to the file system; returns False if none were released.
     """
 
     def __init__(
@@ -178,7 +182,7 @@ class RetentionStore(Tables):
 
     @property
     def trouble(self) -> str | None:
-        """Reason why some old data cannot be deleted; None if all can."""
+        """Reason why some old data cannot be deleted; None if all data can be deleted."""
         if not self._blocked:
             return None
         setting, series = min(self._blocked)
@@ -188,23 +192,23 @@ class RetentionStore(Tables):
         )
 
     def series(self) -> list[int]:
-        """Return the numbers of all bearings."""
+        """Return the series numbers of all bearings."""
         with self._reading() as reader:
             return [int(row[0]) for row in reader.execute("SELECT id FROM series ORDER BY id")]
 
     def believed_ns(self) -> int | None:
-        """Return the newest time with a day of results up to it; None if there are fewer."""
+        """Return the latest of the bearings' 24th newest hours with results; None without one."""
         with self._reading() as reader:
             found: int | None = reader.execute(BELIEVED, BELIEVED_HOURS).fetchone()[0]
         return found
 
     def delete(self, series: int, ages: Ages, now_ns: int) -> bool:
-        """Delete some old data of a bearing; return whether any were due.
+        """Delete some old data of a bearing; return whether any data were deleted.
 
         Raises
         ------
         StoreError
-            If nothing was deleted.
+            If a transaction failed; it deleted nothing.
         """
         found = False
         for setting, rule in BEARING_RULES.items():
@@ -218,7 +222,7 @@ class RetentionStore(Tables):
         return found
 
     def prune(self, ages: Ages, now_ns: int) -> bool:
-        """Delete some old data that belong to no bearing; return whether more are due."""
+        """Delete some old data of the whole plant; return whether more data are due."""
         found = False
         for setting, rule in PLANT_RULES.items():
             if setting in ages:
@@ -228,7 +232,7 @@ class RetentionStore(Tables):
 
 
 def _next_readings(writer: Connection, series: int, within: Span) -> Span:
-    """Return the next whole hours with readings; an empty span if there are none."""
+    """Return the span of the next whole hours with readings; empty span without readings."""
     rows = writer.execute(NEXT_READINGS, (series, *within, MAX_READINGS)).fetchall()
     if not rows:
         return within[0], within[0]
@@ -245,7 +249,10 @@ def _next_cells(writer: Connection, series: int, width_s: int, within: Span) -> 
 
 
 def _verified_until(writer: Connection, series: int, span: Span) -> int:
-    """Return the end of the hours that agree with roll-ups; schedule the next hour to be redone."""
+    """Return the end of the hours that agree with their roll-ups.
+
+    The first hour that differs is scheduled for aggregation.
+    """
     redone = {row[0] for row in writer.execute(REDONE, (series, *span))}
     for hour_ns in range(span[0], span[1], HOUR_NS):
         if hour_ns in redone:
@@ -261,7 +268,7 @@ def _verified_until(writer: Connection, series: int, span: Span) -> int:
 
 
 def _agrees(writer: Connection, series: int, fine: Cells, width_ns: int, span: Span) -> bool:
-    """Return whether the roll-ups of a width equal the aggregate of finer ones."""
+    """Return whether the roll-ups of a width equal the aggregate of finer cells."""
     wanted = fine.gathered(width_ns)
     found = select_cells(writer, series, width_ns, span, rolled_columns())
     return found is not None and _is_same(found, wanted)
@@ -302,7 +309,7 @@ RETENTION_TABLES = """
     CREATE TRIGGER outbox_kept BEFORE DELETE ON outbox WHEN OLD.state = 'waiting'
     BEGIN SELECT RAISE(ABORT, 'waiting messages are kept'); END;
 """
-"""Migration that creates the table of deleted data.
+"""Migration that creates the table of the times up to which data were deleted.
 
-``until_ns``, a whole hour, ends the single readings (width 0) or narrow roll-ups that were deleted.
+``until_ns``, a whole hour, is the end of the deleted single readings (width 0) or roll-ups.
 """

@@ -1,8 +1,8 @@
-"""Schema and migrations: numbered, atomic, never edited once released.
+"""Migrations of the database schema: numbered, atomic, never edited once released.
 
-Migrations are written for SQLite. PostgreSQL gets them through `service.store.postgres.schema`,
-which translates column types, ``STRICT``, ``WITHOUT ROWID`` and triggers, and holds those that it
-cannot translate. A new migration is appended here; the tests of the store run it on both.
+Migrations are written for SQLite. For PostgreSQL `service.store.postgres.schema` translates column
+types, ``STRICT``, ``WITHOUT ROWID`` and triggers, and replaces migrations that it cannot translate.
+A new migration is appended to `MIGRATIONS`; the tests of the store run it on both databases.
 """
 
 from service.store.access.tables import ACCESS_TABLES, MUST_CHANGE
@@ -156,4 +156,4 @@ MIGRATIONS = (
         for table in ("alarm", "alarm_event")
     ),
 )
-"""Statement lists; the n-th leads from schema n to schema n + 1."""
+"""SQL script of each migration; item n migrates a database from schema n to schema n + 1."""

@@ -1,4 +1,4 @@
-"""Checksums of stored rows, and the rows that differ from them."""
+"""Checksums of stored rows (seals), and detection of damaged and missing rows."""
 
 import marshal
 import sqlite3
@@ -12,19 +12,19 @@ from typing import Any
 from service.store.database import Connection
 
 MAX_PLACES = 1000
-"""Maximum number of places that are listed; further ones are only counted."""
+"""Maximum number of damaged rows that are listed; further ones are only counted."""
 
 
 @dataclass(frozen=True)
 class Place:
-    """Row that is damaged or missing.
+    """Table and key of a damaged or missing row.
 
     Parameters
     ----------
     key
         Key of the row as text.
     is_missing
-        Whether the row is missing.
+        Whether the row is missing, not damaged.
     """
 
     table: str
@@ -33,12 +33,12 @@ class Place:
 
 
 class DamageLog:
-    """Damaged rows found since the start, each once; used from several threads.
+    """Log of the damaged rows found since the start, without duplicates; thread-safe.
 
     Parameters
     ----------
     most
-        Maximum number of listed places.
+        Maximum number of rows that are listed.
     """
 
     def __init__(self, most: int = MAX_PLACES) -> None:
@@ -49,17 +49,17 @@ class DamageLog:
 
     @property
     def n_damaged(self) -> int:
-        """Number of damaged rows; beyond `most` a row that is found again may count again."""
+        """Number of damaged rows; rows beyond the listed ones may be counted repeatedly."""
         return len(self._places) + self._n_more
 
     @property
     def places(self) -> Sequence[Place]:
-        """Damaged rows in the order in which they were found."""
+        """Listed damaged rows in the order in which they were found."""
         with self._lock:
             return list(self._places)
 
     def note(self, place: Place) -> None:
-        """Add a damaged row."""
+        """Add a damaged or missing row."""
         with self._lock:
             if place in self._places:
                 return
@@ -70,44 +70,44 @@ class DamageLog:
 
 
 Cell = int | float | bytes | None
-"""Value of a stored row; texts as bytes, since damaged text may not be UTF-8."""
+"""Column value of a stored row; text as bytes, since damaged text may not be UTF-8."""
 
 FORMAT = 1
-"""Format of checksums; those of another format are computed anew."""
+"""Version of the checksum format; checksums of another version are recomputed."""
 
 _VERSION = 2
-"""Version of `marshal`, which encodes types, lengths and all bits of numbers.
+"""`marshal` version with which rows are encoded, including types, lengths and all bits.
 
-Later versions write repeated values as references, so that equal rows may differ."""
+Later versions encode repeated values as references, so that equal rows could differ."""
 
 
 def initial_crc(table: str) -> int:
-    """Return the initial value of the checksums of a table."""
+    """Return the initial CRC-32 for the rows of a table."""
     return zlib.crc32(table.encode())
 
 
 def seal_of(begun_with: int, cells: tuple[Cell, ...]) -> int:
-    """Return the CRC-32 of a row, continued from the initial value of its table."""
+    """Return the CRC-32 of a row, starting from the initial value of its table."""
     return zlib.crc32(marshal.dumps(cells, _VERSION), begun_with)
 
 
 SEAL, IS_WHOLE = "padwatch_seal_", "padwatch_is_whole_"
-"""SQL functions of padwatch's connections, one per table for speed."""
+"""Name prefixes of the SQL functions that compute and check checksums; one pair per table."""
 
 WHOLE = "whole_"
-"""Prefix of views that omit damaged rows also on a writing connection."""
+"""Name prefix of the views without damaged rows, which also exist on writing connections."""
 
 
 @dataclass(frozen=True)
 class SealedTable:
-    """Table with checksums of its rows.
+    """Table whose rows have checksums, which are stored in a separate table.
 
     Parameters
     ----------
     types
-        Types of the columns, in their order.
+        SQL types by column name, in column order.
     key
-        Columns of the key.
+        Names of the primary key columns.
     """
 
     name: str
@@ -116,19 +116,19 @@ class SealedTable:
 
     @property
     def columns(self) -> Sequence[str]:
-        """Names of the columns, in their order."""
+        """Column names, in column order."""
         return list(self.types)
 
     @property
     def seals(self) -> str:
-        """Name of the table with the checksums."""
+        """Name of the checksum table."""
         return f"seal_{self.name}"
 
     @cached_property
     def create(self) -> Sequence[str]:
-        """Statements that create the table of checksums and fill it."""
+        """Statements that create and fill the checksum table."""
         keys = ", ".join(self.key)
-        # with the same types, since the index is not used otherwise
+        # the key has the same types as in the table; otherwise SQLite does not use the index
         typed = ", ".join(f"{column} {self.types[column]} NOT NULL" for column in self.key)
         return (
             f"CREATE TABLE {self.seals} ({typed}, seal INTEGER NOT NULL, PRIMARY KEY ({keys}))"
@@ -138,7 +138,7 @@ class SealedTable:
 
     @cached_property
     def triggers(self) -> Sequence[str]:
-        """Statements by which this connection maintains the checksums."""
+        """Statements that create the temporary triggers that update the checksums."""
         keys = ", ".join(self.key)
         put = (
             f"INSERT INTO {self.seals} VALUES ({self._listed('NEW.')}, {self._seal('NEW.')})"  # noqa: S608
@@ -153,7 +153,10 @@ class SealedTable:
         ]
 
     def view(self, before: str = "") -> str:
-        """Return the statement by which this connection sees intact rows only, under a name."""
+        """Return the statement that creates a temporary view of the intact rows.
+
+        The view has the name of the table after the prefix `before`.
+        """
         listed = ", ".join(f"r.{column} AS {column}" for column in self.columns)
         return (
             f"CREATE TEMP VIEW {before}{self.name} AS SELECT {listed}"  # noqa: S608
@@ -161,12 +164,12 @@ class SealedTable:
         )
 
     def is_whole(self, of: str) -> str:
-        """Return the expression that a row fits its checksum."""
+        """Return the SQL condition that a row matches its checksum."""
         seal = f"SELECT s.seal FROM main.{self.seals} AS s WHERE {self.matched(of, 's.')}"  # noqa: S608
         return f"{IS_WHOLE}{self.name}(({seal}), {self._cells(of)})"
 
     def matched(self, of: str, ours: str = "") -> str:
-        """Return the expression that a row has the key of a checksum."""
+        """Return the SQL condition that a row and a checksum have the same key."""
         return " AND ".join(f"{ours}{column} = {of}{column}" for column in self.key)
 
     def _seal(self, of: str) -> str:
@@ -183,17 +186,18 @@ class SealedTable:
 
 
 OTHERWISE_KEPT = frozenset({"spectrum", "high_water", "rollup_redo"})
-"""Tables whose rows have checksums of their own, or only list pending work."""
+"""Tables without seals: their rows include a checksum, or only list pending work."""
 
 SCHEMA = "CREATE TABLE IF NOT EXISTS seal_schema (id INTEGER PRIMARY KEY, number INTEGER)"
 SEALED_AT = "SELECT number FROM seal_schema WHERE id = 1"
 SET_SEALED_AT = "INSERT OR REPLACE INTO seal_schema VALUES (1, ?)"
-"""An upgrade may change rows, so checksums of an older schema are computed anew."""
+"""Statement that writes the schema and format of the checksums, which are recomputed after a
+migration, since it may change rows."""
 PER_FORMAT = 1_000_000
-"""Factor of the format in that number."""
+"""Factor of the format in the stored number, ``format * PER_FORMAT + schema``."""
 
 WALK = "CREATE TABLE IF NOT EXISTS seal_walk (id INTEGER PRIMARY KEY, place TEXT)"
-"""Table with the progress of the check of all rows."""
+"""Statement that creates the table with the progress of `Scrubber`."""
 
 TABLES = """
     SELECT name FROM main.sqlite_master
@@ -202,12 +206,12 @@ TABLES = """
 
 
 class Seals:
-    """Checksums of one database file.
+    """Row checksums of one database file.
 
     Parameters
     ----------
     damage
-        Receives rows that do not fit their checksums.
+        Log that receives the rows that do not match their checksums.
     """
 
     def __init__(self, damage: DamageLog) -> None:
@@ -215,7 +219,7 @@ class Seals:
         self.tables: dict[str, SealedTable] = {}
 
     def begin(self, writer: sqlite3.Connection) -> None:
-        """Create missing checksums within a transaction, and maintain them on this connection."""
+        """Create missing checksums in a transaction; add triggers and views to the connection."""
         self.tables = {table.name: table for table in _tables(writer)}
         self.register_functions(writer)
         (schema,) = writer.execute("PRAGMA main.user_version").fetchone()
@@ -236,20 +240,20 @@ class Seals:
                 writer.execute(statement)
 
     def load(self, reader: sqlite3.Connection) -> None:
-        """Read which tables have checksums, in a database that another process may be writing."""
+        """Find the tables with checksums of a database that another process may be writing."""
         there = {name for (name,) in reader.execute("SELECT name FROM main.sqlite_master")}
         self.tables = {t.name: t for t in _tables(reader) if t.seals in there}
         self.register_functions(reader)
 
     def install_views(self, reader: sqlite3.Connection) -> None:
-        """Let a connection see intact rows only."""
+        """Create views on a connection that hide damaged rows."""
         self.register_functions(reader)
         for table in self.tables.values():
             reader.execute(table.view())
             reader.execute(table.view(WHOLE))
 
     def register_functions(self, connection: sqlite3.Connection) -> None:
-        """Register the functions that compute checksums on a connection."""
+        """Register the SQL functions that compute and check checksums on a connection."""
         for name in self.tables:
             connection.create_function(SEAL + name, -1, _sealed(name), deterministic=True)
             is_whole = self._is_whole(name)
@@ -299,24 +303,24 @@ def _table(reader: sqlite3.Connection, name: str) -> SealedTable:
 
 
 ROWS_AT_ONCE = 2000
-"""Rows per transaction: a short one does not make the log grow."""
+"""Number of rows per query of a walk; short read transactions keep the WAL small."""
 
 Key = tuple[Any, ...]
-"""Values of the key of a row."""
+"""Values of the primary key columns of a row."""
 
 
 @dataclass(frozen=True)
 class Walk:
-    """Walk through a table or its checksums, in order of the key.
+    """Check of all rows of a table, or of all its checksums, in order of the primary key.
 
     Parameters
     ----------
     source
-        Statement for keys, and whether the row is as it should be.
+        SQL query of the key columns and a flag: row intact, or row present for checksums.
     keys
-        Columns of the key in the statement.
+        Key columns in the query, separated by commas.
     is_of_seals
-        Whether checksums are read, whose rows may be missing.
+        Whether the checksum table is read, to find missing rows.
     """
 
     table: SealedTable
@@ -327,9 +331,9 @@ class Walk:
     def page(
         self, reader: Connection, log: DamageLog, after: Key | None, n_rows: int = ROWS_AT_ONCE
     ) -> Key | None:
-        """Check the rows after a key; return the last key, or None at the end.
+        """Check up to `n_rows` rows after a key; return the last key, or None at the end.
 
-        The SQL function that compares checksums adds altered rows to the log.
+        Missing rows are added to the log here, altered rows by the SQL function of the query.
         """
         marks = ", ".join("?" * len(self.table.key))
         beyond = "" if after is None else f"WHERE ({self.keys}) > ({marks})"
@@ -343,7 +347,7 @@ class Walk:
 
 
 def walks(table: SealedTable) -> tuple[Walk, Walk]:
-    """Return the walks through rows, for altered ones, and through checksums, for missing ones."""
+    """Return the walk over the rows, which finds altered rows, and over the checksums (missing)."""
     keys, of_seals = _keys(table, "r."), _keys(table, "s.")
     row = f"SELECT 1 FROM main.{table.name} AS r WHERE {table.matched('s.', 'r.')}"  # noqa: S608
     rows = f"SELECT {keys}, {table.is_whole('r.')} FROM main.{table.name} AS r"  # noqa: S608

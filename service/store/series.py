@@ -1,4 +1,4 @@
-"""Series of results: identifiers, unique times, and readings as bytes."""
+"""Result series of bearings: series numbers, unique times, and binary encoding of readings."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -18,13 +18,13 @@ ADD = "INSERT INTO series (unit, bearing) VALUES (?, ?) ON CONFLICT DO NOTHING"
 
 
 def find_series(reader: Connection, unit: str, bearing: str) -> int | None:
-    """Return the number of a unit's bearing; None if it has none."""
+    """Return the series number of a bearing; None if the bearing has no series."""
     found = reader.execute(FIND, (unit, bearing)).fetchone()
     return None if found is None else int(found[0])
 
 
 def series_of(writer: Connection, unit: str, bearing: str) -> int:
-    """Return the number of a unit's bearing, assigning one if it has none."""
+    """Return the series number of a bearing; assign a new number if it has none."""
     found = find_series(writer, unit, bearing)
     if found is None:
         writer.execute(ADD, (unit, bearing))
@@ -39,17 +39,17 @@ def unique_time_ns(
     time_ns: int,
     measured: tuple[object, ...],
 ) -> int:
-    """Return the first time from `time_ns` on that is free, or is taken by the same measurement.
+    """Return the first time from `time_ns` on that no other measurement has.
 
-    A device whose clock restarts or is set back produces the same times again for other
-    measurements.
+    A device whose clock restarts or is set back reports the same times again for different
+    measurements. A measurement that is already stored at a time keeps that time.
 
     Parameters
     ----------
     select
         Statement that reads the columns of `measured` by key and time.
     measured
-        Values that distinguish measurements.
+        Values that identify the measurement.
     """
     while writer.execute(select, (*key, time_ns)).fetchone() not in (None, measured):
         time_ns += 1
@@ -57,7 +57,7 @@ def unique_time_ns(
 
 
 LEVEL_SHIFT = 6
-"""A quality byte holds the level in its upper two bits and the number of the reason below."""
+"""Bit offset of the level in a quality byte; the lower six bits are the number of the reason."""
 
 
 U_RANDOM, U_SYSTEMATIC = ".u_random", ".u_systematic"
@@ -65,16 +65,16 @@ U_RANDOM, U_SYSTEMATIC = ".u_random", ".u_systematic"
 
 
 def columns_of(quantities: Iterable[Quantity]) -> tuple[str, ...]:
-    """Return the columns of quantities and of the uncertainties that are kept."""
+    """Return the column names of quantities and of their stored uncertainties."""
     suffixes = {False: ("",), True: ("", U_RANDOM, U_SYSTEMATIC)}
     return tuple(q.name + suffix for q in quantities for suffix in suffixes[q.keeps_uncertainty])
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Columns of a stored row, and the reasons that its numbers stand for.
+    """Column names of stored rows, and quality reasons by the number in the quality byte.
 
-    Rows keep the layout with which they were written, so that the catalogue can grow.
+    Each row refers to the layout with which it was written, so that the catalogue can grow.
     """
 
     quantities: tuple[str, ...]
@@ -82,21 +82,21 @@ class Layout:
 
     @classmethod
     def of(cls, quantities: tuple[str, ...]) -> "Layout":
-        """Return the layout that this version of padwatch writes."""
+        """Return the layout of some columns with all quality reasons of this padwatch version."""
         return cls(quantities, tuple(reason.value for reason in Reason))
 
     def dumps(self) -> tuple[str, str]:
-        """Return quantities and reasons as JSON, as stored."""
+        """Return the quantities and the reasons as JSON texts, as stored."""
         return json.dumps(self.quantities), json.dumps(self.reasons)
 
     @staticmethod
     @lru_cache(maxsize=64)
     def loads(quantities: str, reasons: str) -> "Layout":
-        """Invert `dumps`; cached, since every query reads the same few layouts."""
+        """Return the layout from the JSON texts of `dumps`; cached, since there are few layouts."""
         return Layout(tuple(json.loads(quantities)), tuple(json.loads(reasons)))
 
     def encode(self, readings: Mapping[str, Reading]) -> tuple[bytes, bytes]:
-        """Return values (NaN for none) and qualities, in the order of the layout."""
+        """Return the values (NaN if missing) and quality bytes, in the order of the layout."""
         ordered = [_column(readings, name) for name in self.quantities]
         values = np.array([number for number, _ in ordered], dtype="<f8")
         qualities = bytes(
@@ -108,14 +108,14 @@ class Layout:
     def decode(
         self, values: list[bytes], qualities: list[bytes]
     ) -> tuple[FloatArray, npt.NDArray[np.uint8]]:
-        """Return values (NaN for none) and quality levels, both (n_rows, n_quantities)."""
+        """Return values (NaN if missing) and quality levels, both of (n_rows, n_quantities)."""
         shape = (len(values), len(self.quantities))
         number = np.frombuffer(b"".join(values), dtype="<f8").reshape(shape)
         byte = np.frombuffer(b"".join(qualities), dtype=np.uint8).reshape(shape)
         return number.astype(np.float64), (byte >> LEVEL_SHIFT).astype(np.uint8)
 
     def readings(self, values: bytes, qualities: bytes) -> dict[str, Reading]:
-        """Return the readings of one row, without uncertainties."""
+        """Return the readings of one row by quantity, without uncertainties."""
         numbers, _ = self.decode([values], [qualities])
         rows = zip(self.quantities, numbers[0].tolist(), qualities, strict=True)
         return {name: self._reading(value, byte) for name, value, byte in rows if "." not in name}
@@ -136,7 +136,7 @@ def _column(readings: Mapping[str, Reading], column: str) -> tuple[float, Qualit
 
 
 def remember_layout(writer: Connection, layout: Layout) -> int:
-    """Return the number of a layout, assigning one if it has none."""
+    """Return the stored number of a layout; store the layout if it is new."""
     key = layout.dumps()
     writer.execute(
         "INSERT INTO layout (quantities, reasons) VALUES (?, ?) ON CONFLICT DO NOTHING", key

@@ -1,4 +1,4 @@
-"""Rows by which processes share a plant: states of units, commands, positions in a stream."""
+"""Tables for communication between processes: unit status, operator commands, stream positions."""
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import astuple, dataclass, fields
@@ -10,20 +10,20 @@ from service.store.database import Connection, Tables, insert, upsert
 
 @dataclass(frozen=True)
 class UnitReport:
-    """Report of a process on a unit at one moment.
+    """Status report of a process on a unit.
 
     Parameters
     ----------
     n_beats
-        Number of the report; a running process never repeats one.
+        Number of the report, unique within a process.
     beat_ns
         Time of the report by the clock of its host; for information only.
     link, reason
-        State of the link to the samples, and the reason for it.
+        State of the connection to the sample source, and the reason for the state.
     signs
-        Document on the arrival of samples and the age of all data.
+        JSON document with the arrival of samples and the age of all data.
     revision
-        Revision of the state, which changes with it.
+        Revision number of `state`.
     state
         Document with results and alarms; None if unchanged since the previous report.
     """
@@ -41,7 +41,7 @@ class UnitReport:
 
 @dataclass(frozen=True)
 class UnitBeat:
-    """Newest report on a unit, without its state.
+    """Newest status report on a unit, without the state document.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ UPDATE_BEAT = """
     last_sample_ns = :last_sample_ns, signs = :signs
     WHERE unit = :unit AND process = :process AND revision = :revision
 """
-"""Does not write the state, which is large."""
+"""Statement that updates a report without its state document, which is large."""
 
 UPSERT_REPORT = upsert("unit_status", [*REPORT_COLUMNS, "process"], ("unit",))
 SELECT_BEATS = (
@@ -88,12 +88,12 @@ SELECT_STATE = "SELECT process, revision, state FROM unit_status WHERE unit = ?"
 
 
 class UnitStates(Tables):
-    """Newest report on each unit."""
+    """Store of the newest status report on each unit."""
 
     def report(self, process: str, reports: Sequence[UnitReport]) -> None:
-        """Write reports of a process in one transaction."""
+        """Write the status reports of a process in one transaction."""
         with self._writing() as writer:
-            # always in the same order, so that two writers cannot deadlock
+            # in a fixed order, so that two writers cannot deadlock
             for report in sorted(reports, key=lambda report: report.unit):
                 if report.state is None:
                     writer.execute(UPDATE_BEAT, {**vars(report), "process": process})
@@ -101,12 +101,12 @@ class UnitStates(Tables):
                     writer.execute(UPSERT_REPORT, (*astuple(report), process))
 
     def beats(self) -> list[UnitBeat]:
-        """Return the newest report on each unit, without the states."""
+        """Return the newest status report on each unit, without the state documents."""
         with self._reading() as reader:
             return [UnitBeat(*row) for row in reader.execute(SELECT_BEATS)]
 
     def states(self, units: Collection[str]) -> dict[str, tuple[str, int, bytes]]:
-        """Return the process, revision and state document of units, by unit."""
+        """Return process, revision and state document of the given units that have a report."""
         with self._reading() as reader:
             found = {unit: reader.execute(SELECT_STATE, (unit,)).fetchone() for unit in units}
         return {
@@ -117,7 +117,7 @@ class UnitStates(Tables):
 
 
 class CommandState(StrEnum):
-    """State of a command."""
+    """State of an operator command."""
 
     WAITING = "waiting"
     TAKEN = "taken"
@@ -129,12 +129,12 @@ class CommandState(StrEnum):
 
 
 OPEN = (CommandState.WAITING, CommandState.TAKEN)
-"""States of unanswered commands."""
+"""States of commands without a final answer."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """Command of an operator whose permission has been checked.
+    """Operator command; the operator's permission has already been checked.
 
     Parameters
     ----------
@@ -143,9 +143,9 @@ class Command:
     unit
         Unit whose process executes the command.
     kind, document
-        Kind of command, and its arguments.
+        Kind of command, and its arguments as JSON.
     actor, peer
-        Operator, and the address of the request.
+        Name of the operator, and network address of the request.
     expires_ns
         Latest time at which execution may begin, by the clock of the sending host.
     """
@@ -162,7 +162,7 @@ class Command:
 
 @dataclass(frozen=True)
 class OpenCommand:
-    """Unanswered command, and the process that has taken it, if any."""
+    """Command without a final answer; `taken_by` is the executing process, None while waiting."""
 
     command: Command
     taken_by: str | None
@@ -170,7 +170,7 @@ class OpenCommand:
 
 @dataclass(frozen=True)
 class Answer:
-    """Final state of a command, with an explanation where there is one."""
+    """State of a command with an explanation, which may be empty."""
 
     state: CommandState
     words: str
@@ -198,10 +198,10 @@ COMMAND_TABLES = """
 """
 
 KEPT_NS = 7 * 86_400 * NS_PER_S
-"""Time for which answered commands are kept; the audit trail records their effects."""
+"""Retention time of commands; the audit trail records their effects permanently."""
 
 MAX_OPEN = 200
-"""Maximum number of unanswered commands that are returned."""
+"""Maximum number of commands that `Commands.open` reads."""
 
 COMMAND_COLUMNS = [field.name for field in fields(Command)]
 INSERT = insert("operator_command", COMMAND_COLUMNS) + " ON CONFLICT (id) DO NOTHING"
@@ -227,62 +227,62 @@ MAX_WORDS = 2000
 
 
 class Commands(Tables):
-    """Commands of operators; each is executed once or not at all."""
+    """Queue of operator commands; each command is executed at most once."""
 
     def ask(self, command: Command) -> None:
-        """Write a command, and delete old ones; writing it again has no effect."""
+        """Add a command and delete old ones; adding the same command again has no effect."""
         with self._writing() as writer:
             writer.execute(FORGET, (command.asked_ns - KEPT_NS,))
             writer.execute(INSERT, astuple(command))
 
     def open(self, units: Collection[str]) -> list[OpenCommand]:
-        """Return the unanswered commands of units, in the order in which they were asked."""
+        """Return the commands of the given units that have no final answer, oldest first."""
         with self._reading() as reader:
             rows = reader.execute(SELECT_OPEN, (MAX_OPEN,)).fetchall()
         found = [OpenCommand(Command(*row[:-1]), row[-1]) for row in rows]
         return [each for each in found if each.command.unit in units]
 
     def take(self, id_: str, process: str) -> bool:
-        """Record that a process executes a command; return False if it is answered already."""
+        """Record the process that executes a command; return False if it is already answered."""
         with self._writing() as writer:
             return bool(writer.execute(TAKE, (process, id_)).rowcount == 1)
 
     def answer(self, id_: str, answer: Answer, now_ns: int) -> None:
-        """Answer a command; an answered command keeps its first answer."""
+        """Write the answer to a command; an answered command keeps its first answer."""
         with self._writing() as writer:
             answer_command(writer, id_, answer, now_ns)
 
     def withdraw(self, id_: str, words: str, now_ns: int) -> bool:
-        """Withdraw a command; return False if it was taken or answered."""
+        """Withdraw a waiting command; return False if it was taken or answered."""
         with self._writing() as writer:
             return bool(writer.execute(WITHDRAW, (words, now_ns, id_)).rowcount == 1)
 
     def look(self, id_: str) -> Answer | None:
-        """Return the state of a command; None if the identifier is unknown."""
+        """Return the state and explanation of a command; None if the identifier is unknown."""
         with self._reading() as reader:
             row = reader.execute(LOOK, (id_,)).fetchone()
         return None if row is None else Answer(CommandState(row[0]), str(row[1]))
 
 
 def answer_command(writer: Connection, id_: str, answer: Answer, now_ns: int) -> None:
-    """Answer a command within a transaction."""
+    """Write the answer to a command within an open transaction."""
     writer.execute(ANSWER, (answer.state.value, answer.words[:MAX_WORDS], now_ns, id_))
 
 
 @dataclass(frozen=True)
 class StreamPosition:
-    """Position in a stream up to which the results of a unit are stored.
+    """Position in a message stream up to which the results of a unit are stored.
 
     Parameters
     ----------
     stream
-        Identifier of the stream, which changes when it is created anew and counts from 1 again.
+        Identifier of the stream; a recreated stream has a new one and counts from 1 again.
     sequence
-        Newest message whose results are stored.
+        Sequence number of the newest message whose results are stored.
     window_sequence
-        First message that must be read again to resume.
+        Sequence number of the first message that must be read again to resume.
     memory
-        Document with the state needed besides these messages.
+        Document with the further state that is needed to resume.
     """
 
     unit: str
@@ -307,20 +307,20 @@ WRITE_POSITION = upsert("stream_position", POSITION_COLUMNS, ("unit",)) + (
     " WHERE stream_position.stream <> excluded.stream"
     " OR stream_position.sequence < excluded.sequence"
 )
-"""A position never goes back: a process that was overtaken does not replace it."""
+"""Statement that writes a stream position; a delayed process cannot set a position back."""
 
 READ_POSITION = f"SELECT {', '.join(POSITION_COLUMNS)} FROM stream_position WHERE unit = ?"  # noqa: S608
 
 
 def write_positions(writer: Connection, positions: Iterable[StreamPosition]) -> None:
-    """Write the newest position of each unit, within the transaction of its results."""
+    """Write the newest stream position of each unit, within the transaction of its results."""
     newest = {position.unit: position for position in positions}
-    # always in the same order, so that two writers cannot deadlock
+    # in a fixed order, so that two writers cannot deadlock
     for _, position in sorted(newest.items()):
         writer.execute(WRITE_POSITION, astuple(position))
 
 
 def select_position(reader: Connection, unit: str) -> StreamPosition | None:
-    """Return the position of a unit; None if its results never came from a stream."""
+    """Return the stream position of a unit; None if its results never came from a stream."""
     row = reader.execute(READ_POSITION, (unit,)).fetchone()
     return None if row is None else StreamPosition(*row)

@@ -1,4 +1,4 @@
-"""Spectra over time."""
+"""Store of averaged vibration spectra over time."""
 
 import hashlib
 import math
@@ -20,11 +20,11 @@ from service.store.series import find_series, series_of
 from service.store.trends import storable
 
 N_CHANNELS = 4
-"""Shaft x and y, bearing x and y."""
+"""Number of channels of a bearing: shaft x and y, bearing x and y."""
 
 
 class Tier(IntEnum):
-    """Density of stored spectra, as numbered in the database."""
+    """Time resolution of stored spectra, numbered as in the database."""
 
     DENSE = 0
     SPARSE = 1
@@ -32,7 +32,7 @@ class Tier(IntEnum):
 
 @dataclass(frozen=True)
 class TierLimits:
-    """Interval at which one spectrum per bearing is kept, and maximum number of spectra."""
+    """Limits of a tier: interval between stored spectra and maximum number, per bearing."""
 
     every_s: float
     n_most: int
@@ -49,7 +49,7 @@ class SpectraLimits:
     Parameters
     ----------
     n_most_lines
-        Maximum number of lines per channel, from the lowest frequency on.
+        Maximum number of spectral lines per channel, counted from the lowest frequency.
     """
 
     dense: TierLimits = TierLimits(60.0, 1440)
@@ -58,7 +58,7 @@ class SpectraLimits:
 
     @property
     def tiers(self) -> tuple[tuple[Tier, TierLimits], ...]:
-        """Both tiers with their limits."""
+        """Dense and sparse tier with their limits."""
         return (Tier.DENSE, self.dense), (Tier.SPARSE, self.sparse)
 
 
@@ -71,7 +71,7 @@ class SpectraQuery:
     start_ns, end_ns
         Half-open time range.
     max_spectra
-        If the range has more, spectra are chosen evenly in time.
+        Maximum number of spectra; from a longer range spectra are chosen evenly in time.
     """
 
     unit: str
@@ -88,17 +88,17 @@ class StoredSpectrum:
     Parameters
     ----------
     time_ns
-        End of the samples.
+        End time of the averaged samples.
     duration_s
-        Duration of all averaged samples.
+        Duration of the averaged samples.
     n_segments
         Number of segments in which all channels were usable.
     quality
         Worst quality of the 1× amplitudes.
     bin_hz
-        Frequency of the first line, and spacing of the lines.
+        Frequency of the first spectral line, and line spacing.
     amplitude_um_pk : (N_CHANNELS, n_lines)
-        Displacement; NaN throughout where a channel was not usable.
+        Displacement amplitudes; all NaN for an unusable channel.
     """
 
     time_ns: int
@@ -115,7 +115,7 @@ class StoredSpectrum:
 
     @property
     def resolution(self) -> tuple[float, int]:
-        """Spacing and number of lines; spectra with different ones have no common axis."""
+        """Line spacing and number of lines, which are equal for spectra with the same axis."""
         return self.bin_hz, self.amplitude_um_pk.shape[1]
 
 
@@ -126,11 +126,11 @@ class Spectra:
     Parameters
     ----------
     n_found
-        Number of spectra in the range, before some were chosen.
+        Number of stored spectra in the range, before the choice of `max_spectra`.
     damaged_ns
-        Times of chosen spectra with a wrong checksum, which are left out.
+        Times of chosen spectra with a wrong checksum, which are omitted.
     first_ns
-        Time of the oldest stored spectrum of this bearing, inside the range or not.
+        Time of the oldest stored spectrum of the bearing in any range; None without spectra.
     """
 
     spectra: Sequence[StoredSpectrum]
@@ -140,11 +140,11 @@ class Spectra:
 
 
 LOWEST_UM, HIGHEST_UM = 1e-6, 1e5
-"""Range of stored amplitudes: smaller ones read zero, larger ones read the upper end."""
+"""Range of stored amplitudes; smaller ones are stored as zero, larger ones as the upper limit."""
 
 N_STEPS = 65_533
 STEP = math.log(HIGHEST_UM / LOWEST_UM) / N_STEPS
-"""Step of the logarithm: amplitudes are accurate to 0.02 %, better than any transducer."""
+"""Logarithmic step of stored amplitudes, 0.04 %; rounding errors are below 0.02 %."""
 
 ZERO, UNUSABLE = 0, 65_535
 
@@ -152,7 +152,7 @@ CHECKSUM_BYTES = 8
 
 
 def encode(amplitude_um_pk: FloatArray) -> bytes:
-    """Encode (N_CHANNELS, n_lines) amplitudes, NaN where a channel is not usable."""
+    """Return (N_CHANNELS, n_lines) amplitudes, NaN for unusable channels, as 16-bit codes."""
     usable = np.nan_to_num(amplitude_um_pk, nan=LOWEST_UM)
     steps = np.log(np.clip(usable, LOWEST_UM, HIGHEST_UM) / LOWEST_UM) / STEP
     codes = 1 + np.round(steps).astype(np.int64)
@@ -162,7 +162,7 @@ def encode(amplitude_um_pk: FloatArray) -> bytes:
 
 
 def decode(amplitudes: bytes) -> FloatArray:
-    """Invert `encode`."""
+    """Return the (N_CHANNELS, n_lines) amplitudes from their codes, the inverse of `encode`."""
     codes = np.frombuffer(amplitudes, dtype="<u2").reshape(N_CHANNELS, -1)
     found: FloatArray = LOWEST_UM * np.exp(STEP * (codes.astype(np.float64) - 1.0))
     found[codes == ZERO] = 0.0
@@ -171,12 +171,12 @@ def decode(amplitudes: bytes) -> FloatArray:
 
 
 def checksum(facts: tuple[object, ...], amplitudes: bytes) -> bytes:
-    """Return the checksum of a spectrum.
+    """Return the checksum of the columns and amplitudes of a stored spectrum.
 
     Parameters
     ----------
     facts
-        Integers, floats, texts and None, exactly as the database returns them.
+        Values of the columns `FACTS`, exactly as the database returns them.
     """
     digest = hashlib.blake2b(repr(facts).encode(), digest_size=CHECKSUM_BYTES)
     digest.update(amplitudes)
@@ -188,7 +188,7 @@ FACTS = (
     *("quality_level", "quality_reason", "speed_rpm", "power_mw"),
     *("order1_hz", "vortex_hz", "bin_hz"),
 )
-"""Columns that the checksum covers, besides the amplitudes."""
+"""Columns that the checksum covers in addition to the amplitudes."""
 
 INSERT = insert("spectrum", ("tier", "slot", *FACTS, "amplitudes", "checksum"))
 IS_TAKEN = "SELECT 1 FROM spectrum WHERE series = ? AND tier = ? AND slot = ?"
@@ -198,13 +198,14 @@ TRIM = """
         ORDER BY id DESC LIMIT 1 OFFSET :n_kept
     )
 """
-"""By the order of writing, so that a temporarily wrong clock does not displace newer spectra."""
+"""Statement that deletes spectra by order of insertion, so that a temporarily wrong clock does not
+displace newer spectra."""
 
 IN_RANGE = """
     SELECT min(id), time_ns FROM spectrum WHERE series = ? AND time_ns >= ? AND time_ns < ?
     GROUP BY time_ns ORDER BY time_ns
 """
-"""A spectrum that is stored in both tiers counts once."""
+"""Query of the spectra in a range; a spectrum that is stored in both tiers is returned once."""
 
 FIRST = "SELECT min(time_ns) FROM spectrum WHERE series = ?"
 SELECT = f"SELECT {', '.join(FACTS)}, amplitudes, checksum FROM spectrum WHERE id = ?"  # noqa: S608
@@ -217,7 +218,7 @@ JUDGED = tuple(
 def insert_spectra(
     writer: Connection, assessments: Iterable[Assessment], limits: SpectraLimits
 ) -> None:
-    """Store the first spectrum of each interval, within a transaction."""
+    """Insert the first spectrum of each interval of each tier; delete those beyond the maximum."""
     for assessment in assessments:
         spectrum = assessment.spectrum
         if spectrum.frequency_hz.size and spectrum.n_segments.diagonal().any():
@@ -266,10 +267,10 @@ def _number(value: float | None) -> float | None:
 
 
 class SpectraStore(Tables):
-    """Spectra of bearings, stored with assessments."""
+    """Store of the averaged spectra of bearings; they are written with the assessments."""
 
     def read(self, query: SpectraQuery) -> Spectra:
-        """Return spectra of one bearing; damaged ones are counted and left out."""
+        """Return the intact spectra that match a query, and the times of damaged ones."""
         start_ns, end_ns = storable(query.start_ns), storable(query.end_ns)
         with self._reading() as reader:
             series = find_series(reader, query.unit, query.bearing)
@@ -288,7 +289,7 @@ class SpectraStore(Tables):
 
 
 def _evenly(found: Sequence[tuple[int, int]], n_most: int) -> Sequence[tuple[int, int]]:
-    """Return at most `n_most` entries nearest to even steps of time, with the first and last."""
+    """Return at most `n_most` entries, evenly in time, including the first and the last."""
     if len(found) <= n_most:
         return found
     time_ns = np.array([time for _, time in found], dtype=np.int64)
@@ -340,4 +341,4 @@ SPECTRA_TABLES = """
     CREATE INDEX spectrum_at ON spectrum (series, time_ns);
     CREATE INDEX spectrum_of ON spectrum (series, tier);
 """
-"""Migration that creates the table."""
+"""Migration that creates the table of spectra."""

@@ -1,4 +1,4 @@
-"""Store over one of two databases."""
+"""Store of all data of a plant, common to SQLite and PostgreSQL."""
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
@@ -43,7 +43,7 @@ from service.store.trends import storable
 from service.store.waveforms import WaveformStore
 
 MAX_GAPS = 5000
-"""Maximum number of gaps that are returned."""
+"""Maximum number of gaps that `Store.gaps` returns."""
 
 INSERT_ASSESSMENT = """
     INSERT INTO assessment VALUES (?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)
@@ -56,7 +56,7 @@ INSERT_GAP = """
     INSERT INTO gap (unit, epoch, first_index, n_samples, stop_ns, start_ns, is_estimated)
     VALUES (?,?,?,?,?,?,?) ON CONFLICT DO NOTHING
 """
-"""Not OR IGNORE, which would silently drop rows that violate any other constraint."""
+"""Statement that inserts a gap; ``OR IGNORE`` would also hide violations of other constraints."""
 
 SELECT_GAPS = """
     SELECT epoch, first_index, n_samples, stop_ns, start_ns, is_estimated FROM gap WHERE unit = ?
@@ -74,18 +74,18 @@ SELECT_LAST = """
 
 
 class Store:
-    """Durable results in one database; may be used from several threads.
+    """Store of all data of a plant in one database; may be used from several threads.
 
-    Data is on the disk when the method that writes it returns.
+    Data are on the disk when the method that writes them returns.
 
     Parameters
     ----------
     database
         Open database; closed with the store.
     head
-        File that names the newest entry of the audit trail.
+        Head file of the audit trail, with the number and hash of the newest entry.
     address
-        Function that returns the messages about an event of an alarm.
+        Function that returns the outbox messages about an alarm event.
     spectra
         Limits of stored spectra.
     """
@@ -121,15 +121,15 @@ class Store:
 
     @property
     def kind(self) -> str:
-        """``sqlite`` or ``postgresql``."""
+        """Kind of the database: ``sqlite`` or ``postgresql``."""
         return self.database.kind
 
     def hold(self, name: str) -> AbstractContextManager[Hold]:
-        """Hold a name among all processes that use the database; see `Database.hold`."""
+        """Return a lock on a name, exclusive among all processes; see `Database.hold`."""
         return self.database.hold(name)
 
     def close(self) -> None:
-        """Release the database; closing twice has no effect."""
+        """Close the database; closing it twice has no effect."""
         self.database.close()
 
     def append(
@@ -145,7 +145,7 @@ class Store:
         Parameters
         ----------
         positions
-            Positions in a stream up to which the results of units reach with these.
+            Stream positions that the units have reached with these results.
 
         Raises
         ------
@@ -162,7 +162,7 @@ class Store:
             write_positions(writer, positions)
 
     def trend(self, query: TrendQuery) -> Trend:
-        """Return trends of one bearing, aggregated into buckets if they are many.
+        """Return the trends of one bearing, aggregated into buckets if it has many readings.
 
         Raises
         ------
@@ -178,7 +178,7 @@ class Store:
         Raises
         ------
         QueryTooLargeError
-            If there are more than `MAX_GAPS`.
+            If the range has more than `MAX_GAPS` gaps.
         """
         in_range = "AND stop_ns >= ? AND stop_ns < ? ORDER BY stop_ns, first_index LIMIT ?"
         bounds = (unit, storable(start_ns), storable(end_ns), MAX_GAPS + 1)
@@ -189,7 +189,7 @@ class Store:
         return found
 
     def reach(self, unit: str) -> Reach | None:
-        """Return where the results of a unit end, with the gaps beyond; None without results."""
+        """Return the end of a unit's results and the later gaps; None without measured results."""
         with self._reader() as reader:
             series = reader.execute("SELECT id FROM series WHERE unit = ?", (unit,)).fetchall()
             rows = [reader.execute(SELECT_LAST, row).fetchone() for row in series]
@@ -202,7 +202,7 @@ class Store:
             return Reach(epoch, stop_index, time_ns, tuple(_gap(row) for row in gaps))
 
     def newest(self, unit: str, bearing: str) -> StoredReadings | None:
-        """Return the newest readings of a bearing; None if there are none."""
+        """Return the newest readings of a bearing; None if the bearing has no readings."""
         with self._reader() as reader:
             row = reader.execute(SELECT_NEWEST, (unit, bearing)).fetchone()
         if row is None:
@@ -212,15 +212,15 @@ class Store:
         return StoredReadings(int(time_ns), readings)
 
     def add_reference(self, reference: GapReference) -> None:
-        """Write a gap reference, which is in force for its bearing from then on."""
+        """Write a gap reference; it becomes the one in force for its bearing."""
         self.gap_references.add(reference)
 
     def references(self) -> list[GapReference]:
-        """Return the gap references in force."""
+        """Return the gap reference in force of each bearing."""
         return self.gap_references.in_force()
 
     def reference_history(self, unit: str, bearing: str) -> list[GapReference]:
-        """Return the gap references of a bearing, newest first; at most the newest thousand."""
+        """Return the newest 1000 gap references of a bearing, newest first."""
         return self.gap_references.history(unit, bearing)
 
     def position(self, unit: str) -> StreamPosition | None:
@@ -229,12 +229,12 @@ class Store:
             return select_position(reader, unit)
 
     def alarms(self) -> list[Alarm]:
-        """Return every alarm that ever had an event, in its current state."""
+        """Return the current state of every alarm that has had an event."""
         with self._reader() as reader:
             return select_alarms(reader)
 
     def alarm_events(self, query: AlarmQuery) -> list[StoredEvent]:
-        """Return events of alarms, newest first."""
+        """Return the alarm events that match a query, newest first."""
         with self._reader() as reader:
             return select_events(reader, query)
 

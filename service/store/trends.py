@@ -1,4 +1,4 @@
-"""Queries of single readings by time and condition."""
+"""Queries of single readings by time and operating condition."""
 
 from collections.abc import Iterable, Iterator
 
@@ -14,16 +14,16 @@ from service.store.series import Layout
 IN_STATES = """(
         CAST(:states AS TEXT) = '' OR CAST(:states AS TEXT) LIKE '%,' || operating_state || ',%'
     )"""
-"""Condition that an operating state is listed in ``,2,3,``; an empty list matches all."""
+"""SQL condition that the state is in the list ``:states``, such as ``,2,3,``; empty for all."""
 
 
 def at_least(column: str, name: str) -> str:
-    """Return the condition that a column is at least a parameter, if that is not NULL."""
+    """Return the SQL condition that a column is at least a parameter; NULL means no bound."""
     return f"(CAST(:{name} AS DOUBLE PRECISION) IS NULL OR {column} >= :{name})"
 
 
 def at_most(column: str, name: str) -> str:
-    """Return the condition that a column is at most a parameter, if that is not NULL."""
+    """Return the SQL condition that a column is at most a parameter; NULL means no bound."""
     return f"(CAST(:{name} AS DOUBLE PRECISION) IS NULL OR {column} <= :{name})"
 
 
@@ -31,13 +31,13 @@ BETWEEN_BOUNDS = f"""{at_least("eccentricity_ratio", "eccentricity_low")}
     AND {at_most("eccentricity_ratio", "eccentricity_high")}
     AND {at_least("oil_temperature_c", "oil_low")}
     AND {at_most("oil_temperature_c", "oil_high")}"""
-"""Condition that a single reading lies within the bounds of a query."""
+"""SQL condition that a single reading is within the value ranges of a query."""
 
 
 def condition_arguments(
     states: Iterable[OperatingState], eccentricity_ratio: ValueRange, oil_temperature_c: ValueRange
 ) -> dict[str, object]:
-    """Return the parameters of `IN_STATES` and `BETWEEN_BOUNDS`."""
+    """Return the SQL parameters of `IN_STATES` and `BETWEEN_BOUNDS`."""
     return {
         "eccentricity_low": eccentricity_ratio.low,
         "eccentricity_high": eccentricity_ratio.high,
@@ -48,10 +48,10 @@ def condition_arguments(
 
 
 MAX_ROWS = 1_000_000
-"""Maximum number of readings that one query reads, in a few seconds."""
+"""Maximum number of readings that one query reads, which takes a few seconds."""
 
 ROWS_AT_ONCE = 4000
-"""Number of whole rows in memory; from others only the requested columns are kept."""
+"""Number of rows fetched at a time; only the requested columns stay in memory."""
 
 SELECT_ROWS = f"""
     SELECT time_ns, layout, reading_values, reading_qualities FROM assessment
@@ -66,11 +66,11 @@ Span = tuple[int, int]
 """Half-open time range, ns."""
 
 Row = tuple[int, int, bytes, bytes]
-"""Time, layout, values and qualities of a reading."""
+"""Stored reading: time, layout number, encoded values and quality bytes."""
 
 
 def select_page(reader: Connection, query: TrendQuery) -> Summaries:
-    """Return the first readings of a bearing, oldest first, and one more than a page holds."""
+    """Return the readings of one page, oldest first, and the first reading of the next page."""
     rows = reader.execute(SELECT_ROWS, arguments(query) | {"most": query.max_points + 1})
     return decoded_rows(rows.fetchall(), select_layouts(reader), query.quantities)
 
@@ -78,18 +78,18 @@ def select_page(reader: Connection, query: TrendQuery) -> Summaries:
 def select_readings(
     reader: Connection, query: TrendQuery, spans: Iterable[Span], width_ns: int
 ) -> tuple[int, Summaries]:
-    """Return the number of readings of a bearing in spans of time, and the readings, oldest first.
+    """Return the number of readings in some time spans, and the readings, oldest first.
 
     Parameters
     ----------
     width_ns
-        Readings beyond ``max_points`` are aggregated into buckets of this width while they are
+        Bucket width into which more than ``max_points`` readings are aggregated while they are
         read.
 
     Raises
     ------
     QueryTooLargeError
-        If there are more than `MAX_ROWS`.
+        If the spans have more than `MAX_ROWS` readings.
     """
     layouts = select_layouts(reader)
     n_readings, single, summed = 0, [decoded_rows([], layouts, query.quantities)], []
@@ -117,7 +117,7 @@ def _chunks(reader: Connection, query: TrendQuery, spans: Iterable[Span]) -> Ite
 
 
 def too_large() -> QueryTooLargeError:
-    """Return the error of a query that reads too many readings."""
+    """Return the error for a query that would read too many single readings."""
     return QueryTooLargeError(
         f"more than {MAX_ROWS} single readings would have to be read: ask for a shorter time, for"
         " fewer points, or for bounds of eccentricity and oil temperature at whole cells"
@@ -125,7 +125,7 @@ def too_large() -> QueryTooLargeError:
 
 
 def select_layouts(reader: Connection) -> dict[int, Layout]:
-    """Return all layouts by number."""
+    """Return all stored layouts by number."""
     return {
         id_: Layout.loads(quantities, reasons)
         for id_, quantities, reasons in reader.execute("SELECT * FROM whole_layout")
@@ -138,7 +138,7 @@ def storable(time_ns: int) -> int:
 
 
 def arguments(query: TrendQuery) -> dict[str, object]:
-    """Return the parameters of statements for a query."""
+    """Return the SQL parameters of a trend query."""
     return {
         "unit": query.unit,
         "bearing": query.bearing,
@@ -149,7 +149,7 @@ def arguments(query: TrendQuery) -> dict[str, object]:
 
 
 def decoded_rows(rows: list[Row], layouts: dict[int, Layout], names: tuple[str, ...]) -> Summaries:
-    """Decode columns of rows; columns missing in a row are bad."""
+    """Return the requested columns of stored rows; a column missing in a row has level BAD."""
     time_ns = np.array([row[0] for row in rows], dtype=np.int64)
     layout_of_row = np.array([row[1] for row in rows], dtype=np.int64)
     value = np.full((len(rows), len(names)), np.nan)

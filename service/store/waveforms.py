@@ -1,4 +1,4 @@
-"""Index of recordings in the database."""
+"""Index of waveform recordings in the database."""
 
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass, fields
@@ -10,14 +10,14 @@ from service.store.port import StoreError
 
 
 class WaveformKind(StrEnum):
-    """Kind of a recording."""
+    """Kind of a waveform recording."""
 
     CAPTURE = "capture"
     CONTINUOUS = "continuous"
 
 
 class WaveformState(StrEnum):
-    """State of a recording on the disk."""
+    """State of a waveform recording on the disk."""
 
     PRESENT = "present"
     DAMAGED = "damaged"
@@ -27,22 +27,22 @@ class WaveformState(StrEnum):
 
 @dataclass(frozen=True)
 class WaveformFile:
-    """Index entry of a recording.
+    """Index entry of a waveform recording.
 
     Parameters
     ----------
     place
-        Identifier of the data folder, as several may share a database.
+        Identifier of the data folder; several data folders may share a database.
     name
         Name of the recording's folder within the folder of its kind.
     start_ns, stop_ns
         Time of the first sample, and time one sample after the last.
     n_samples
-        Samples per channel.
+        Number of samples per channel.
     n_bytes
-        Size of all files.
+        Total size of the files.
     checksum
-        SHA-256 of the manifest, which lists those of the other files; empty if it is unreadable.
+        SHA-256 of the manifest, which lists the checksums of the other files; empty if unreadable.
     reason
         Reason for the state.
     changed_ns
@@ -85,7 +85,7 @@ WAVEFORM_TABLES = """
     ) STRICT;
     CREATE INDEX waveform_of_state ON waveform (place, state, start_ns);
 """
-"""Migration that creates the index."""
+"""Migration that creates the table of recordings."""
 
 COLUMNS = [field.name for field in fields(WaveformFile)]
 PUT = upsert("waveform", COLUMNS, ("place", "kind", "name"))
@@ -99,10 +99,10 @@ FORGET = (
 
 
 class WaveformStore(Tables):
-    """Index of the recordings of all data folders; their files are not in the database."""
+    """Store of the index of recordings in all data folders; the database holds no waveforms."""
 
     def put(self, files: Sequence[WaveformFile]) -> None:
-        """Write entries in one transaction, replacing those of the same place, kind and name.
+        """Write entries in one transaction; replace entries with the same place, kind and name.
 
         Raises
         ------
@@ -113,12 +113,12 @@ class WaveformStore(Tables):
             writer.executemany(PUT, [astuple(file) for file in files])
 
     def files(self, place: str) -> list[WaveformFile]:
-        """Return the entries of a place except those of removed recordings, oldest first."""
+        """Return the entries of a data folder without removed recordings, oldest first."""
         with self._reading() as reader:
             return [_file(row) for row in reader.execute(FILES, (place,))]
 
     def forget(self, place: str, before_ns: int) -> int:
-        """Delete entries of recordings removed or missing before a time; return their number."""
+        """Delete the entries of recordings removed or lost before a time; return their number."""
         with self._writing() as writer:
             return writer.execute(FORGET, (place, before_ns)).rowcount
 

@@ -1,1 +1,1 @@
-"""Accounts, sessions, keys and entries of the audit trail."""
+"""Accounts, sessions, API keys and audit trail entries."""

@@ -1,4 +1,4 @@
-"""Entries of the audit trail, and the chain of hashes that connects them."""
+"""Entries of the audit trail, and the hash chain that connects them."""
 
 import hashlib
 import json
@@ -12,11 +12,11 @@ from typing import TypeAlias
 from core.alarms.alarm import AlarmNews
 
 MAX_NAME = 300
-"""Maximum length of a stored actor, peer, action or object."""
+"""Maximum length of a stored actor, peer, action or object, in characters."""
 
 MAX_REASON = 2000
 MAX_DOCUMENT = 65_536
-"""Maximum length of a document; of a longer one only the beginning and the length are stored."""
+"""Maximum length of a document in characters; only the beginning of a longer one is stored."""
 
 N_SHOWN = 1000
 
@@ -48,9 +48,9 @@ class AuditAction:
     object
         Identifier of the changed object.
     before, after
-        State of the object as JSON values; None if there is nothing to record.
+        State of the object before and after the action as JSON values; None if not recorded.
     peer
-        Address of the request, or user of the operating system; None if there is none.
+        Network address of the request, or user of the operating system; None if unknown.
     """
 
     time_ns: int
@@ -73,9 +73,9 @@ class AuditEntry:
     number
         Consecutive number from 1.
     before, after
-        Canonical JSON.
+        State of the object before and after the action, as canonical JSON.
     previous_hash, hash
-        SHA-256 in hexadecimal, of the previous entry and of all other fields of this one.
+        Hash of the previous entry, and SHA-256 of all other fields of this entry, in hexadecimal.
     """
 
     number: int
@@ -98,7 +98,7 @@ def canonical(document: object) -> str | None:
     Raises
     ------
     ValueError
-        If it contains a number that is not finite.
+        If the document contains a number that is not finite.
     """
     if document is None:
         return None
@@ -109,7 +109,7 @@ def canonical(document: object) -> str | None:
 
 
 def storable(text: str, n_most: int) -> str:
-    """Return a text that can be stored: lone surrogates replaced, and shortened if too long."""
+    """Return a text without lone surrogates, truncated to at most `n_most` characters."""
     whole = text.encode("utf-8", "replace").decode("utf-8")
     return whole if len(whole) <= n_most else whole[: n_most - 1] + "…"
 
@@ -117,23 +117,23 @@ def storable(text: str, n_most: int) -> str:
 FORMAT = "padwatch-audit-1"
 
 FIRST = "0" * 64
-"""Previous hash of the first entry."""
+"""Value of `previous_hash` in the first entry."""
 
 
 def digest(values: Sequence[object]) -> str:
-    """Return the SHA-256 of the fields of an entry without its own hash, in their order.
+    """Return the SHA-256 of the fields of an entry, in order and without its own hash.
 
     Raises
     ------
     TypeError
-        If one of them is not text, a number or None.
+        If a field is not text, a number or None.
     """
     text = json.dumps([FORMAT, *values], separators=(",", ":"))  # ASCII, so that the text is unique
     return hashlib.sha256(text.encode("ascii")).hexdigest()
 
 
 def chained(action: AuditAction, number: int, previous_hash: str) -> AuditEntry:
-    """Return the entry of an action that follows another entry."""
+    """Return the audit entry of an action, chained to the hash of the previous entry."""
     columns = (
         *(number, action.time_ns, storable(action.actor, MAX_NAME), action.source.value),
         None if action.peer is None else storable(action.peer, MAX_NAME),
@@ -154,16 +154,16 @@ def recomputed(entry: AuditEntry) -> str | None:
 
 @dataclass(frozen=True)
 class Acting:
-    """Context of actions.
+    """Context of actions: data about their origin for audit entries.
 
     Parameters
     ----------
     peer
-        Address of the request, or user of the operating system.
+        Network address of the request, or user of the operating system.
     actor
-        Name of the person or machine; empty until it is known.
+        Name of the person or machine; empty before authentication.
     command
-        Identifier of the command in the database that is being executed; None if there is none.
+        Identifier of the operator command that is being executed; None if there is none.
     """
 
     source: Source = Source.PADWATCH
@@ -174,14 +174,14 @@ class Acting:
 
 @dataclass(frozen=True)
 class ActedNews(AlarmNews):
-    """News of an alarm that a person's action has caused.
+    """Alarm update that was caused by the action of a person.
 
     Parameters
     ----------
     peer
-        Network address of the client, if known.
+        Network address of the client; None if unknown.
     command
-        Identifier of the command that asked for it; storing the news answers the command.
+        Identifier of the operator command; storing the update also answers the command.
     """
 
     peer: str | None = None
@@ -194,13 +194,13 @@ _ACTING: ContextVar[Acting] = ContextVar("acting", default=PADWATCH_ITSELF)
 
 
 def acting() -> Acting:
-    """Return the context of this task or thread; by default that of padwatch itself."""
+    """Return the context of actions in this task or thread; by default `PADWATCH_ITSELF`."""
     return _ACTING.get()
 
 
 @contextmanager
 def acting_as(who: Acting) -> Iterator[None]:
-    """Record actions within the block in a context."""
+    """Set the context of actions within the block."""
     token = _ACTING.set(who)
     try:
         yield
@@ -209,5 +209,5 @@ def acting_as(who: Acting) -> Iterator[None]:
 
 
 def name_actor(actor: str) -> None:
-    """Set the actor of the current context, once the actor is authenticated."""
+    """Set the actor in the current context of actions, after authentication."""
     _ACTING.set(replace(acting(), actor=actor))

@@ -1,4 +1,4 @@
-"""Verification of the audit trail: its chain, and the file that names its newest entry."""
+"""Verification of the audit trail: hash chain of the entries, and head file."""
 
 import json
 from collections.abc import Callable, Iterable
@@ -15,28 +15,28 @@ MAX_BYTES = 4096
 
 @dataclass(frozen=True)
 class AuditHead:
-    """Number of the newest entry, 0 before the first, and its hash."""
+    """Number and hash of the newest entry of an audit trail; number 0 for an empty trail."""
 
     number: int = 0
     hash: str = FIRST
 
 
 class HeadError(ValueError):
-    """A head file is missing or invalid; the message says which."""
+    """The head file is missing, unreadable or invalid; the message states the reason."""
 
 
 def head_path(database: Path) -> Path:
-    """Return the path of the head of a database's audit trail."""
+    """Return the path of the head file beside a database."""
     return database.with_name(database.stem + SUFFIX)
 
 
 def read_head(path: Path) -> AuditHead:
-    """Return the head in a file.
+    """Read the head of an audit trail from its file.
 
     Raises
     ------
     HeadError
-        If the file is missing or invalid.
+        If the file is missing, unreadable or invalid.
     """
     try:
         with path.open("rb") as file:
@@ -52,12 +52,12 @@ def read_head(path: Path) -> AuditHead:
 
 
 def write_head(path: Path, head: AuditHead) -> None:
-    """Write a head, durable on return.
+    """Write the head of an audit trail to its file, durable on return.
 
     Raises
     ------
     OSError
-        If that fails; the previous head stays.
+        If the file cannot be written; the previous head stays.
     """
     write_private(path, json.dumps({"format": FORMAT, **asdict(head)}).encode() + b"\n")
 
@@ -73,11 +73,11 @@ def _head(document: object) -> AuditHead:
 
 
 HEAD_DIFFERED = "audit.head_differed"
-"""Action of an entry which records that the head contradicted the chain."""
+"""Action of an audit entry which records that the head file contradicted the chain."""
 
 
 MAX_BEHIND = 64
-"""Maximum number of entries by which a head may lag; a crash omits those of one transaction."""
+"""Maximum number of entries by which the head may lag, as after a crash during a transaction."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Finding:
     Parameters
     ----------
     number
-        Number of the first affected entry; None for the head.
+        Number of the first affected entry; None for a defect of the head file.
     """
 
     number: int | None
@@ -101,18 +101,18 @@ class Verdict:
     Parameters
     ----------
     n_entries
-        Number of valid entries, from the first one on.
+        Number of valid entries before the first defect.
     hash
         Hash of the last valid entry.
     finding
-        Defect of what follows; None if there is none.
+        First defect; None if the trail has no defect.
     n_behind
         Number of entries by which the head lags, as after a crash; the next entry repairs it.
     contradictions
-        Numbers of entries which record that the head contradicted the chain.
+        Numbers of the entries which record that the head contradicted the chain.
     is_shared
-        Whether other hosts, each with its own head, write to the trail as well. The head then lags
-        by the entries that they have written since.
+        Whether other hosts, each with its own head file, also write to the trail. The head then
+        lags by the newer entries of other hosts.
     """
 
     n_entries: int
@@ -124,7 +124,7 @@ class Verdict:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the chain has no defect now."""
+        """Whether the audit trail has no defect."""
         return self.finding is None
 
 
@@ -140,12 +140,12 @@ def walk(
     Parameters
     ----------
     head
-        Head in the file, or the reason why there is none. Must be read before the entries, since it
-        may lag behind them but not lead.
+        Head from the file, or the reason why it cannot be read. It must be read before the entries,
+        since it may lag behind them but not lead.
     rename
-        Describes the defect of an entry whose hash is wrong.
+        Function that describes the defect of an entry with a wrong hash.
     is_shared
-        Whether other hosts write to the trail as well.
+        Whether other hosts also write to the trail.
     """
     number, hash_, at_head = 0, FIRST, ""
     contradictions: list[int] = []
@@ -200,7 +200,7 @@ def _wrong_head(
 
 
 def place_of(entry: AuditEntry, last: int) -> str:
-    """Return whether an entry was altered, or has the number of another entry."""
+    """Describe the defect of an entry with a wrong hash: altered, or stored as another number."""
     for number in range(1, last + 1):
         if recomputed(replace(entry, number=number)) == entry.hash:
             return f"entry {entry.number} is out of order: it holds entry {number}"

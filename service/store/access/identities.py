@@ -1,4 +1,4 @@
-"""Roles, accounts, sessions and keys as values."""
+"""Permissions, roles, sessions, API keys, and the tokens behind them."""
 
 import re
 import secrets
@@ -10,16 +10,16 @@ from types import MappingProxyType
 
 
 class Permission(StrEnum):
-    """Permission required by an operation of the service."""
+    """Permission that an operation of the service requires."""
 
     READ = "read"
-    """Read the plant: results, alarms, evidence, health."""
+    """Read results, alarms, evidence and health of the plant."""
 
     ACT_ON_ALARMS = "act_on_alarms"
     """Acknowledge, comment and shelve alarms."""
 
     CHANGE_MEASURING = "change_measuring"
-    """Change references, baselines, alarms out of service and recordings; send messages again."""
+    """Change references, baselines and recordings; take alarms out of service; resend messages."""
 
     READ_AUDIT = "read_audit"
     """Read the audit trail."""
@@ -29,7 +29,7 @@ class Permission(StrEnum):
 
 
 class Role(StrEnum):
-    """Role of an account or key, from the lowest to the highest."""
+    """Role of an account or an API key; roles are listed from the lowest to the highest."""
 
     VIEWER = "viewer"
     OPERATOR = "operator"
@@ -38,7 +38,7 @@ class Role(StrEnum):
 
     @property
     def rank(self) -> int:
-        """Position in the order of roles; a role includes the permissions of lower ones."""
+        """Rank in the order of roles, from 0; a role includes the permissions of lower roles."""
         return tuple(Role).index(self)
 
     def may(self, permission: Permission) -> bool:
@@ -65,23 +65,23 @@ class Means(StrEnum):
     KEY = "key"
 
     LOCAL = "local"
-    """None: the request comes from this computer."""
+    """Request from this computer without authentication."""
 
 
 @dataclass(frozen=True)
 class Identity:
-    """Authenticated person or machine behind one request.
+    """Identity of the person or program that sent a request.
 
     Parameters
     ----------
     name
-        Name of the account or the key, or `LOCAL`.
+        Name of the account or of the API key, or `LOCAL`.
     role
-        Current role, which may differ from that at login.
+        Current role, which may differ from the role at login.
     units
         Units to which access is limited; empty for all.
     must_change_password
-        Whether the only permitted operation is changing the password, which another person has set.
+        Whether a change of the password is the only permitted operation.
     """
 
     name: str
@@ -92,18 +92,18 @@ class Identity:
 
     @property
     def actor(self) -> str:
-        """Name recorded with actions; distinguishes a key from an account of the same name."""
+        """Name for audit entries; API keys have the prefix ``key:``."""
         return f"key:{self.name}" if self.means is Means.KEY else self.name
 
     @property
     def is_proven(self) -> bool:
-        """Whether the identity was authenticated, not only located on this computer."""
+        """Whether the identity was authenticated by a session or an API key."""
         return self.means is not Means.LOCAL
 
     def may(self, permission: Permission, unit: str | None = None) -> bool:
-        """Return whether an operation is permitted, for a unit or for data of no single unit.
+        """Return whether an operation on a unit, or on data of the whole plant, is permitted.
 
-        A key that is limited to units may read data of no single unit, but not change them.
+        An API key that is limited to units may read data of the whole plant, but not change them.
         """
         if not self.role.may(permission):
             return False
@@ -113,7 +113,7 @@ class Identity:
 
 
 LOCAL = "local"
-"""Name of an unauthenticated program or browser on this computer."""
+"""Name in the identity of an unauthenticated program or browser on this computer."""
 
 
 NS_PER_S = 1_000_000_000
@@ -121,12 +121,12 @@ NS_PER_S = 1_000_000_000
 
 @dataclass(frozen=True)
 class Session:
-    """Login of an account, as stored.
+    """Login session of an account, as stored.
 
     Parameters
     ----------
     digest
-        Digest of the token in the browser's cookie.
+        SHA-256 digest of the token in the browser's cookie.
     seen_ns
         Time of the last use, to a resolution of `SessionLimits.step_s`.
     """
@@ -150,7 +150,8 @@ class SessionLimits:
     step_s
         Resolution of the stored time of last use; each update is a write to the disk.
     slack_s
-        Maximum time by which a session may lie in the future, after the host clock was corrected.
+        Maximum time by which the times of a session may lie in the future, as after a correction of
+        the host clock.
     """
 
     idle_s: float = 1800.0
@@ -161,8 +162,8 @@ class SessionLimits:
     def is_live(self, session: Session, now_ns: int) -> bool:
         """Return whether a session is valid.
 
-        A session from the future is not: a clock that ran years ahead must not leave permanent
-        logins.
+        A session with times in the future is invalid: a host clock that was years ahead must not
+        leave permanent sessions.
         """
         age_s = (now_ns - session.created_ns) / NS_PER_S
         idle_s = (now_ns - session.seen_ns) / NS_PER_S
@@ -173,17 +174,17 @@ class SessionLimits:
         return now_ns - session.seen_ns >= self.step_s * NS_PER_S
 
     def oldest_ns(self, now_ns: int) -> int:
-        """Return the time before which every session has ended."""
+        """Return the earliest start time of a session that has not ended."""
         return now_ns - round(self.absolute_s * NS_PER_S)
 
 
 MAX_DAYS = 3650
 SEEN_STEP_NS = 60 * 1_000_000_000
-"""Resolution of the stored time of last use; each update is a write to the disk."""
+"""Resolution of an API key's stored time of last use; each update is a write to the disk."""
 
 
 class KeyState(StrEnum):
-    """State of a key."""
+    """State of an API key."""
 
     VALID = "valid"
     EXPIRED = "expired"
@@ -192,18 +193,18 @@ class KeyState(StrEnum):
 
 @dataclass(frozen=True)
 class ApiKey:
-    """Key as stored, without the secret.
+    """API key as stored, without the secret.
 
     Parameters
     ----------
     id
-        Public identifier, part of the key.
+        Public identifier, which is a part of the key.
     digest
-        Digest of the whole key.
+        SHA-256 digest of the whole key.
     units
         Units to which the key is limited; empty for all.
     used_ns
-        Time of the last use, to a minute; None if unused.
+        Time of the last use, with a resolution of one minute; None if never used.
     revoked_ns
         Time of revocation; None if not revoked.
     """
@@ -234,16 +235,16 @@ NAME = re.compile(r"[a-z0-9](?:[a-z0-9._@-]{0,62}[a-z0-9])?", re.ASCII)
 
 
 class NameRefusedError(ValueError):
-    """Invalid name of an account or a key; the message gives the rules."""
+    """The name of an account or an API key is invalid; the message states the rules."""
 
 
 def account_name(written: str) -> str:
-    """Return a name in its stored form, which is in lower case.
+    """Return the name of an account or an API key in lower case, as stored.
 
     Raises
     ------
     NameRefusedError
-        If it is invalid.
+        If the name is invalid.
     """
     name = written.strip().lower()
     if NAME.fullmatch(name) is None:
@@ -255,7 +256,7 @@ def account_name(written: str) -> str:
 
 
 N_BYTES = 32
-"""256 bits cannot be guessed, so that a digest without salt or stretching suffices."""
+"""Number of random bytes of a secret; 256 bits need no salt or key stretching."""
 
 KEY_ID_BYTES = 6
 TOKEN = re.compile(r"[A-Za-z0-9_-]{43}", re.ASCII)
@@ -263,18 +264,18 @@ KEY = re.compile(r"pw_([0-9a-f]{12})_[A-Za-z0-9_-]{43}", re.ASCII)
 
 
 def new_token() -> str:
-    """Return a random token for a session or for setting up."""
+    """Return a random token for a session or for the set-up."""
     return secrets.token_urlsafe(N_BYTES)
 
 
 def new_key() -> tuple[str, str]:
-    """Return a random key: its public identifier, and the whole key."""
+    """Return the public identifier and the whole text of a new random API key."""
     id_ = secrets.token_hex(KEY_ID_BYTES)
     return id_, f"pw_{id_}_{secrets.token_urlsafe(N_BYTES)}"
 
 
 def key_id(key: str) -> str | None:
-    """Return the public identifier in a key; None if the text is not a key."""
+    """Return the public identifier in an API key; None if the text is not an API key."""
     found = KEY.fullmatch(key)
     return found.group(1) if found else None
 
@@ -285,10 +286,10 @@ def is_token(text: str) -> bool:
 
 
 def digest(token: str) -> bytes:
-    """Return the digest of a token, as stored."""
+    """Return the SHA-256 digest of a token, as stored."""
     return sha256(token.encode()).digest()
 
 
 def is_token_of(token: str, stored: bytes) -> bool:
-    """Return whether a token has a stored digest, in constant time."""
+    """Return whether a token matches a stored digest; the comparison takes constant time."""
     return secrets.compare_digest(digest(token), stored)

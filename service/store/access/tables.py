@@ -1,6 +1,6 @@
-"""Accounts, sessions and keys in the database.
+"""Tables of accounts, sessions, API keys and the set-up token.
 
-A change and its audit entries are on the disk when the method that makes it returns.
+Each method writes a change with its audit entries; both are on the disk when it returns.
 """
 
 import json
@@ -14,7 +14,7 @@ from service.store.database import Connection, Reading
 
 
 class AccessRefusedError(Exception):
-    """A change of accounts or keys is refused; the message says why."""
+    """A change of an account is not allowed; the message states the reason."""
 
 
 @dataclass(frozen=True)
@@ -24,13 +24,13 @@ class Account:
     Parameters
     ----------
     password_hash
-        Argon2id hash in its usual text form, which holds its parameters.
+        Argon2id hash in the encoded text form, which includes its parameters.
     password_number
-        Number of the password; a session belongs to the password with which it was begun.
+        Number of the password, incremented at each change.
     password_ns
         Time at which the password was set.
     must_change
-        Whether another person set the password, so that it permits only changing it.
+        Whether another person set the password, so that the account may only change it.
     """
 
     name: str
@@ -76,7 +76,7 @@ def _action(
 
 
 MAX_SESSIONS = 16
-"""Maximum number of sessions per account; beyond it the oldest end."""
+"""Maximum number of sessions per account; a further login ends the oldest session."""
 
 SELECT_ACCOUNTS = """
     SELECT name, role, password_hash, password_number, created_ns, password_ns, must_change
@@ -101,7 +101,7 @@ END_OLDEST = """
 
 
 class AccountStore(AuditedTables):
-    """Accounts of people."""
+    """Store of user accounts."""
 
     def add(
         self, name: str, role: Role, password_hash: str, now_ns: int, must_change: bool = False
@@ -116,18 +116,21 @@ class AccountStore(AuditedTables):
             self._audit.add(writer, [_account_action("added", name, now_ns, after=role)])
 
     def get(self, name: str) -> Account | None:
-        """Return an account; None if there is none of that name."""
+        """Return an account; None if the name is unknown."""
         with self._reading() as reader:
             row = reader.execute(SELECT_ACCOUNTS, {"name": name}).fetchone()
         return _account(row) if row else None
 
     def all(self) -> list[Account]:
-        """Return all accounts, by name."""
+        """Return all accounts, ordered by name."""
         with self._reading() as reader:
             return [_account(row) for row in reader.execute(SELECT_ACCOUNTS, {"name": None})]
 
     def set_role(self, name: str, role: Role, now_ns: int) -> None:
-        """Change a role; `AccessRefusedError` if no admin would be left, or it is unknown."""
+        """Set the role of an account.
+
+        Raises `AccessRefusedError` if no admin would be left or the account is unknown.
+        """
         with self._writing() as writer:
             before = _role(writer, name)
             if role is not Role.ADMIN:
@@ -138,7 +141,10 @@ class AccountStore(AuditedTables):
     def set_password(
         self, name: str, password_hash: str, now_ns: int, must_change: bool = False
     ) -> None:
-        """Change a password and end all sessions; `AccessRefusedError` if it is unknown."""
+        """Set the password of an account and end its sessions.
+
+        Raises `AccessRefusedError` if the account is unknown.
+        """
         with self._writing() as writer:
             _role(writer, name)
             writer.execute(
@@ -150,7 +156,7 @@ class AccountStore(AuditedTables):
             self._audit.add(writer, [_account_action("password_set", name, now_ns)])
 
     def rehash(self, account: Account, password_hash: str) -> None:
-        """Write a new hash of the same password, unless the password has changed meanwhile."""
+        """Write a new hash of an account's password, unless the password has been changed."""
         with self._writing() as writer:
             writer.execute(
                 "UPDATE account SET password_hash = ? WHERE name = ? AND password_number = ?"
@@ -159,9 +165,10 @@ class AccountStore(AuditedTables):
             )
 
     def remove(self, name: str, now_ns: int) -> None:
-        """Remove an account with its sessions.
+        """Remove an account and its sessions.
 
-        Raises `AccessRefusedError` if others would be left without an admin, or it is unknown.
+        Raises `AccessRefusedError` if the other accounts would have no admin, or the account is
+        unknown.
         """
         with self._writing() as writer:
             role = _role(writer, name)
@@ -172,12 +179,12 @@ class AccountStore(AuditedTables):
 
 
 class SessionStore(AuditedTables):
-    """Sessions of accounts; logins are recorded by their callers."""
+    """Store of login sessions; the caller writes the audit entry of a login."""
 
     def add(self, session: Session, password_number: int, oldest_ns: int) -> bool:
-        """Begin a session; return False if the password has changed since it was checked.
+        """Add a session; return False if the password was changed since it was verified.
 
-        Sessions begun before `oldest_ns`, and the oldest above `MAX_SESSIONS`, are deleted.
+        Sessions that began before `oldest_ns` and the oldest beyond `MAX_SESSIONS` are deleted.
         """
         name = session.account
         row = (session.digest, session.created_ns, session.seen_ns, name, password_number)
@@ -188,7 +195,7 @@ class SessionStore(AuditedTables):
         return is_begun
 
     def get(self, digest: bytes) -> tuple[Session, Account] | None:
-        """Return a session with the current state of its account; None if there is none."""
+        """Return a session with the current state of its account; None if it does not exist."""
         with self._reading() as reader:
             row = reader.execute(SELECT_SESSION, (digest,)).fetchone()
         if row is None:
@@ -197,7 +204,7 @@ class SessionStore(AuditedTables):
         return Session(bytes(row[0]), account.name, row[1], row[2]), account
 
     def see(self, digest: bytes, now_ns: int) -> None:
-        """Record the use of a session."""
+        """Set the time of last use of a session."""
         with self._writing() as writer:
             writer.execute("UPDATE session SET seen_ns = ? WHERE digest = ?", (now_ns, digest))
 
@@ -220,7 +227,7 @@ def insert_account(
     now_ns: int,
     must_change: bool = False,
 ) -> bool:
-    """Add an account and return True, or return False if the name is taken."""
+    """Insert an account; return False if the name is taken."""
     row = (name, role.value, password_hash, now_ns, now_ns, int(must_change))
     insert = "INSERT INTO account VALUES (?, ?, ?, 1, ?, ?, ?) ON CONFLICT (name) DO NOTHING"
     return writer.execute(insert, row).rowcount == 1
@@ -257,10 +264,10 @@ IS_TAKEABLE = """
 
 
 class KeyStore(AuditedTables):
-    """API keys of machines."""
+    """Store of API keys."""
 
     def add(self, key: ApiKey) -> None:
-        """Add a key; adding the same key again has no effect."""
+        """Add an API key; adding the same key again has no effect."""
         units = json.dumps(key.units)
         made = (key.id, key.name, key.digest, key.role.value, units, key.created_ns, key.expires_ns)
         with self._writing() as writer:
@@ -271,23 +278,23 @@ class KeyStore(AuditedTables):
             self._audit.add(writer, [_key_action("created", key.id, key.created_ns, key)])
 
     def get(self, id_: str) -> ApiKey | None:
-        """Return a key; None if the id is unknown."""
+        """Return an API key; None if the id is unknown."""
         with self._reading() as reader:
             row = reader.execute(SELECT_KEYS, {"id": id_}).fetchone()
         return _key(row) if row else None
 
     def all(self) -> list[ApiKey]:
-        """Return all keys, also revoked and expired ones, oldest first."""
+        """Return all API keys, including revoked and expired keys, oldest first."""
         with self._reading() as reader:
             return [_key(row) for row in reader.execute(SELECT_KEYS, {"id": None})]
 
     def see(self, id_: str, now_ns: int) -> None:
-        """Record the use of a key."""
+        """Set the time of last use of an API key."""
         with self._writing() as writer:
             writer.execute("UPDATE api_key SET used_ns = ? WHERE id = ?", (now_ns, id_))
 
     def revoke(self, id_: str, now_ns: int) -> bool:
-        """Revoke a key permanently; return False if it was revoked before."""
+        """Revoke an API key permanently; return False if it is unknown or already revoked."""
         revoke = "UPDATE api_key SET revoked_ns = ? WHERE id = ? AND revoked_ns IS NULL"
         with self._writing() as writer:
             is_news = writer.execute(revoke, (now_ns, id_)).rowcount == 1
@@ -297,10 +304,10 @@ class KeyStore(AuditedTables):
 
 
 class SetUpStore(AuditedTables):
-    """Token with which the first account is created."""
+    """Store of the set-up token, with which the first account is created."""
 
     def offer(self, digest: bytes, expires_ns: int) -> bool:
-        """Replace the token; return False if an account exists."""
+        """Replace the set-up token; return False if an account exists."""
         offer = """
             INSERT INTO set_up_token SELECT 1, ?, ? WHERE NOT EXISTS (SELECT 1 FROM account)
             ON CONFLICT (id) DO UPDATE SET
@@ -310,14 +317,14 @@ class SetUpStore(AuditedTables):
             return writer.execute(offer, (digest, expires_ns)).rowcount == 1
 
     def holds(self, digest: bytes, now_ns: int) -> bool:
-        """Return whether a token is valid now."""
+        """Return whether a set-up token is valid."""
         with self._reading() as reader:
             return bool(reader.execute(IS_TAKEABLE, (digest, now_ns)).fetchone()[0])
 
     def take(self, digest: bytes, name: str, password_hash: str, now_ns: int) -> bool:
-        """Create the first account, an admin, and delete the token.
+        """Create the first account, an admin, and delete the set-up token.
 
-        Returns False if the token is wrong or expired, or an account exists.
+        Returns False if the token is wrong or expired, or if an account exists.
         """
         with self._writing() as writer:
             if not writer.execute(IS_TAKEABLE, (digest, now_ns)).fetchone()[0]:
@@ -329,7 +336,7 @@ class SetUpStore(AuditedTables):
 
 
 class AccessStore:
-    """Stored access: accounts, sessions, keys and the set-up token."""
+    """Stores of access data: accounts, sessions, API keys and the set-up token."""
 
     def __init__(self, chain: AuditChain, reading: Reading) -> None:
         self.accounts = AccountStore(chain, reading)
@@ -348,7 +355,7 @@ MUST_CHANGE = """
     ALTER TABLE account ADD COLUMN must_change INTEGER NOT NULL DEFAULT 0
         CHECK (must_change IN (0, 1));
 """
-"""Migration that adds whether a password was set by another person and must be changed."""
+"""Migration that adds the flag of passwords that must be changed by their owner."""
 
 ACCESS_TABLES = """
     CREATE TABLE account (
@@ -391,4 +398,4 @@ ACCESS_TABLES = """
     BEFORE UPDATE OF id, name, digest, role, units, created_ns, expires_ns ON api_key
     BEGIN SELECT RAISE(ABORT, 'keys are kept as they were made'); END;
     """
-"""Migration that creates the tables, which hold no secrets but argon2id hashes and digests."""
+"""Migration that creates the access tables, which store only hashes and digests of secrets."""

@@ -1,1 +1,1 @@
-"""High-water mark, which detects a database that was restored from an older copy."""
+"""High-water mark, which reveals that a database was replaced by an older copy."""

@@ -1,4 +1,4 @@
-"""Commit counter that detects a database restored from an older copy."""
+"""Commit counter that detects a database replaced by an older copy."""
 
 import hashlib
 import os
@@ -20,9 +20,9 @@ NO_HOST = ""
 
 
 def host_id(machine_id: Path = MACHINE_ID) -> str:
-    """Return an identifier of this machine that does not reveal its own.
+    """Return an identifier of this machine, a keyed hash of its machine id.
 
-    Empty where machines have none, as in many containers.
+    Empty if the machine has no machine id, as in many containers.
     """
     try:
         text = machine_id.read_bytes().strip()
@@ -34,11 +34,11 @@ def host_id(machine_id: Path = MACHINE_ID) -> str:
 
 
 MAX_BEHIND = 64
-"""Maximum number of transactions by which the file may lag; a crash omits each process's last."""
+"""Maximum number of transactions by which the mark in the file may lag, as after a crash."""
 
 
 class Kind(StrEnum):
-    """Kind of a difference."""
+    """Kind of a difference between the database and its high-water mark file."""
 
     ROLLED_BACK = "rolled_back"
     REPLACED = "replaced"
@@ -49,14 +49,14 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class MarkFinding:
-    """Difference between the mark in the file and that in the database.
+    """Difference between the high-water marks in the file and in the database.
 
     Parameters
     ----------
     n_missing
-        Number of committed transactions that are missing; None if unknown.
+        Number of committed transactions that are missing in the database; None if unknown.
     detail
-        Sentence that describes it.
+        Description of the difference, for messages.
     """
 
     kind: Kind
@@ -65,12 +65,14 @@ class MarkFinding:
 
 
 def compared(mark: Mark | str, database: Mark, host: str) -> list[MarkFinding]:
-    """Return the differences; none if the database is the newest.
+    """Return the differences between two marks; empty if the database is the newest copy.
 
     Parameters
     ----------
     mark
-        Mark in the file, read before that in the database; or the reason why there is none.
+        Mark in the file, or the reason why it cannot be read. It must be read before `database`.
+    database
+        Mark in the database.
     host
         Identifier of this machine.
     """
@@ -156,33 +158,33 @@ CREATE = """
         time_ns INTEGER NOT NULL
     ) STRICT
 """
-"""Not a migration: in PostgreSQL one row would block all writers."""
+"""Statement that creates the table of the mark; SQLite only, hence not a migration."""
 
 COLUMNS = "store, host, n_commits, nonce, time_ns"
 SELECT = """
     SELECT CAST(store AS BLOB), CAST(host AS BLOB), n_commits, CAST(nonce AS BLOB), time_ns
     FROM high_water WHERE id = 1
 """
-"""Texts as bytes, since damaged text may not be UTF-8."""
+"""Query of the mark; text as bytes, since damaged text may not be UTF-8."""
 PUT = f"INSERT OR REPLACE INTO high_water (id, {COLUMNS}) VALUES (1, ?, ?, ?, ?, ?)"  # noqa: S608
 
 
 class CommitMarks:
-    """Marks of one database; used only by the holder of its writing connection.
+    """High-water mark of one database; used only by the owner of its writing connection.
 
     Parameters
     ----------
     file
-        File beside the database.
+        High-water mark file beside the database.
     now_ns
         Wall clock.
     host
-        Returns the identifier of this machine.
+        Function that returns the identifier of this machine.
 
     Attributes
     ----------
     found
-        Differences at opening, until they are adopted.
+        Differences found at opening; empty after `adopted`.
     error
         Error of the last attempt to write the file; None if it succeeded.
     """
@@ -196,9 +198,9 @@ class CommitMarks:
         self.error: str | None = None
 
     def open(self, writer: Connection, in_file: Mark | str | None) -> None:
-        """Compare the file with a database that has just been opened, within a transaction.
+        """Compare a newly opened database with the mark file, within a transaction.
 
-        A database without a mark gets one, as does a folder without a file.
+        A database without a mark receives one; a missing file is then created.
         """
         writer.execute(CREATE)
         mark = select_mark(writer)
@@ -211,18 +213,18 @@ class CommitMarks:
         self.found = compared("is not there" if in_file is None else in_file, mark, self._host)
 
     def count(self, writer: Connection) -> None:
-        """Count the current transaction, within it."""
+        """Increment the commit counter within the current transaction."""
         if self.found:
-            return  # the differences stay visible until they are adopted
+            return  # keep the differences until they are accepted
         last = select_mark(writer)
         if last is None:
             raise StoreError("the database has lost its high-water mark")
         self._put(writer, last, last.n_commits + 1)
 
     def settle(self) -> None:
-        """Write the committed mark to the file.
+        """Write the mark of the committed transaction to the file.
 
-        If that fails, the transaction stays committed and the file lags behind until it succeeds.
+        If the write fails, the transaction stays committed and the file lags until a later write.
         """
         if self._newest is None or self.found:
             return
@@ -234,16 +236,16 @@ class CommitMarks:
             self.error = None
 
     def adopt(self, writer: Connection) -> None:
-        """Accept the database as the newest, within a transaction."""
+        """Accept the database as the newest copy, within a transaction."""
         last, in_file = select_mark(writer), self.in_file()
         if last is None:
             raise StoreError("the database has lost its high-water mark")
         n_before = in_file.n_commits if isinstance(in_file, Mark) else 0
-        # above both, so that no earlier mark ever fits again
+        # above both counts, so that no earlier mark matches again
         self._put(writer, last, max(last.n_commits, n_before) + 1)
 
     def adopted(self) -> None:
-        """Write the adopted mark to the file; if that fails, the differences are found again."""
+        """Write the accepted mark to the file; if the write fails, the differences remain."""
         if self._newest is None:
             return
         try:
@@ -258,9 +260,9 @@ class CommitMarks:
         writer.execute(PUT, astuple(self._newest))
 
     def in_file(self) -> Mark | str | None:
-        """Return the mark in the file, or the reason why it is unreadable; None if there is none.
+        """Return the mark in the file, or why it is unreadable; None if the file is missing.
 
-        It must be read before the database: the file may lag behind, but not lead.
+        The file must be read before the database, since it may lag behind but not lead.
         """
         try:
             return self._file.read()
@@ -271,7 +273,7 @@ class CommitMarks:
 
 
 def select_mark(reader: Connection) -> Mark | None:
-    """Return the mark in a database; None if it has none yet."""
+    """Return the high-water mark in a database; None if it has none yet."""
     row = reader.execute(SELECT).fetchone()
     if row is None:
         return None
@@ -286,18 +288,18 @@ def _random_hex(n_bytes: int) -> str:
 
 
 def adopt_restored(database: Path) -> None:
-    """Write the mark of a restored database to the file beside it.
+    """Write the high-water mark of a restored database to the file beside it.
 
     Raises
     ------
     OSError
-        If the disk refuses; the next start then finds the database older than the mark.
+        If the file cannot be written; the next start then reports an older database.
     sqlite3.Error
         If the database cannot be read.
     """
     mark = _mark_of(database)
     file = MarkFile(mark_path(database))
-    if mark is None:  # an old copy without a mark gets one when it is opened
+    if mark is None:  # an old backup without a mark receives one when it is opened
         file.path.unlink(missing_ok=True)
     else:
         file.replace(mark)

@@ -1,4 +1,4 @@
-"""High-water mark: the last transaction of a database, in the database and in a file beside it."""
+"""High-water mark: last transaction of a database, recorded in a file beside the database."""
 
 import fcntl
 import json
@@ -13,7 +13,7 @@ from service.runtime.files import write_private
 
 FORMAT = "padwatch-high-water-mark-1"
 SLOT_BYTES = 512
-"""Size that disks write atomically."""
+"""Size of a mark in the file; disks write this size atomically."""
 
 _SUM_BYTES = 9
 TEXT_BYTES = SLOT_BYTES - _SUM_BYTES
@@ -21,18 +21,18 @@ TEXT_BYTES = SLOT_BYTES - _SUM_BYTES
 
 @dataclass(frozen=True)
 class Mark:
-    """Last transaction of a database.
+    """High-water mark: the last committed transaction of a database.
 
     Parameters
     ----------
     store
         Random identifier of the database.
     host
-        Identifier of the machine that wrote it; empty if machines have none.
+        Identifier of the machine that wrote the mark; empty if the machine has none.
     n_commits
-        Total number of transactions.
+        Total number of committed transactions.
     nonce
-        Random identifier of the transaction, which differs between diverging histories.
+        Random identifier of the transaction; it differs between independently written copies.
     time_ns
         Time of writing, UTC.
     """
@@ -45,13 +45,13 @@ class Mark:
 
 
 def encoded(mark: Mark) -> bytes:
-    """Return a mark as `SLOT_BYTES` bytes of readable text."""
+    """Return a mark as JSON text with a CRC-32, `SLOT_BYTES` bytes long."""
     text = json.dumps({"format": FORMAT, **asdict(mark)}).encode("ascii").ljust(TEXT_BYTES)
     return text + b"%08x\n" % zlib.crc32(text)
 
 
 def decoded(slot: bytes) -> Mark | None:
-    """Invert `encoded`; None for other bytes."""
+    """Return the mark in a slot, the inverse of `encoded`; None if the slot is invalid."""
     text, checksum = slot[:TEXT_BYTES], slot[TEXT_BYTES:]
     if checksum != b"%08x\n" % zlib.crc32(text):
         return None
@@ -66,35 +66,35 @@ def decoded(slot: bytes) -> Mark | None:
 
 SUFFIX = ".high-water-mark"
 SLOTS = (0, 4096)
-"""Offsets that are written in turn, each in its own block: a torn write leaves the other mark."""
+"""File offsets of two marks, written alternately; an interrupted write damages only one."""
 
 
 class MarkError(ValueError):
-    """There is no valid mark; the message says why."""
+    """The file has no valid mark; the message states the reason."""
 
 
 class NoMarkError(MarkError):
-    """The file does not exist."""
+    """The file of the high-water mark does not exist."""
 
 
 def mark_path(database: Path) -> Path:
-    """Return the path of the mark of a database."""
+    """Return the path of the high-water mark file beside a database."""
     return database.with_name(database.stem + SUFFIX)
 
 
 class MarkFile:
-    """File with a database's mark; several processes may write it."""
+    """File with the high-water mark of a database; several processes may write it."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def read(self) -> Mark:
-        """Return the mark.
+        """Return the newest mark in the file.
 
         Raises
         ------
         MarkError
-            If it is damaged; `NoMarkError` if the file does not exist.
+            If the file is unreadable or damaged; `NoMarkError` if it does not exist.
         """
         try:
             with _opened(self.path, os.O_RDONLY) as descriptor:
@@ -105,14 +105,14 @@ class MarkFile:
             raise MarkError(f"cannot be read: {error.strerror}") from error
 
     def advance(self, mark: Mark) -> None:
-        """Write a later mark, durable on return; an earlier one has no effect.
+        """Write a mark, durable on return; a mark older than that in the file is ignored.
 
         Raises
         ------
         MarkError
-            If the file is missing or damaged, which must be reported before it is replaced.
+            If the file is missing, damaged or of another database; it is not replaced.
         OSError
-            If the disk refuses.
+            If the file cannot be written.
         """
         try:
             with _opened(self.path, os.O_RDWR) as descriptor:
@@ -128,12 +128,12 @@ class MarkFile:
             raise NoMarkError("is not there") from None
 
     def replace(self, mark: Mark) -> None:
-        """Write the file anew with this mark.
+        """Replace the file by a new file with this mark.
 
         Raises
         ------
         OSError
-            If the disk refuses; the previous file stays.
+            If the file cannot be written; the previous file stays.
         """
         write_private(self.path, encoded(mark).ljust(SLOTS[1], b"\0") + encoded(mark))
 

@@ -29,20 +29,20 @@ DEFAULTS = {
     "keepalives_count": "3",
     "tcp_user_timeout": "25000",
 }
-"""A server that disappears silently is detected within half a minute."""
+"""Connection timeouts, with which an unreachable server is detected within half a minute."""
 
 
 @dataclass(frozen=True)
 class PostgresAddress:
-    """Address of a database.
+    """Address of a PostgreSQL database.
 
     Parameters
     ----------
     conninfo
         Connection string of libpq, without a password.
     password_file
-        File with only the password, readable by its owner alone; without it libpq reads
-        ``~/.pgpass``.
+        File that contains only the password and is readable by its owner only; if None, libpq
+        reads ``~/.pgpass``.
     """
 
     conninfo: str
@@ -50,14 +50,14 @@ class PostgresAddress:
 
     @property
     def name(self) -> str:
-        """Name of the database in messages."""
+        """Name of the database and its host, for messages."""
         parts = conninfo_to_dict(self.conninfo)
         database = parts.get("dbname") or parts.get("user") or "named like the user"
         host = parts.get("host") or parts.get("service") or "this computer"
         return f"PostgreSQL database {database} at {host}"
 
     def full(self, purpose: str) -> str:
-        """Return the connection string with the password, which must never be shown."""
+        """Return the connection string with the password; it must never be displayed or logged."""
         given = conninfo_to_dict(self.conninfo)
         name = f"padwatch {purpose} {os.getpid()}@{socket.gethostname()}"[:63]
         settings = {**DEFAULTS, "application_name": name, **given, "client_encoding": "UTF8"}
@@ -86,7 +86,7 @@ SESSION = """
     SET tcp_keepalives_idle = 10; SET tcp_keepalives_interval = 5; SET tcp_keepalives_count = 3;
     SET idle_in_transaction_session_timeout = '30s';
 """
-"""Settings of every session; one whose client disappeared releases its locks soon."""
+"""Settings of every session; timeouts release the locks of a session whose client is gone."""
 
 SERVER_SETTINGS = """
     SELECT current_setting('fsync'), current_setting('full_page_writes'),
@@ -95,7 +95,7 @@ SERVER_SETTINGS = """
 
 
 class _TruthDumper(Dumper):
-    """Dumps booleans as 0 and 1, as they are stored."""
+    """Dumper that writes booleans as 0 and 1, as they are stored."""
 
     oid = BIGINT_OID
 
@@ -104,7 +104,7 @@ class _TruthDumper(Dumper):
 
 
 class _NumberDumper(Dumper):
-    """Dumps floats; NaN as NULL, as in SQLite."""
+    """Dumper that writes floats, and NaN as NULL, as SQLite does."""
 
     oid = DOUBLE_OID
 
@@ -125,7 +125,7 @@ Session = psycopg.Connection[tuple[Any, ...]]
 
 
 class PostgresConnection:
-    """Session within a transaction, for statements written for both databases."""
+    """Connection within a transaction; runs statements that are written for both databases."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -139,14 +139,14 @@ class PostgresConnection:
     def executemany(
         self, statement: str, parameters: Iterable[Parameters], /
     ) -> psycopg.Cursor[tuple[Any, ...]]:
-        """Run a statement once for each set of parameters, without waiting between them."""
+        """Run a statement once for each set of parameters, without a round trip for each."""
         cursor = self._session.cursor()
         cursor.executemany(translated(statement), parameters)
         return cursor
 
 
 def connected(address: PostgresAddress, purpose: str, settings: str) -> Session:
-    """Open a session with additional settings."""
+    """Open a session with the common settings and additional SET statements."""
     session = psycopg.connect(address.full(purpose), autocommit=True, context=_Context)
     try:
         session.execute((SESSION + settings).encode())
@@ -162,12 +162,13 @@ class _Context:
 
 
 def require_fit(session: Session, where: str) -> None:
-    """Refuse an unsuitable server.
+    """Check that a server is suitable.
 
     Raises
     ------
     StoreError
-        If it is too old, loses data at a power cut, is a standby or has no schema for tables.
+        If the server is too old, may lose data at a power cut, is a standby, does not use UTF-8,
+        or has no schema for tables.
     """
     if session.info.server_version < OLDEST_VERSION:
         version = session.info.parameter_status("server_version")
@@ -204,12 +205,12 @@ CANCEL_WITHIN_S = 2.0
 
 @contextmanager
 def cancelled_when_gone(session: Session) -> Iterator[None]:
-    """Cancel the statements of a session when the client of the request has gone.
+    """Cancel the statements of a session within the block when the HTTP client disconnects.
 
     Raises
     ------
     StoreError
-        If the client has gone.
+        If the client has disconnected.
     """
     asker = ASKER.get()
     if asker is None:
@@ -234,7 +235,7 @@ def _watch(session: Session, asker: Asker, is_done: Event) -> None:
     try:
         session.cancel_safe(timeout=CANCEL_WITHIN_S)
     except psycopg.Error:
-        return  # the server is gone, and its statements with it
+        return  # without a connection to the server the statement fails by itself
 
 
 BY_STATE = {
@@ -252,7 +253,7 @@ BY_STATE = {
     "XX001": "the database is damaged: restore a backup",
     "XX002": "an index is damaged: run reindexdb",
 }
-"""Advice by SQLSTATE."""
+"""Advice for error messages by SQLSTATE."""
 
 BY_WORDS = {
     "password authentication failed": "correct [store] password_file, or the role's password",
@@ -266,7 +267,7 @@ BY_WORDS = {
     "session is read-only": BY_STATE["25006"],
     "certificate": "correct sslmode, sslrootcert or sslcert in [store] postgresql",
 }
-"""Advice by the text of errors that occur before there is a session."""
+"""Advice for connection errors without an SQLSTATE, by a part of the error text."""
 
 OF_THE_ROW = (
     psycopg.IntegrityError,
@@ -274,13 +275,13 @@ OF_THE_ROW = (
     psycopg.errors.DataCorrupted,
     psycopg.errors.IndexCorrupted,
 )
-"""Errors caused by a row or its page: others of its transaction can be written."""
+"""Errors caused by one row or its page; other rows can be written without it."""
 
 UNREACHABLE = "check that PostgreSQL runs and can be reached; padwatch retries"
 
 
 def sentence(where: str, error: psycopg.Error) -> str:
-    """Return a message with advice."""
+    """Return a one-line error message with advice."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     said = (error.diag.message_primary or (lines[0] if lines else type(error).__name__)).rstrip(".")
     advice = _advice(error)
@@ -298,7 +299,7 @@ def _advice(error: psycopg.Error) -> str | None:
 
 @contextmanager
 def renamed(where: str) -> Iterator[None]:
-    """Raise `StoreError` for errors of PostgreSQL, its library and the system."""
+    """Convert errors of PostgreSQL, psycopg and the operating system to `StoreError`."""
     try:
         yield
     except psycopg.Error as error:
@@ -311,14 +312,14 @@ def renamed(where: str) -> Iterator[None]:
 
 
 def lock_number(name: str) -> int:
-    """Return the number of an advisory lock by name, the same in every process."""
+    """Return the number of the advisory lock for a name; it is the same in every process."""
     digest = hashlib.sha256(b"padwatch " + name.encode("utf-8", "surrogateescape")).digest()
     return int.from_bytes(digest[:8], "big", signed=True)
 
 
 MIGRATING = lock_number("/migrating")
 WRITING = lock_number("/writing")
-"""Held by every writing transaction, so that only one writes at a time, as in SQLite."""
+"""Advisory lock of writing transactions; it permits one writer at a time, as in SQLite."""
 
 
 _PIECE = re.compile(r"('(?:[^']|'')*')|\?|(?<!:):([A-Za-z_][A-Za-z_0-9]*)|%|\bwhole_(?=[a-z])")
@@ -326,9 +327,10 @@ _PIECE = re.compile(r"('(?:[^']|'')*')|\?|(?<!:):([A-Za-z_][A-Za-z_0-9]*)|%|\bwh
 
 @lru_cache(maxsize=1024)
 def translated(statement: str) -> bytes:
-    """Return a statement with ``%s`` for ``?`` and ``%(name)s`` for ``:name``, except in literals.
+    """Return a statement in psycopg's syntax: ``%s`` for ``?``, ``%(name)s`` for ``:name``.
 
-    The prefix ``whole_`` of tables is removed, since the server checks its data itself.
+    String literals stay unchanged. The prefix ``whole_`` of table names is removed, since the
+    server checks its data itself.
     """
     return _PIECE.sub(_piece, statement).encode()
 

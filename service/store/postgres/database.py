@@ -1,4 +1,4 @@
-"""PostgreSQL database: one writer, several readers, and names held by a process."""
+"""PostgreSQL database: one writing session, several reading sessions, and named locks."""
 
 import time
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ BEGIN_READING = b"BEGIN ISOLATION LEVEL REPEATABLE READ READ ONLY"
 
 
 class Readers:
-    """Read-only sessions of one database, each used by one thread at a time."""
+    """Pool of read-only sessions of one database; each is used by one thread at a time."""
 
     def __init__(self, address: PostgresAddress) -> None:
         self._address = address
@@ -43,7 +43,7 @@ class Readers:
 
     @contextmanager
     def reading(self) -> Iterator[PostgresConnection]:
-        """Borrow a session; one that raised an error is not used again."""
+        """Open a read-only transaction in a pooled session; close the session after an error."""
         with renamed(self._address.name):
             session = self._begun()
             try:
@@ -56,7 +56,7 @@ class Readers:
             self._put_back(session)
 
     def close(self) -> None:
-        """Close idle sessions now, and the others when they are returned."""
+        """Close idle sessions now, and sessions in use when their transactions end."""
         with self._lock:
             self._is_closed = True
             idle, self._idle = self._idle, []
@@ -97,16 +97,16 @@ BEGIN_WRITING = f"""
 """
 NUMBER = "SELECT pg_current_xact_id()::text"
 OUTCOME = "SELECT pg_xact_status(%s::xid8)"
-"""``committed``, ``aborted``, or ``in progress`` while the lost session still exists."""
+"""Query of a transaction's status; ``in progress`` while the lost session still exists."""
 
 DOUBT_S = 8.0
-"""Maximum time to determine the outcome of a commit without an answer."""
+"""Maximum time to determine the outcome of a commit after the connection was lost."""
 
 PAUSE_S = 0.2
 
 
 class Writer:
-    """Writing session, with one transaction at a time among all processes.
+    """Writing session; one writing transaction is open at a time among all processes.
 
     Parameters
     ----------
@@ -122,14 +122,14 @@ class Writer:
         self._is_closed = False
 
     def close(self) -> None:
-        """End the session; closing twice has no effect."""
+        """Close the session; closing it twice has no effect."""
         with self._lock:
             self._is_closed = True
             self._session.close()
 
     @contextmanager
     def writing(self) -> Iterator[PostgresConnection]:
-        """Open a transaction; durable when left."""
+        """Open a writing transaction; it is durable when its block ends without an error."""
         with self._lock, renamed(self._where):
             number = self._begin()
             try:
@@ -149,7 +149,7 @@ class Writer:
                 if not self._session.closed:
                     self._roll_back()
                     raise
-        self._session = writing_session(self._address)  # it was lost after the last transaction
+        self._session = writing_session(self._address)  # the previous session was lost
         return self._begun()
 
     def _begun(self) -> str:
@@ -174,7 +174,7 @@ class Writer:
                 raise StoreError(f"{self._where}: an error rolled the transaction back")
 
     def _settle(self, number: str, lost: psycopg.Error) -> None:
-        """Determine the outcome of an unanswered commit; raise an error unless it succeeded."""
+        """Determine the outcome of a commit without a reply; raise an error unless it succeeded."""
         until_s = time.monotonic() + DOUBT_S
         outcome = self._outcome(number)
         while outcome is None and time.monotonic() < until_s:
@@ -209,14 +209,14 @@ class Writer:
 
 
 def writing_session(address: PostgresAddress) -> Session:
-    """Open a session that may write.
+    """Open a writing session.
 
     Raises
     ------
     StoreError
         If the server is unsuitable.
     psycopg.Error
-        If it cannot be reached, or refuses.
+        If the server cannot be reached or rejects the connection.
     """
     session = connected(address, "writer", WRITER_SETTINGS)
     try:
@@ -238,18 +238,18 @@ HOLDER = """
 
 
 class PostgresHold:
-    """Name held in a database, from entering to leaving, by an advisory lock of its own session.
+    """Exclusive lock on a name, an advisory lock in a separate session; a context manager.
 
     The lock ends with the session: when the process ends, when the server restarts, or at most half
     a minute after the host or the network fails. The holder must therefore check `is_held` before
-    every action that only one process may take; a lost name stays lost.
+    every action that only one process may take; a lost lock is never regained.
 
     Parameters
     ----------
     address
         Address of the database.
     name
-        Name to hold.
+        Name of the lock.
     """
 
     def __init__(self, address: PostgresAddress, name: str) -> None:
@@ -259,7 +259,7 @@ class PostgresHold:
 
     @property
     def is_held(self) -> bool:
-        """Check with the server; False forever once it did not answer."""
+        """Whether the server still answers in the session of the lock; False after any failure."""
         with self._lock:
             if self._session is None:
                 return False
@@ -307,19 +307,20 @@ class PostgresHold:
 
 
 class PostgresDatabase:
-    """One database of a server; used by several threads and processes.
+    """PostgreSQL database of the store; may be used by several threads and processes.
 
     Parameters
     ----------
     address
-        Address of the database, which must exist and be empty or padwatch's.
+        Address of the database, which must exist and must be empty or created by padwatch.
     origin
-        Origin of its data; a database with data of the other origin is refused.
+        Origin of the stored data; a database with data of another origin is rejected.
 
     Raises
     ------
     StoreError
-        If it cannot be reached or used, is not padwatch's, or is newer than this program.
+        If the database cannot be reached or used, belongs to another program, or has a newer
+        schema than this program.
     """
 
     kind = "postgresql"
@@ -336,12 +337,12 @@ class PostgresDatabase:
         self._writer, self._readers = Writer(address, session), Readers(address)
 
     def close(self) -> None:
-        """End all sessions; closing twice has no effect."""
+        """Close all sessions; closing twice has no effect."""
         self._readers.close()
         self._writer.close()
 
     def writing(self) -> AbstractContextManager[PostgresConnection]:
-        """Open the only writing transaction of all processes; durable when left."""
+        """Open a writing transaction; only one is open at a time among all processes."""
         return self._writer.writing()
 
     @contextmanager
@@ -349,14 +350,14 @@ class PostgresDatabase:
         self,
         unreadable: Unreadable = "strict",  # noqa: ARG002
     ) -> Iterator[PostgresConnection]:
-        """Open a read-only transaction; the database stores no unreadable text."""
+        """Open a read-only transaction; `unreadable` is unused, since all text is valid UTF-8."""
         with self._readers.reading() as reader:
             yield reader
 
     def ever_had(self, connection: Connection, table: str) -> bool:  # noqa: ARG002
-        """Return True: files beside the database are created when it is opened."""
+        """Return True; a missing head file is written when the store is opened."""
         return True
 
     def hold(self, name: str) -> PostgresHold:
-        """Hold a name among all processes that use this database."""
+        """Return a lock on a name, exclusive among all processes that use this database."""
         return PostgresHold(self.address, name)

@@ -21,25 +21,26 @@ HEAD_BEGUN = "audit.head_begun"
 
 
 class PostgresStore(Store):
-    """Store that several processes on several hosts may share.
+    """Store in a PostgreSQL database; several processes on several hosts may share it.
 
     Parameters
     ----------
     address
-        Address of the database, which must exist and be empty or padwatch's.
+        Address of the database, which must exist and must be empty or created by padwatch.
     head
-        File on this host that names the newest entry of the audit trail read here.
+        Head file of the audit trail on this host, with the newest entry seen by this host.
     origin
-        Origin of its data; a database with data of the other origin is refused.
+        Origin of the stored data; a database with data of another origin is rejected.
     to
-        Function that returns the messages about an event of an alarm.
+        Function that returns the outbox messages about an alarm event.
     spectra
         Limits of stored spectra.
 
     Raises
     ------
     StoreError
-        If it cannot be reached or used, is not padwatch's, or is newer than this program.
+        If the database cannot be reached or used, belongs to another program, or has a newer
+        schema than this program.
     """
 
     def __init__(
@@ -65,7 +66,7 @@ class PostgresStore(Store):
 
 
 def _begin_head(database: PostgresDatabase, head: Path) -> bool:
-    """Write the head of a new host; return whether the trail already had entries."""
+    """Write a missing head file; return whether the audit trail already had entries."""
     if head.exists():
         return False
     head.parent.mkdir(parents=True, exist_ok=True)
@@ -76,7 +77,7 @@ def _begin_head(database: PostgresDatabase, head: Path) -> bool:
 
 
 def _begun(head: Path) -> AuditAction:
-    """Return an entry about a new head, so that the removal of a head is visible in the trail."""
+    """Return the audit entry about a new head file; it reveals that a head file was removed."""
     who = acting()
     return AuditAction(
         time_ns=time.time_ns(),
@@ -90,7 +91,7 @@ def _begun(head: Path) -> AuditAction:
 
 
 def server_trail(address: PostgresAddress, head: Path) -> Trail:
-    """Return the audit trail of a database, with the head of this host; nothing is upgraded."""
+    """Return the audit trail of a database with the head file of this host; no migration is run."""
     return Trail(partial(_opened, address), head, is_shared=True)
 
 

@@ -1,1 +1,1 @@
-"""Roll-ups: readings aggregated per minute, ten minutes and hour, by operating condition."""
+"""Roll-ups of readings over one minute, ten minutes and one hour, by operating condition."""

@@ -1,4 +1,4 @@
-"""Trends of a time range from as few roll-ups as possible."""
+"""Trend queries, answered from as few roll-ups and single readings as possible."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,10 +22,10 @@ from service.store.series import find_series
 from service.store.trends import Span, arguments, select_page, select_readings, storable, too_large
 
 MAX_SPANS = 4096
-"""Spans per query, which bounds memory."""
+"""Maximum number of roll-up spans that one SQL query reads, to limit memory."""
 
 MAX_CUT_SPANS = 100_000
-"""Maximum number of finer roll-ups that are read because bounds cut through wider ones."""
+"""Maximum number of finer roll-ups read in place of wider ones that match a query only in part."""
 
 REDONE = """
     SELECT start_ns FROM rollup_redo
@@ -35,20 +35,20 @@ REDONE = """
 
 @dataclass
 class Cover:
-    """Data that answer a query.
+    """Roll-ups and time spans that together answer a query.
 
     Parameters
     ----------
     summaries
-        Roll-ups whose readings are all requested, aggregated into buckets.
+        Roll-ups that contain requested readings only, aggregated into buckets.
     spans
-        Spans whose single readings must be read.
+        Time spans for which single readings must be read.
     rolled_spans
-        Spans of the roll-ups.
+        Time spans of the roll-ups.
     n_rolled
-        Number of readings in them, usable or not.
+        Number of readings in the roll-ups, usable or not.
     is_coarse
-        Whether some of these readings were deleted.
+        Whether the single readings of some roll-ups were deleted.
     """
 
     summaries: list[Summaries] = field(default_factory=list)
@@ -65,10 +65,10 @@ def covered(
     whole: Span,
     bucket_ns: int,
 ) -> Cover:
-    """Cover a time range.
+    """Return the roll-ups and the spans of single readings that cover a time range.
 
-    Where single readings were deleted, roll-ups that extend beyond the range count as a whole, and
-    those that bounds of conditions cut through are left out.
+    Where single readings were deleted, roll-ups that extend beyond the range are included as a
+    whole, and roll-ups that match the bounds of the conditions only in part are omitted.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def covered(
     Raises
     ------
     QueryTooLargeError
-        If bounds of conditions cut through too many roll-ups.
+        If too many roll-ups match the bounds of the conditions only in part.
     """
     series = find_series(reader, query.unit, query.bearing)
     if series is None:
@@ -108,7 +108,7 @@ class _Covering:
         self.cover = Cover()
 
     def take(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span by the widest roll-ups, its ends by finer ones, then by single readings."""
+        """Cover a span by the widest roll-ups, and its ends by finer ones or single readings."""
         if span[0] >= span[1]:
             return
         if not widths_ns:
@@ -126,13 +126,13 @@ class _Covering:
         self.take((inner[1], span[1]), finer_ns)
 
     def take_coarse(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span whose single readings were deleted, except late ones."""
+        """Cover a span whose single readings were deleted, except late readings."""
         self._take_cells(span, widths_ns)
         late = self._redone(span)
         self.cover.spans += [_within(span, (hour, hour + HOUR_NS)) for hour in late]
 
     def _take_cells(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span by the widest roll-ups that fit; the narrowest may extend beyond it."""
+        """Cover a span by the widest roll-ups inside it; the finest ones may extend beyond it."""
         width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
         inner = _inside(span, width_ns) if finer_ns else _around(span, width_ns)
         if finer_ns and inner[0] >= inner[1]:
@@ -197,7 +197,7 @@ class _Covering:
             self.cover.rolled_spans += _runs(np.unique(chosen.time_ns), width_ns)
 
     def _cut(self, conditions: Conditions) -> npt.NDArray[np.bool_]:
-        """Return the cells whose readings may be requested only in part."""
+        """Return a mask of the cells that the bounds of the conditions may match only in part."""
         asked = self._asked
         sides = (
             (asked["eccentricity_low"], conditions.eccentricity_low, -1.0),
@@ -225,7 +225,7 @@ def _around(span: Span, width_ns: int) -> Span:
 
 
 def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
-    """Return the spans of adjacent buckets, given their starts."""
+    """Yield the span of each run of contiguous buckets, given the sorted bucket starts."""
     breaks = np.flatnonzero(np.diff(time_ns) > width_ns)
     if time_ns.size:
         firsts = np.concatenate([time_ns[:1], time_ns[breaks + 1]]).tolist()
@@ -235,7 +235,7 @@ def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
 
 
 def read_trend(reader: Connection, query: TrendQuery) -> Trend:
-    """Return trends of one bearing, aggregated into buckets if they are many.
+    """Return the trends of one bearing, aggregated into buckets if it has many readings.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Aggregation of readings into roll-ups, in bounded steps."""
+"""Aggregation of readings into roll-ups, in short transactions."""
 
 from itertools import pairwise
 
@@ -20,11 +20,11 @@ DELETE_HOUR = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time
 
 
 def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUntil) -> None:
-    """Merge late readings of an hour whose single readings were deleted into its roll-ups.
+    """Merge late readings into the roll-ups of an hour whose single readings were deleted.
 
-    The readings are deleted in the same transaction, so that each is either stored or merged. A
-    reading that is written twice after its hour was deleted counts twice, since it cannot be
-    recognized.
+    The late readings are deleted in the same transaction, so that each is either stored or merged.
+    A reading that is written twice after its hour was deleted is counted twice, since padwatch
+    cannot recognize it.
     """
     hour = (hour_ns, hour_ns + HOUR_NS)
     minutes = minutes_of(writer, series, hour)
@@ -40,10 +40,10 @@ def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUn
 
 
 MAX_READINGS = 2000
-"""Readings per step, which blocks other writers for some tens of milliseconds."""
+"""Maximum number of readings per step; a step blocks other writers for tens of milliseconds."""
 
 MAX_REDONE = 24
-"""Hours per step."""
+"""Maximum number of hours that are aggregated again per step."""
 
 NEXT_TIMES = """
     SELECT time_ns FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?
@@ -56,7 +56,7 @@ SET_MARK = """
 
 
 def gather_next(writer: Connection, series: int, now_ns: int) -> None:
-    """Aggregate readings after the mark, in complete minutes, and move the mark."""
+    """Aggregate the next complete minutes of readings of a bearing."""
     mark_ns = select_mark(writer, series)
     until_ns = _until(writer, series, mark_ns, now_ns)
     if until_ns > mark_ns:
@@ -65,7 +65,7 @@ def gather_next(writer: Connection, series: int, now_ns: int) -> None:
 
 
 def gather_again(writer: Connection, series: int) -> None:
-    """Aggregate again the hours that received readings since they were aggregated."""
+    """Aggregate hours with late readings again."""
     mark_ns = select_mark(writer, series)
     hours = writer.execute(
         "SELECT start_ns FROM rollup_redo WHERE series = ? ORDER BY start_ns LIMIT ?",
@@ -89,7 +89,7 @@ def _gather_hour(writer: Connection, series: int, span: Span) -> None:
 
 
 def _until(writer: Connection, series: int, mark_ns: int, now_ns: int) -> int:
-    """Return the end of the next step: whole minutes that are followed by a reading."""
+    """Return the end of the next step; only minutes before a later reading are complete."""
     end_ns = now_ns + 1
     times = writer.execute(NEXT_TIMES, (series, mark_ns, end_ns, MAX_READINGS)).fetchall()
     if not times:
@@ -100,7 +100,7 @@ def _until(writer: Connection, series: int, mark_ns: int, now_ns: int) -> int:
 
 
 def _gather(writer: Connection, series: int, span: Span) -> None:
-    """Write the roll-ups of every width that end within a span."""
+    """Aggregate a span: insert the roll-ups of every width that end within it."""
     minutes = minutes_of(writer, series, span)
     if minutes is not None:
         insert_cells(writer, series, MINUTE_NS, minutes)
@@ -130,21 +130,21 @@ DUE = """
 
 
 class RollupStore(Tables):
-    """Roll-ups of readings. Readings that are not aggregated yet are read one by one."""
+    """Store of roll-ups; readings that are not aggregated yet are read as single readings."""
 
     def due(self, now_ns: int) -> list[int]:
-        """Return the bearings with readings to aggregate, the one furthest behind first."""
+        """Return the series numbers of bearings with readings to aggregate, most delayed first."""
         with self._reading() as reader:
             rows = reader.execute(DUE, {"now_ns": now_ns, "width_ns": MINUTE_NS})
             return [int(row[0]) for row in rows]
 
     def gather(self, series: int, now_ns: int) -> None:
-        """Aggregate some readings of one bearing in one short transaction.
+        """Aggregate some readings of one bearing in a short transaction.
 
         Raises
         ------
         StoreError
-            If nothing was aggregated.
+            If the transaction failed; nothing was aggregated.
         """
         with self._writing() as writer:
             gather_again(writer, series)

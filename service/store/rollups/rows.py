@@ -1,4 +1,4 @@
-"""Roll-ups by operating condition: rows and their encoding."""
+"""Roll-up rows by operating condition: aggregation, encoding, tables and queries."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -17,21 +17,21 @@ from service.store.trends import IN_STATES, Span, at_least, at_most, select_layo
 NO_STATE = -1
 NO_BIN = np.iinfo(np.int64).min
 GRID = CellGrid()
-"""Resolution of operating conditions in roll-ups; a filter may still cut through a cell."""
+"""Grid of operating condition cells; roll-ups aggregate readings of the same cell."""
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Operating conditions of readings.
+    """Operating conditions of n single or aggregated readings.
 
     Parameters
     ----------
     state : (n,)
         Operating state, `NO_STATE` if unknown.
     n_readings : (n,)
-        Number of readings, usable or not.
+        Number of aggregated readings, usable or not.
     eccentricity_low, eccentricity_high, oil_low_c, oil_high_c : (n,)
-        Extremes, NaN if unknown.
+        Minimum and maximum of eccentricity ratio and oil temperature, NaN if unknown.
     """
 
     state: IntArray
@@ -48,7 +48,7 @@ class Conditions:
         return cls(state, one, eccentricity, eccentricity, oil_c, oil_c)
 
     def summed(self, order: IntArray, starts: IntArray) -> "Conditions":
-        """Aggregate runs of ordered rows; all rows of a run are of one cell."""
+        """Return the aggregate of each run of sorted rows; the rows of a run are of one cell."""
         return Conditions(
             self.state[order][starts],
             np.add.reduceat(self.n_readings[order], starts),
@@ -61,13 +61,13 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Cells:
-    """Summaries of readings with their operating conditions, in order of time."""
+    """Roll-up cells: statistics of readings with their operating conditions, in order of time."""
 
     conditions: Conditions
     summaries: Summaries
 
     def gathered(self, width_ns: int) -> "Cells":
-        """Aggregate into spans of a width, with one row for each condition of each span."""
+        """Return the cells aggregated over spans of a width; one row per span and condition."""
         bucket = self.summaries.time_ns // width_ns
         keys = np.stack(
             [
@@ -86,7 +86,7 @@ class Cells:
         )
 
     def slots(self) -> IntArray:
-        """Return the number of each cell within its span."""
+        """Return the index of each cell within its time span."""
         time_ns = self.summaries.time_ns
         first = np.flatnonzero(np.concatenate([[True], np.diff(time_ns) != 0]))
         lengths = np.diff(np.append(first, time_ns.size))
@@ -94,7 +94,7 @@ class Cells:
 
 
 def together(one: Cells, other: Cells) -> Cells:
-    """Concatenate cells; aggregating them restores the order."""
+    """Return the concatenated rows of two sets of cells; `Cells.gathered` restores the order."""
     conditions = Conditions(
         *(
             np.concatenate([getattr(one.conditions, name), getattr(other.conditions, name)])
@@ -105,7 +105,7 @@ def together(one: Cells, other: Cells) -> Cells:
 
 
 def bins(value: FloatArray, width: float) -> IntArray:
-    """Return the bin of each value, with decimal bounds; `NO_BIN` where there is no value."""
+    """Return the bin number of each value, with decimal bin edges; `NO_BIN` for NaN."""
     known = np.isfinite(value)
     safe = np.clip(np.where(known, value, 0.0), -1e9, 1e9)
     number = np.floor(safe / width).astype(np.int64)
@@ -115,18 +115,18 @@ def bins(value: FloatArray, width: float) -> IntArray:
 
 
 PART_COLUMNS = 24
-"""Columns per part, whose bytes fit in a page without overflow pages."""
+"""Number of columns per part; a row of a part fits in a database page without overflow pages."""
 
 
 def parts_of(columns: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
-    """Split columns into parts of neighbours."""
+    """Split columns into parts of at most `PART_COLUMNS` adjacent columns."""
     return tuple(
         columns[first : first + PART_COLUMNS] for first in range(0, len(columns), PART_COLUMNS)
     )
 
 
 def encoded(summaries: Summaries) -> list[bytes]:
-    """Return the bytes of each row."""
+    """Return each row of roll-up statistics as a binary record."""
     usable = summaries.count > 0
     packed = np.packbits(usable, axis=1)
     found: list[bytes] = [b""] * len(packed)
@@ -145,7 +145,7 @@ def encoded(summaries: Summaries) -> list[bytes]:
 
 
 def decoded(names: tuple[str, ...], time_ns: IntArray, rows: Sequence[bytes]) -> Summaries:
-    """Invert `encoded`."""
+    """Return the roll-up statistics in binary records, the inverse of `encoded`."""
     shape, n_head = (len(rows), len(names)), len(names)
     count, level = np.zeros(shape, dtype=np.int64), np.zeros(shape, dtype=np.uint8)
     mean, minimum, maximum = (np.full(shape, np.nan) for _ in range(3))
@@ -177,7 +177,7 @@ def _record(n_columns: int, n_usable: int) -> np.dtype[np.void]:
 
 
 def _alike(patterns: list[bytes]) -> list[tuple[bytes, npt.NDArray[np.int64]]]:
-    """Group rows by the columns that have numbers: there are few patterns and many rows."""
+    """Group row indices by the bit pattern of usable columns; there are few patterns."""
     rows: dict[bytes, list[int]] = {}
     for row, pattern in enumerate(patterns):
         rows.setdefault(pattern, []).append(row)
@@ -224,15 +224,16 @@ ROLLUP_TABLES = """
         ON CONFLICT DO NOTHING;
     END;
 """
-"""Migration that creates the tables.
+"""Migration that creates the tables of roll-ups.
 
-A reading that is written into aggregated time schedules its hour to be redone in the same
-transaction. Until then roll-ups of that hour are not read."""
+A late reading, whose time is already aggregated, is inserted together with a row in
+``rollup_redo``. Roll-ups of that hour are not read until the hour is aggregated again."""
 
 
 NS_PER_S = 1_000_000_000
 WIDTHS_S = (60, 600, 3600)
-"""Finest first; each divides the next, and the last one is the unit of redoing."""
+"""Roll-up widths in seconds, finest first. Each width divides the next one; hours with late
+readings are aggregated again as a whole."""
 
 WIDTHS_NS = tuple(width * NS_PER_S for width in WIDTHS_S)
 HOUR_NS = WIDTHS_NS[-1]
@@ -284,14 +285,14 @@ def select_cells(
     names: tuple[str, ...],
     asked: Mapping[str, object] = ANYTHING,
 ) -> Cells | None:
-    """Return the cells that may contain readings of a query; None if there are none.
+    """Return the cells of a time span that may contain requested readings; None without cells.
 
     Parameters
     ----------
     names
         Requested columns.
     asked
-        Bounds of the conditions.
+        Bounds of the operating conditions, by SQL parameter.
     """
     wanted = {**asked, "series": series, "width_s": width_ns // NS_PER_S}
     wanted |= {"start_ns": span[0], "end_ns": span[1]}
@@ -319,7 +320,7 @@ def _conditions(rows: Iterable[tuple[object, ...]]) -> Conditions:
 
 
 def _nothing(names: tuple[str, ...], start_ns: IntArray) -> Summaries:
-    """Return empty summaries, as of unknown quantities."""
+    """Return empty statistics (count 0, level BAD), which are filled by `_put`."""
     value = np.full((start_ns.size, len(names)), np.nan)
     level = np.full(value.shape, Level.BAD, dtype=np.uint8)
     count = np.zeros(value.shape, dtype=np.int64)
@@ -333,7 +334,7 @@ def _put(
     width_ns: int,
     rows: list[tuple[int, int, bytes]],
 ) -> None:
-    """Copy the columns of one layout into summaries."""
+    """Decode the stored rows of one layout and copy their columns into the statistics."""
     if not rows:
         return
     start_ns, slot = (np.array([row[i] for row in rows], dtype=np.int64) for i in (0, 1))

@@ -1,4 +1,4 @@
-"""Roll-ups in their tables, and the time up to which finer data were deleted."""
+"""Writing and deletion of roll-ups, and the times up to which data were deleted."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -31,7 +31,7 @@ INSERT_NUMBERS = "INSERT INTO rollup_numbers VALUES (?,?,?,?,?,?)"
 
 
 def select_mark(reader: Connection, series: int) -> int:
-    """Return the end of the aggregated readings of a bearing; 0 if there are none."""
+    """Return the time up to which the readings of a bearing are aggregated; 0 if none are."""
     found = reader.execute(
         "SELECT until_ns FROM rollup_mark WHERE series = ?", (series,)
     ).fetchone()
@@ -39,7 +39,7 @@ def select_mark(reader: Connection, series: int) -> int:
 
 
 def minutes_of(writer: Connection, series: int, span: Span) -> Cells | None:
-    """Aggregate the single readings of a span by the minute; None if there are none."""
+    """Return the single readings of a span aggregated by minute; None if it has no readings."""
     rows = writer.execute(SELECT_WHOLE, (series, *span)).fetchall()
     if not rows:
         return None
@@ -50,7 +50,7 @@ def minutes_of(writer: Connection, series: int, span: Span) -> Cells | None:
 
 
 def insert_cells(writer: Connection, series: int, width_ns: int, cells: Cells) -> None:
-    """Write roll-ups of one width."""
+    """Insert roll-ups of one width."""
     width_s, slots = width_ns // NS_PER_S, cells.slots().tolist()
     start_ns = cells.summaries.time_ns.tolist()
     writer.executemany(INSERT_CELL, _cell_rows(series, width_s, start_ns, slots, cells.conditions))
@@ -79,7 +79,7 @@ def _cell_rows(
 
 
 def forget_width(writer: Connection, series: int, width_ns: int, span: Span) -> None:
-    """Delete the roll-ups of one width in a span."""
+    """Delete the roll-ups of one width in a time span."""
     layouts = [row[0] for row in writer.execute("SELECT id FROM layout").fetchall()]
     its = (series, width_ns // NS_PER_S)
     writer.execute(
@@ -95,12 +95,12 @@ def forget_width(writer: Connection, series: int, width_ns: int, span: Span) -> 
 
 
 def rolled_columns() -> tuple[str, ...]:
-    """Return the columns that roll-ups contain."""
+    """Return the names of the columns that roll-ups contain."""
     return columns_of(CATALOGUE)
 
 
 SINGLE_S = 0
-"""Width of single readings."""
+"""Width that stands for single readings in the table of deleted data."""
 
 SELECT_DELETED = "SELECT width_s, until_ns FROM retention_mark WHERE series = ?"
 SET_DELETED = """
@@ -116,30 +116,30 @@ class DeletedUntil:
     Parameters
     ----------
     until_ns
-        Time by width, 0 for single readings: all earlier data were deleted or never existed.
+        Time by width in seconds, 0 for single readings; no earlier data of that width exist.
     """
 
     until_ns: dict[int, int]
 
     @property
     def readings_ns(self) -> int:
-        """Time up to which single readings were deleted; 0 if none were."""
+        """Time up to which single readings were deleted; 0 if none were deleted."""
         return self.of(SINGLE_S)
 
     def of(self, width_s: int) -> int:
-        """Return the time up to which roll-ups of a width were deleted."""
+        """Return the time up to which roll-ups of a width were deleted; 0 if none were deleted."""
         return self.until_ns.get(width_s, 0)
 
     def kept_ns(self, time_ns: int) -> tuple[int, ...]:
-        """Return the widths of the roll-ups that exist at a time, finest first."""
+        """Return the widths of the roll-ups that are stored for a time, finest first."""
         return tuple(width for width in WIDTHS_NS if self.of(width // NS_PER_S) <= time_ns)
 
     def finest_ns(self, start_ns: int) -> int | None:
-        """Return the width available for all time since a start; None for single readings."""
+        """Return the finest roll-up width available since a start; None for single readings."""
         return self.kept_ns(start_ns)[0] if start_ns < self.readings_ns else None
 
     def stretches(self, span: tuple[int, int]) -> list[tuple[int, int]]:
-        """Split a span at the times at which the available widths change."""
+        """Split a time span at the times up to which data were deleted."""
         cuts = sorted({*span, *(t for t in self.until_ns.values() if span[0] < t < span[1])})
         return list(pairwise(cuts))
 
@@ -152,5 +152,5 @@ def select_deleted(reader: Connection, series: int) -> DeletedUntil:
 
 
 def set_deleted(writer: Connection, series: int, width_s: int, until_ns: int) -> None:
-    """Record a deletion in its transaction."""
+    """Write the time up to which data were deleted, in the transaction of the deletion."""
     writer.execute(SET_DELETED, (series, width_s, until_ns))

@@ -1,4 +1,4 @@
-"""Search for damage in a SQLite database: its structure, its rows, and the high-water mark."""
+"""Integrity check of a SQLite database: structure, row checksums, and high-water mark."""
 
 import json
 import re
@@ -23,12 +23,12 @@ NULL_FINDING = "NULL value in "
 
 @dataclass(frozen=True)
 class Finding:
-    """Defect of a database.
+    """Defect of a database, with a description.
 
     Parameters
     ----------
     kind
-        "structure", "altered", "missing" or "high_water".
+        "structure", "altered" (row), "missing" (row) or "high_water".
     """
 
     kind: str
@@ -36,21 +36,21 @@ class Finding:
 
 
 def findings(path: Path, progress: Callable[[float], None] = lambda _: None) -> Iterator[Finding]:
-    """Check a database completely, also while padwatch writes to it; yield its defects.
+    """Check a database completely and yield its defects; padwatch may be writing to it.
 
     Parameters
     ----------
     progress
-        Receives the completed fraction.
+        Function that receives the completed fraction, 0 to 1.
 
     Raises
     ------
     StoreError
-        If it cannot be read at all.
+        If the file does not exist.
     """
     if not path.exists():
         raise StoreError(f"{path.absolute()}: there is no database")
-    in_file = _mark_beside(path)  # read first: it may lag behind, but not lead
+    in_file = _mark_beside(path)  # read before the database, which may be ahead of it
     log = DamageLog(EVERY)
     seals = Seals(log)
     uri = f"{path.absolute().as_uri()}?mode=ro"
@@ -58,7 +58,7 @@ def findings(path: Path, progress: Callable[[float], None] = lambda _: None) -> 
         with closing(
             sqlite3.connect(uri, uri=True, timeout=BUSY_TIMEOUT_S, isolation_level=None)
         ) as reader:
-            mark = _mark_inside(reader)  # now: a running service changes both
+            mark = _mark_inside(reader)  # read early: a running service changes both marks
             yield from (Finding("structure", each) for each in structure_findings(reader))
             seals.load(reader)
             _look_at_rows(reader, seals, log, progress)
@@ -82,11 +82,15 @@ def _mark_inside(reader: sqlite3.Connection) -> Mark | None:
     try:
         return select_mark(reader)
     except (sqlite3.Error, UnicodeDecodeError):
-        return None  # read again at the end, after other damage was reported
+        return None  # read again at the end, after the structure check
 
 
 def structure_findings(connection: sqlite3.Connection) -> Iterator[str]:
-    """Yield structural defects; SQLite before 3.41 reports false nulls in WITHOUT ROWID tables."""
+    """Yield structural defects.
+
+    NULL findings are checked by a query: SQLite before 3.41 reports false ones in WITHOUT ROWID
+    tables.
+    """
     nulls = set()
     for (finding,) in connection.execute(f"PRAGMA integrity_check({EVERY})"):
         if finding.startswith(NULL_FINDING):
@@ -121,11 +125,11 @@ def _damage(log: DamageLog) -> Iterator[Finding]:
 
 
 ROWS_AT_ONCE = 500
-"""Rows per transaction of a few milliseconds, after which the log can be moved into the file."""
+"""Rows per read transaction, a few milliseconds, so that the WAL can be moved into the file."""
 
 HEX = "hex"
 REMEMBER_EVERY = 300
-"""Number of steps after which the progress is written."""
+"""Number of steps between two writes of the progress."""
 
 RECALL = "SELECT place FROM main.seal_walk WHERE id = 1"
 REMEMBER = """
@@ -134,12 +138,12 @@ REMEMBER = """
 
 
 class Scrubber:
-    """Checks all rows in turn and resumes after a restart; used by one thread at a time.
+    """Cyclic checksum check of all rows, resumed after a restart; used by one thread at a time.
 
     Parameters
     ----------
     damage
-        Receives altered and missing rows.
+        Log that receives altered and missing rows.
     """
 
     def __init__(self, database: Database, seals: Seals, damage: DamageLog) -> None:
@@ -150,12 +154,12 @@ class Scrubber:
         self._n_looks = 0
 
     def check_some(self) -> bool:
-        """Check some rows; return whether all rows have been checked once.
+        """Check the next rows; return whether this completes a check of all rows.
 
         Raises
         ------
         StoreError
-            If the database cannot be used now.
+            If the database is temporarily unusable.
         """
         if self._number < 0:
             self._recall()
@@ -194,7 +198,7 @@ class Scrubber:
 
 
 def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
-    """Return where to resume; the beginning if that is unknown."""
+    """Return the walk and the key at which to resume; the first walk if the progress is unknown."""
     row = reader.execute(RECALL).fetchone()
     try:
         name, is_of_seals, after = json.loads(row[0]) if row else (None, False, None)
@@ -207,7 +211,7 @@ def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
 
 
 def _json_cell(cell: Any) -> Any:
-    """Return a value of a key as JSON; keys of sessions are bytes."""
+    """Return a key value as a JSON value; bytes, as in the keys of sessions, as hexadecimal."""
     return {HEX: cell.hex()} if isinstance(cell, bytes) else cell
 
 

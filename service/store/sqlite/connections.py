@@ -14,25 +14,25 @@ from service.store.sqlite.file import leaves_in_doubt
 BUSY_TIMEOUT_S = 5.0
 N_KEPT = 4
 LOOK_AFTER_STEPS = 20_000
-"""Instructions of SQLite, some tens of microseconds, after which a read checks whether its client
-still waits."""
+"""Number of SQLite instructions, some tens of microseconds, between two checks of a read for a
+timeout or a disconnected client."""
 
 CLOCK = SystemClock()
 LONGEST_S = 120.0
-"""Maximum duration of a read, during which the log beside the file only grows."""
+"""Maximum duration of a read transaction; the WAL file cannot shrink during a read."""
 
 
 class Readers:
-    """Read-only connections to one database; each is used by one thread at a time.
+    """Pool of read-only connections to one database; each is used by one thread at a time.
 
     Parameters
     ----------
     now_s
         Monotonic clock.
     prepare
-        Prepares a new connection for reading.
+        Function that prepares a new connection for reading.
     require
-        Raises an error if the file is no longer the one that was opened.
+        Function that raises an error if the database file was removed or replaced.
     """
 
     def __init__(
@@ -50,11 +50,11 @@ class Readers:
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
-        """Borrow a connection; one that raised an error is not used again."""
+        """Open a read-only transaction on a pooled connection; close it after an error."""
         reader = self._taken()
         try:
             reader.set_progress_handler(self._should_end(), LOOK_AFTER_STEPS)
-            reader.execute("BEGIN")  # one state of the database for the whole read
+            reader.execute("BEGIN")  # one consistent state for the whole block
             yield reader
             reader.set_progress_handler(None, 0)
             if reader.in_transaction:
@@ -65,7 +65,7 @@ class Readers:
         self._put_back(reader)
 
     def close(self) -> None:
-        """Close idle connections now, and the others when they are returned."""
+        """Close idle connections now, and connections in use when their transactions end."""
         with self._lock:
             self._is_closed = True
             idle, self._idle = self._idle, []
@@ -73,7 +73,7 @@ class Readers:
             reader.close()
 
     def _should_end(self) -> Callable[[], bool]:
-        """Return a callback that ends a read after a timeout or when the client has gone."""
+        """Return a callback that interrupts a read after a timeout or if the client disconnects."""
         asker, end_s = ASKER.get(), self._now_s() + LONGEST_S
         return lambda: self._now_s() > end_s or (asker is not None and asker.has_gone)
 
@@ -104,33 +104,33 @@ class Readers:
 
 
 MAX_LOG_BYTES = 67_108_864
-"""Size to which the ``-wal`` file is cut after a long read let it grow."""
+"""Size in bytes to which SQLite truncates the ``-wal`` file after a long read."""
 
 MIN_FREE_PAGES = 2000
 MIN_FREE_SHARE = 0.1
-"""Less free space than this is soon used again."""
+"""Minimum share of free pages that are released; fewer are soon used again."""
 
 PAGES_AT_ONCE = 200
 
 ONLY_THEN = 2
-"""``auto_vacuum = INCREMENTAL``."""
+"""Value of ``PRAGMA auto_vacuum`` for incremental vacuum."""
 
 
 class Writer:
-    """Writing connection to an upgraded file; used by one thread at a time, under `lock`.
+    """Writing connection to a migrated file; used by one thread at a time, under `lock`.
 
-    A failed sync is not repeated: the system may have dropped the data and report success. The
-    connection is closed, and before the next transaction the file is opened again and compared with
-    the high-water mark beside it.
+    A failed sync is not repeated: the operating system may have dropped the data and report
+    success. The file is opened again before the next transaction and compared with the high-water
+    mark beside it.
 
     Parameters
     ----------
     connection
         Open connection.
     marks
-        High-water mark.
+        High-water mark of the database.
     prepare
-        Prepares a connection for writing, within a transaction.
+        Function that prepares a connection for writing, within a transaction.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class Writer:
 
     @contextmanager
     def transaction(self) -> Iterator[sqlite3.Connection]:
-        """Open a transaction; durable when left."""
+        """Open a writing transaction; it is durable when its block ends without an error."""
         if self._is_in_doubt:
             self._reopen()
         try:
@@ -163,9 +163,9 @@ class Writer:
             raise
 
     def give_back(self) -> bool:
-        """Cut some free pages off the end of the file; return whether there are more.
+        """Truncate the file by some free pages; return False if none were released.
 
-        A file created by an older padwatch keeps its free pages for reuse.
+        A file created without incremental vacuum keeps its free pages for reuse.
         """
         if self._number("auto_vacuum") != ONLY_THEN:
             return False
@@ -190,14 +190,14 @@ class Writer:
 
 
 def opened(path: Path) -> sqlite3.Connection:
-    """Return a connection that may write and can be used by any thread."""
+    """Return a new writing connection that can be used by any thread."""
     return sqlite3.connect(
         path, timeout=BUSY_TIMEOUT_S, isolation_level=None, check_same_thread=False
     )
 
 
 def set_up(connection: sqlite3.Connection) -> None:
-    """Make every transaction durable."""
+    """Configure a connection so that every transaction is durable."""
     for setting in (
         *("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"),
         f"journal_size_limit = {MAX_LOG_BYTES}",
@@ -212,6 +212,6 @@ def _begun(connection: sqlite3.Connection) -> Iterator[None]:
         yield
         connection.execute("COMMIT")
     finally:
-        # a full disk rolls back by itself; a refused commit leaves the transaction open
+        # SQLite rolls back after a full disk, but not after a failed commit
         if connection.in_transaction:
             connection.execute("ROLLBACK")

@@ -1,4 +1,4 @@
-"""SQLite database: WAL, synchronous=FULL, one writer, short reads."""
+"""SQLite database in WAL mode with synchronous=FULL, one writer and short read transactions."""
 
 import sqlite3
 from collections.abc import Iterator
@@ -25,37 +25,38 @@ from service.store.sqlite.file import (
 from service.store.sqlite.migrating import migrate
 
 PAGE_BYTES = 8192
-"""A result with all quantities would fill a page of half that size."""
+"""Page size; a result row with all quantities would fill a page of 4096 bytes."""
 
 EVER_HAD = "SELECT 1 FROM sqlite_sequence WHERE name = ?"
 HAS_TRAIL = "SELECT 1 FROM sqlite_master WHERE name = 'audit'"
 
 
 class SqliteDatabase:
-    """One database file; used from several threads, with one writing transaction at a time.
+    """SQLite database of the store; used by several threads, one writing transaction at a time.
 
     Parameters
     ----------
     path
-        Path of the file; created, with its folder, if missing.
+        Path of the file; the file and its folder are created if missing.
     origin
-        Origin of its data; a file with data of the other origin is refused.
+        Origin of the stored data; a file with data of another origin is rejected.
 
     Attributes
     ----------
     had_trail
-        Whether it had an audit trail before it was opened.
+        Whether the file had an audit trail before it was opened.
     damage
-        Damaged rows found since the start.
+        Log of the damaged rows found since the start.
     marks
-        High-water mark.
+        High-water mark of the database.
     file
         Identity of the opened file.
 
     Raises
     ------
     StoreError
-        If the file cannot be opened, is not padwatch's, is damaged, or is newer than this program.
+        If the file cannot be opened, is damaged, belongs to another program, or has a newer schema
+        than this program.
     """
 
     kind = "sqlite"
@@ -82,14 +83,14 @@ class SqliteDatabase:
 
     def close(self) -> None:
         """Close all connections; closing twice has no effect."""
-        self._readers.close()  # first: the last connection to close moves the log into the file
+        self._readers.close()  # first: the last connection that closes moves the WAL into the file
         with self.writer.lock:
             self.writer.close()
         self.file.keep_logs_apart()
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """Open a transaction; committed, durable and counted when left."""
+        """Open a writing transaction; at the end of its block it is counted and durable."""
         with self.writer.lock, self._store_errors():
             self.file.require()
             with self.writer.transaction() as writer:
@@ -99,7 +100,7 @@ class SqliteDatabase:
 
     @contextmanager
     def reading(self, unreadable: Unreadable = "strict") -> Iterator[sqlite3.Connection]:
-        """Open a read-only transaction, which sees one state of the file."""
+        """Open a read-only transaction on one consistent state of the file."""
         with self._store_errors(), self._readers.reading() as reader:
             if unreadable == "strict":
                 yield reader
@@ -109,20 +110,20 @@ class SqliteDatabase:
             reader.text_factory = str
 
     def give_back(self) -> bool:
-        """Return some free space to the disk; return whether there is more."""
+        """Release free pages of the file to the file system; return False if none were released."""
         with self.writer.lock, self._store_errors():
             return self.writer.give_back()
 
     def ever_had(self, connection: Connection, table: str) -> bool:
-        """Return whether a table that numbers its rows ever had one."""
+        """Return whether a table with numbered rows ever had a row, including deleted rows."""
         return connection.execute(EVER_HAD, (table,)).fetchone() is not None
 
     def hold(self, name: str) -> FileHold:
-        """Hold a name by the lock of a file beside the database."""
+        """Return an exclusive lock for a name, a lock file beside the database."""
         return held(self._path, name)
 
     def _prepare(self, connection: sqlite3.Connection, origin: Origin) -> bool:
-        """Upgrade the file; return whether it had an audit trail before."""
+        """Migrate the file and open its writer; return whether it had an audit trail before."""
         in_file = self.marks.in_file()
         for setting in (f"page_size = {PAGE_BYTES}", "auto_vacuum = INCREMENTAL"):
             connection.execute(f"PRAGMA {setting}")  # effective only in a new file
@@ -141,7 +142,7 @@ class SqliteDatabase:
         except (OSError, sqlite3.Error, OverflowError, UnicodeEncodeError) as error:
             kind = RefusedRowError if is_of_the_row(error) else StoreError
             raise kind(error_message(self._path, error)) from error
-        except UnicodeDecodeError as error:  # in an error message about damage
+        except UnicodeDecodeError as error:  # in an error message of SQLite
             raise StoreError(
                 f"{self._path}: the file is damaged: names in it are not text"
             ) from error

@@ -1,4 +1,4 @@
-"""File of a SQLite database: its identity, its errors, and locks beside it."""
+"""File of a SQLite database: identity, truncation, error classification, and lock files."""
 
 import os
 import re
@@ -13,7 +13,7 @@ from service.store.port import StoreError
 LOGS = ("-wal", "-shm")
 
 Identity = tuple[int, int]
-"""Device and inode."""
+"""Device and inode number of a file."""
 
 
 class OpenedFile:
@@ -30,11 +30,11 @@ class OpenedFile:
         self._opened: Identity | None = None
 
     def remember(self) -> None:
-        """Record the file that the path names now as the opened one."""
+        """Record the identity of the file that is at the path now."""
         self._opened = _identity(self._path)
 
     def require(self) -> None:
-        """Check that the path still names the opened file; no check before `remember`.
+        """Check that the opened file is still at the path; no check before `remember`.
 
         Raises
         ------
@@ -56,9 +56,9 @@ class OpenedFile:
             )
 
     def keep_logs_apart(self) -> None:
-        """Rename logs that do not belong to the file that the path names now; call after closing.
+        """Rename WAL files of a database file that was replaced; call after closing.
 
-        SQLite would apply them to that file at the next start and damage it.
+        SQLite would apply them to the new file at the next start and damage it.
         """
         if self._opened is None or self._opened == _identity(self._path):
             return
@@ -80,13 +80,13 @@ _MAGIC = b"SQLite format 3\0"
 _HEADER_BYTES = 100
 _PAGE_BYTES_AT = slice(16, 18)
 _LARGEST_PAGE = 65_536
-"""Stored as 1."""
+"""Maximum page size in bytes, which the file header stores as 1."""
 
 
 def truncation_of(path: Path) -> str | None:
-    """Return why a database file is incomplete; None if its length is plausible.
+    """Return a message if a database file is truncated; None if its length is plausible.
 
-    With a log beside it the file may end anywhere, since the log holds the page being written.
+    The length is not checked if a WAL file exists, since the last page may be in the WAL only.
     """
     log = path.with_name(path.name + "-wal")
     if not path.is_file() or (log.exists() and log.stat().st_size):
@@ -95,7 +95,7 @@ def truncation_of(path: Path) -> str | None:
         header = file.read(_HEADER_BYTES)
     size = path.stat().st_size
     if len(header) < _HEADER_BYTES or not header.startswith(_MAGIC):
-        return None  # new, or not of SQLite, which then raises an error
+        return None  # a new file, or another format, for which SQLite raises an error
     written = int.from_bytes(header[_PAGE_BYTES_AT], "big")
     page_bytes = _LARGEST_PAGE if written == 1 else written
     if page_bytes == 0 or size % page_bytes == 0:
@@ -104,33 +104,33 @@ def truncation_of(path: Path) -> str | None:
 
 
 IOERR = 10
-"""Primary code of errors of reading, writing and syncing (``SQLITE_IOERR``)."""
+"""Primary result code of read, write and sync errors (``SQLITE_IOERR``)."""
 
 UNREADABLE = frozenset({IOERR, 11, 26})
-"""These, and codes of invalid pages (``SQLITE_CORRUPT``, ``SQLITE_NOTADB``)."""
+"""Result codes of unreadable data: `IOERR`, ``SQLITE_CORRUPT`` and ``SQLITE_NOTADB``."""
 
 OF_THE_ROW = frozenset({11, 18, 19, 20})
-"""Primary codes of errors caused by a row or its page (``SQLITE_CORRUPT``, ``SQLITE_TOOBIG``,
-``SQLITE_CONSTRAINT``, ``SQLITE_MISMATCH``)."""
+"""Primary result codes of errors caused by one row or its page (``SQLITE_CORRUPT``,
+``SQLITE_TOOBIG``, ``SQLITE_CONSTRAINT``, ``SQLITE_MISMATCH``)."""
 
 BY_TRIGGER = 1811
-"""Extended code of a refusal by a trigger, which no insertion of padwatch causes."""
+"""Extended result code of an error raised by a trigger, which no insertion of padwatch causes."""
 
 PAGE_ROOM = 65_536
-"""Distance from the size limit at which a file cannot grow by a transaction."""
+"""Distance from the limit of file sizes, bytes, at which a transaction may no longer fit."""
 
 
 def leaves_in_doubt(error: BaseException) -> bool:
-    """Return whether it is unknown how much of the last transaction is on the disk.
+    """Return whether the state of the last transaction on the disk is unknown after an error.
 
-    A full disk does not: SQLite has then rolled the transaction back.
+    It is known after a full disk, since SQLite has rolled the transaction back.
     """
     code = getattr(error, "sqlite_errorcode", None)
     return code is not None and code & 0xFF == IOERR
 
 
 def is_of_the_row(error: BaseException) -> bool:
-    """Return whether one row caused the error, so that others can be written without it."""
+    """Return whether one row caused the error, so that other rows can be written without it."""
     code = getattr(error, "sqlite_errorcode", None)
     if code is None:  # raised by Python: an integer above 64 bits, or invalid text
         return isinstance(error, OverflowError | UnicodeEncodeError)
@@ -138,7 +138,7 @@ def is_of_the_row(error: BaseException) -> bool:
 
 
 def is_of_the_data(error: BaseException | None) -> bool:
-    """Return whether stored data are unreadable, so that reading them again does not help."""
+    """Return whether the error is permanent because stored data are unreadable."""
     code = getattr(error, "sqlite_errorcode", None)
     if code is None:  # raised by Python: invalid text
         return isinstance(error, UnicodeError | sqlite3.OperationalError)
@@ -146,7 +146,7 @@ def is_of_the_data(error: BaseException | None) -> bool:
 
 
 def error_message(path: Path, error: BaseException) -> str:
-    """Return a message with advice."""
+    """Return the error message; add advice if the limit of file sizes is reached."""
     if not leaves_in_doubt(error):
         return f"{path}: {error}"
     limit = _limit_reached(path)
@@ -168,14 +168,14 @@ def _limit_reached(path: Path) -> int | None:
 
 
 class FileHold:
-    """Name held by the lock of a file; it ends with the process.
+    """Exclusive lock on a name, implemented by a lock file; the lock ends with the process.
 
     Parameters
     ----------
     path
-        Lock file, which stays and has no meaning of its own.
+        Path of the lock file, which stays after the lock is released.
     name
-        Name for the message.
+        Name of the lock, for error messages.
     """
 
     def __init__(self, path: Path, name: str) -> None:
@@ -184,7 +184,7 @@ class FileHold:
 
     @property
     def is_held(self) -> bool:
-        """Whether the name is held; the lock of a file cannot be lost."""
+        """Whether the lock is held; a file lock cannot be lost."""
         return self._descriptor is not None
 
     def __enter__(self) -> "FileHold":
@@ -212,6 +212,6 @@ class FileHold:
 
 
 def held(database: Path, name: str) -> FileHold:
-    """Return the hold of a name beside a database file."""
+    """Return an exclusive lock for a name, a lock file beside the database."""
     safe = re.sub(r"[^A-Za-z0-9_-]", lambda found: f"%{ord(found[0]):x}", name)
     return FileHold(database.with_name(f"{database.name}.{safe}.lock"), name)

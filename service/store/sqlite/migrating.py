@@ -7,18 +7,18 @@ from service.store import schema
 from service.store.port import StoreError
 
 APPLICATION_IDS = {Origin.LIVE: 0x5057_4454, Origin.REPLAY: 0x5057_5250}
-"""Mark of padwatch's files by origin (``PRAGMA application_id``)."""
+"""``PRAGMA application_id`` of padwatch databases by origin of the data."""
 
 
 def migrate(connection: sqlite3.Connection, name: str, origin: Origin = Origin.LIVE) -> None:
-    """Migrate a database to the current schema, one transaction per step.
+    """Migrate a database to the current schema, one transaction per migration.
 
     Raises
     ------
     StoreError
-        If the file belongs to another program, to a newer padwatch, or to the other origin.
+        If the file belongs to another program or a newer padwatch, or has another origin.
     """
-    connection.execute("BEGIN")  # one state of all three: another process may be upgrading
+    connection.execute("BEGIN")  # consistent values: another process may be migrating
     n_tables = int(connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0])
     version = int(connection.execute("PRAGMA user_version").fetchone()[0])
     application = int(connection.execute("PRAGMA application_id").fetchone()[0])
@@ -45,7 +45,7 @@ def _require_origin(application: int, name: str, origin: Origin) -> None:
 
 
 def _step(connection: sqlite3.Connection, number: int, application_id: int) -> None:
-    """Apply one migration, unless another process has done so meanwhile."""
+    """Apply one migration unless another process has applied it in the meantime."""
     try:
         connection.executescript(
             f"BEGIN IMMEDIATE; PRAGMA application_id = {application_id};"

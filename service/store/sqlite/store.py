@@ -1,4 +1,4 @@
-"""Store in a SQLite file."""
+"""Store in a SQLite database file."""
 
 import sqlite3
 from collections.abc import Iterator
@@ -22,23 +22,24 @@ from service.store.store import Store
 
 
 class SqliteStore(Store):
-    """Store in one database file; used from several threads, with one writer at a time.
+    """Store in a SQLite database file; used by several threads, one writer at a time.
 
     Parameters
     ----------
     path
-        Path of the file; created, with its folder, if missing.
+        Path of the file; the file and its folder are created if missing.
     origin
-        Origin of its data; a file with data of the other origin is refused.
+        Origin of the stored data; a file with data of another origin is rejected.
     address
-        Function that returns the messages about an event of an alarm.
+        Function that returns the outbox messages about an alarm event.
     spectra
         Limits of stored spectra.
 
     Raises
     ------
     StoreError
-        If the file cannot be opened, is not padwatch's, is damaged, or is newer than this program.
+        If the file cannot be opened, is damaged, belongs to another program, or has a newer schema
+        than this program.
     """
 
     def __init__(
@@ -73,7 +74,7 @@ class SqliteStore(Store):
 
     @property
     def _writer(self) -> sqlite3.Connection:
-        """Current writing connection; replaced after an error of the disk."""
+        """Current writing connection; replaced after a disk error."""
         return self._file.writer.connection
 
     @property
@@ -83,7 +84,7 @@ class SqliteStore(Store):
 
 
 def file_trail(database: Path) -> Trail:
-    """Return the audit trail of a database file; it is opened, but not changed, when it is read."""
+    """Return the audit trail of a database file; each read opens the file read-only."""
     return Trail(partial(_opened, database), head_path(database))
 
 
@@ -101,5 +102,5 @@ def _opened(database: Path) -> Iterator[sqlite3.Connection]:
 
 
 def _exact(text: bytes) -> str:
-    """Decode text so that every byte stays distinguishable, also where it is not UTF-8."""
+    """Decode text without loss, also if it is not valid UTF-8."""
     return text.decode("utf-8", "surrogateescape")
