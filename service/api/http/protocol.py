@@ -50,7 +50,7 @@ class Connections:
         return self._n_open
 
     def admit(self, connection: "GuardedProtocol") -> bool:
-        """Add a connection; return False if there are too many and none is idle and can be closed."""
+        """Add a connection; return False if a limit is reached and no connection is idle."""
         neighbours = self._of_peer[connection.peer]
         if len(neighbours) >= self.limits.max_connections_per_peer:
             has_room = _make_room(neighbours)
@@ -273,7 +273,7 @@ class GuardedProtocol(HttpToolsProtocol):
         self._enter(Phase.NOTHING)
 
     def on_response_complete(self) -> None:
-        """Restart the keep-alive time after an answer; the client may not have read all of it yet."""
+        """Restart the keep-alive time after an answer, which the client may not have read yet."""
         super().on_response_complete()
         self._unsent_since_s = None
         if self._phase is Phase.NOTHING:
