@@ -35,7 +35,7 @@ def tag_of(*digests: bytes) -> str:
 
 
 def is_known(tag: str, if_none_match: str | None) -> bool:
-    """Whether a client has cached the answer with an entity tag.
+    """Whether a client has cached the answer with the entity tag `tag`.
 
     Parameters
     ----------
@@ -70,12 +70,12 @@ async def rendered(make: Callable[[], BaseModel]) -> Response:
 
 
 async def rendered_now(make: Callable[[], DatedAnswer]) -> Response:
-    """Return the current state like `rendered`; the entity tag ignores the time of the answer.
+    """Build a model of the current state like `rendered`; its tag ignores the time of the answer.
 
     Parameters
     ----------
     make
-        Function that builds the model; may block. The time of the answer must be its first time.
+        Function that builds the model; may block. Its field `time` must precede nested times.
     """
     return await asyncio.to_thread(lambda: _dated(make()))
 
@@ -152,7 +152,7 @@ class SharedAnswer:
 
 
 def _shared_context() -> Context:
-    """Return a context without the first client, whose disconnection must not cancel the reads."""
+    """Return a context without the client, whose disconnection must not cancel shared reads."""
     context = copy_context()
     context.run(ASKER.set, None)
     return context

@@ -11,7 +11,7 @@ from service.store.access.audit_entries import AuditEntry
 HEADER = ("time", *(field.name for field in fields(AuditEntry)))
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "|", "%", "'", "＝", "＋", "－", "＠")
-"""Prefixes that spreadsheets interpret, and the quote, so that the escaping is reversible."""
+"""Prefixes of spreadsheet formulas, and the quote, so that the escaping is reversible."""
 
 
 def write_csv(file: TextIO, entries: Iterable[AuditEntry]) -> int:

@@ -58,7 +58,7 @@ class LiveState(Protocol):
         """Return the state of the source of a unit."""
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Return the newest blocks of a unit; raise `NotAvailableError` if there are none."""
+        """Return the newest blocks of a unit; raise `NotAvailableError` without blocks."""
 
     def newest_block(self, unit: str) -> SampleBlock | None:
         """Return the newest block of a unit; None without a block."""
@@ -91,7 +91,7 @@ class FilmState(Protocol):
         """Return the film rules of a unit; None if its films are not watched."""
 
     def place(self, unit: str, bearing: str) -> FilmPlace | None:
-        """Return a film with its stiffness estimator; None if the film is not watched."""
+        """Return unit, bearing and estimator of a film; None if the film is not watched."""
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
         """Return the newest reading of a film with its findings; None without a reading."""

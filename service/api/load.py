@@ -1,4 +1,4 @@
-"""Load shedding: overload refuses requests, so that samples and alarms have priority."""
+"""Load shedding: requests are refused under overload; samples and alarms have priority."""
 
 import re
 from collections import Counter, deque
@@ -23,7 +23,7 @@ RELIEF_S = 5.0
 
 
 class Refused(IntEnum):
-    """Level of refusal; each level refuses further kinds of requests."""
+    """Level of refusal; a higher level refuses additional kinds of requests."""
 
     NOTHING = 0
     HISTORY = 1

@@ -157,7 +157,7 @@ class Examples:
         return self._of_type(schema, model, field)
 
     def _one_of(self, choices: list[Mapping[str, Any]], model: str, field: str) -> Any:
-        """Return an example of the first type except null; None for text without an example."""
+        """Return an example of the first non-null type; None for text without an example."""
         may_be_null = any(choice.get("type") == "null" for choice in choices)
         some = [choice for choice in choices if choice.get("type") != "null"]
         is_word = some[0].get("type") == "string" and not some[0].get("examples")

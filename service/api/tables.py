@@ -149,7 +149,7 @@ def csv_pieces(columns: Sequence[Column]) -> Iterator[bytes]:
 
 
 def parquet_file(columns: Sequence[Column]) -> bytes:
-    """Return a table as a Parquet file; the metadata of each column contain its unit."""
+    """Return a table as a Parquet file; the metadata of each column contains its unit."""
     fields = [
         pa.field(each.name, ARROW_TYPES[each.kind], metadata={"unit": each.unit or ""})
         for each in columns

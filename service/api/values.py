@@ -30,7 +30,7 @@ from service.runtime.times import rfc3339
 
 
 class ApiModel(BaseModel):
-    """Base class of answers, without NaN or infinity; its field docstrings are published.
+    """Base class of answers, without NaN or infinity; OpenAPI shows the docstrings of its fields.
 
     A model can be built from the attributes of an object: a field is read from the attribute with
     its name, or for times from the attribute with its name and the suffix ``_ns``.
@@ -76,7 +76,7 @@ class RequestModel(ApiModel):
     @model_validator(mode="before")
     @classmethod
     def _reject_many_members(cls, body: Any) -> Any:
-        """Reject too many members with a single error; an error for each would take 10 µs each."""
+        """Reject too many members with one error; one error per member would take 10 µs each."""
         if isinstance(body, dict) and len(body) > len(cls.model_fields) + MAX_UNKNOWN:
             known = ", ".join(cls.model_fields)
             raise ValueError(f"{len(body)} members are too many; known: {known}")
@@ -314,7 +314,7 @@ LEVEL_NAMES: dict[Level, LevelName] = {
 
 
 def level_names(levels: Iterable[Level | None]) -> list[LevelName | None]:
-    """Return the names of quality levels, with None for each None."""
+    """Return the names of quality levels; None remains None."""
     return [None if level is None else LEVEL_NAMES[level] for level in levels]
 
 
@@ -359,7 +359,7 @@ STATE_NAMES = {state: cast("OperatingStateName", state.name.lower()) for state i
 
 
 def states_named(names: list[OperatingStateName] | None) -> tuple[OperatingState, ...]:
-    """Return the operating states with the given names; an empty tuple selects all states."""
+    """Return the operating states with the given names; without names, an empty tuple for all."""
     return tuple(OperatingState[name.upper()] for name in names or ())
 
 

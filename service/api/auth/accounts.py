@@ -191,7 +191,7 @@ def account_router(authenticator: Authenticator) -> APIRouter:
 
     @router.get("", summary="Accounts", responses=problem_responses(503))
     async def accounts() -> list[AccountModel]:
-        """List all accounts by name."""
+        """List all accounts, sorted by name."""
         return [account_model(account) for account in await work.run(stored.all)]
 
     @router.post("", summary="Add an account", status_code=201, responses=CHANGE_PROBLEMS)
@@ -214,7 +214,10 @@ def account_router(authenticator: Authenticator) -> APIRouter:
     async def set_password(
         request: Request, name: AccountName, asked: SetPasswordModel
     ) -> AccountModel:
-        """Set the password of another account and end its sessions; its owner must change it."""
+        """Set the password of another account and end its sessions.
+
+        The person must change this password at the next login.
+        """
         if _is_own(request, name):
             detail = "change your own password with POST /session/password"
             raise ProblemError(409, "Does not fit", detail)

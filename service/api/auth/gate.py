@@ -79,12 +79,12 @@ CALLER = "caller"
 
 
 class Gate:
-    """ASGI middleware that authenticates callers; others can only use open routes.
+    """ASGI middleware that authenticates callers; unauthenticated callers reach only open routes.
 
     Parameters
     ----------
     declared
-        Returns the operations of the application with their requirements.
+        Function that returns the operations of the application with their requirements.
     """
 
     def __init__(

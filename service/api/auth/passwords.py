@@ -47,7 +47,7 @@ def new_password(written: str, name: str) -> str:
     Raises
     ------
     PasswordRefusedError
-        If the password is too short, too long, too uniform, or contains the account name.
+        If it is too short or too long, has too few different characters, or contains the name.
     """
     password = _normal(written)
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
@@ -84,7 +84,7 @@ class Hashing:
             return self._hasher.hash(_bytes(password))
 
     def verify(self, stored: str | None, password: str) -> bool:
-        """Whether a password matches a stored hash; if the hash is None, False after equal time.
+        """Whether a password matches a stored hash; False after the same time if the hash is None.
 
         A password above the maximum length is truncated before hashing and does not match.
         """

@@ -37,7 +37,7 @@ class Refusals:
         self.n_more = 0
 
     async def note(self, deed: AuditAction, status: int) -> None:
-        """Write a refusal and the number of unwritten ones before it; above the limit, count it."""
+        """Write a refusal to the audit trail; above the rate limit, count it for the next entry."""
         if not self._allowance.take(self._clock.monotonic_s()):
             self.n_more += 1
             return

@@ -44,7 +44,7 @@ class HeadRequests:
 
 
 HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::[0-9]{1,5})?")
-"""Host header: name, IPv4 address or bracketed IPv6 address, with an optional port."""
+"""Pattern of a Host header: name, IPv4 address or bracketed IPv6 address, and optional port."""
 
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
@@ -121,7 +121,7 @@ FOR, PROTO = b"x-forwarded-for", b"x-forwarded-proto"
 
 
 class TrustedProxy:
-    """ASGI middleware that takes client address and scheme from the headers of a trusted proxy."""
+    """ASGI middleware for a Unix socket: client address and scheme as sent by a trusted proxy."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app

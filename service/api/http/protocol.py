@@ -102,7 +102,10 @@ class Connections:
 
 
 def _make_room(connections: set["GuardedProtocol"]) -> bool:
-    """Close the longest idle connection, first without a request; return whether any was idle."""
+    """Close the longest idle connection; return whether any connection was idle.
+
+    Connections that never sent a request are closed first.
+    """
     waiting = [(since, each) for each in connections if (since := each.waiting_since())]
     if not waiting:
         return False
@@ -303,7 +306,7 @@ class GuardedProtocol(HttpToolsProtocol):
             self._unsent_since_s += seconds
 
     def waiting_since(self) -> tuple[bool, float] | None:
-        """Return whether a request was received, and the start of the wait; None if busy."""
+        """Return whether a request was ever received, and the start of the wait; None if busy."""
         is_answered = self._phase is Phase.NOTHING and self._is_answering()
         if is_answered or self.transport.is_closing():
             return None

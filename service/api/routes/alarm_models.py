@@ -119,7 +119,7 @@ class AlarmModel(ApiModel):
     """State in the life cycle of ISA-18.2."""
 
     level: Annotated[AlarmLevelName, ByName] | None
-    """Priority; null if the alarm is not active."""
+    """Level of the alarm, which is its priority; null if the alarm is not active."""
 
     is_active: bool
     """Whether the alarm is active, also while it is hidden."""
@@ -220,7 +220,7 @@ class AlarmEventModel(ApiModel):
     """Identifier of the unit."""
 
     subject: str
-    """Channel or bearing."""
+    """Subject of the alarm, such as a channel or bearing."""
 
     kind: AlarmKindName
     """Kind of alarm."""
@@ -229,7 +229,7 @@ class AlarmEventModel(ApiModel):
     """Number of the event in the history of the alarm, from 1 without gaps."""
 
     change: AlarmChangeName
-    """Kind of change."""
+    """Kind of change of the alarm by the event."""
 
     level: Annotated[AlarmLevelName, ByName] | None
     """Level after the event; for a return to normal, the level before it."""

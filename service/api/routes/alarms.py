@@ -61,7 +61,7 @@ class AcknowledgeModel(ActorModel):
     """Occurrence to acknowledge; a later occurrence is not acknowledged."""
 
     comment: NoteText = ""
-    """Note, at most 500 printable characters."""
+    """Comment, at most 500 printable characters."""
 
 
 class CommentModel(ActorModel):

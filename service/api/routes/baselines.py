@@ -185,7 +185,7 @@ def baseline_router(context: Context) -> APIRouter:
         responses=READING_PROBLEMS,
     )
     async def one_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
-        """Return the cells by column: bounds, stiffness, scatter, and basis of judgement."""
+        """Return the cells by column: bounds, stiffness, scatter, and support for judgements."""
         context.bearing(unit, bearing)
         return await rendered(lambda: _baseline(context, unit, bearing, version))
 
@@ -222,7 +222,7 @@ def baseline_action_router(context: Context) -> APIRouter:
     async def reject(
         unit: UnitId, bearing: BearingId, version: Version, asked: BaselineActionModel
     ) -> BaselinesModel:
-        """Reject this version; if it is in force, no version is until another one is accepted."""
+        """Reject this version; if in force, no baseline is in force until another is accepted."""
         await asyncio.to_thread(_require_version, context, unit, bearing, version)
         return await _done(context, unit, bearing, Reject(version), asked)
 
@@ -230,12 +230,12 @@ def baseline_action_router(context: Context) -> APIRouter:
     async def freeze(
         unit: UnitId, bearing: BearingId, asked: BaselineActionModel
     ) -> BaselinesModel:
-        """Stop learning until it is thawed; the version in force stays in force."""
+        """Freeze learning until it is thawed; the version in force does not change."""
         return await _done(context, unit, bearing, Freeze(), asked)
 
     @router.post("/thaw", summary="Learn again", responses=ACTION_PROBLEMS)
     async def thaw(unit: UnitId, bearing: BearingId, asked: BaselineActionModel) -> BaselinesModel:
-        """Continue learning after a freeze, within the learning period."""
+        """Thaw learning after a freeze; it continues within the learning period."""
         return await _done(context, unit, bearing, Thaw(), asked)
 
     @router.post("/renew", summary="Begin again", responses=ACTION_PROBLEMS)

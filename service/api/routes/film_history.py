@@ -58,7 +58,7 @@ class FilmSeriesModel(ApiModel):
     """Bearing motion at 1×, zero to peak."""
 
     evidence: list[EvidenceName]
-    """""measured", or the reason why the stiffness is unknown."""
+    """"measured", or the reason why the stiffness is unknown."""
 
     verdict: list[VerdictName]
     """Verdict on the film when the reading was made."""

@@ -84,7 +84,7 @@ class MotionModel(SampleRange, BearingAnswer):
     """Time of the first sample."""
 
     offset_s: float | None
-    """Start of the samples from the start of the recording, s; null for the newest samples."""
+    """Offset of the first sample from the recording's start, s; null for the newest samples."""
 
     total_s: float | None
     """Duration of the recording including gaps, s; null for the newest samples."""

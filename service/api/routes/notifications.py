@@ -69,7 +69,7 @@ class ReceiverModel(ApiModel):
     """Number of waiting messages."""
 
     waiting_since: Time | None
-    """Queueing time of the oldest waiting message; null if no message waits."""
+    """Time since which the oldest message waits; null without waiting messages."""
 
     n_dead: int
     """Number of messages that will never be delivered: rejected or too old."""

@@ -32,13 +32,13 @@ class DeviceClockModel(ApiModel):
     during the first minute, and for a device that samples on request."""
 
     drift_uncertainty_ppm: float | None
-    """Standard uncertainty of the drift."""
+    """Standard uncertainty of the drift, ppm."""
 
     n_stamp_faults: int
     """Number of blocks whose time stamp was discarded because it contradicts the sample index."""
 
     stamp_fault: Literal["stamp_regressed", "stamp_repeated", "stamp_jumped"] | None
-    """Fault of the newest time stamp."""
+    """Fault of the newest time stamp; null without a fault."""
 
 
 class SourceModel(ApiModel):
@@ -146,7 +146,7 @@ def source_model(live: LiveState, unit: str) -> SourceModel:
 
 
 class GapModel(ApiModel):
-    """Gap in the samples, which were not delivered, or sent while the service was stopped."""
+    """Gap: samples that were not delivered, or not received while the service was stopped."""
 
     epoch: int
     """Epoch of the sample index."""

@@ -230,7 +230,7 @@ def spectra_router(context: Context) -> APIRouter:
     ) -> Response:
         """List stored averaged amplitude spectra, all channels as displacement.
 
-        Each spectrum applies to its own time only; times in between are not averaged into it.
+        Each spectrum applies to its own time; it is no mean or maximum up to the next spectrum.
         """
         context.bearing(unit, bearing)
         places = list(dict.fromkeys(channel or PLACES))

@@ -317,7 +317,7 @@ def _read(
 
 
 def _page_start_ns(cursor: str | None, group_by: GroupName | None, start_ns: int) -> int:
-    """Return the start of the page selected by a cursor; raise a problem with `group_by`."""
+    """Return the start of the page of a cursor; raise a problem if `group_by` is also given."""
     if cursor is not None and group_by is not None:
         detail = "pages cannot be grouped: omit cursor or group_by"
         raise ProblemError(422, "Wrong parameter", detail, "cursor")
