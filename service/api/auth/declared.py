@@ -21,7 +21,7 @@ class Reach(StrEnum):
     """All units; a key that is limited to some units is refused."""
 
     NO_UNIT = "no_unit"
-    """No unit; a key that is limited to some units is accepted."""
+    """No unit; a key that is limited to some units can only read."""
 
     ASKED = "asked"
     """Unit of the query parameter ``unit``; all units if the parameter is absent."""

@@ -259,7 +259,7 @@ class BoundedAnswers:
         try:
             is_answered = await self._answered(scope, receive, send)
         finally:
-            asker.has_gone = True  # a thread may still work on the request
+            asker.has_gone = True  # cancels store reads that still run in a thread
             ASKER.reset(before)
         if not is_answered:
             await NO_ANSWER.send(scope, send)
