@@ -1,5 +1,5 @@
-"""The HTTP API: a file of `routes` for each subject, access in `auth`, the server in `http`.
+"""HTTP API: one module of `routes` for each subject, access control in `auth`, server in `http`.
 
-It reads live state, the store and recordings. Pages belong to `service.dashboard`, evidence of
-alarms to `service.reports`.
+The API reads live state, the store and recordings. The web pages are in `service.dashboard`, the
+evidence reports of alarms in `service.reports`.
 """

@@ -1,4 +1,4 @@
-"""JSON answers rendered in threads, their entity tags, caches and headers."""
+"""JSON answers: rendering in threads, entity tags (ETag), caches and headers."""
 
 import asyncio
 import re
@@ -35,12 +35,12 @@ def tag_of(*digests: bytes) -> str:
 
 
 def is_known(tag: str, if_none_match: str | None) -> bool:
-    """Whether a client already has the answer of a tag.
+    """Whether a client has cached the answer with the entity tag `tag`.
 
     Parameters
     ----------
     if_none_match
-        Header If-None-Match: tags separated by commas, or a star.
+        Header If-None-Match: comma-separated entity tags, or ``*``.
     """
     if if_none_match is None:
         return False
@@ -54,39 +54,39 @@ JSON = "application/json"
 
 
 async def in_thread(do: Callable[[], T]) -> T:
-    """Call a function in a thread."""
+    """Call a function in a thread; return its result."""
     return await asyncio.to_thread(do)
 
 
 async def rendered(make: Callable[[], BaseModel]) -> Response:
-    """Build a model, its JSON and its entity tag in a thread.
+    """Build a model in a thread; return it as a JSON response with an entity tag.
 
     Parameters
     ----------
     make
-        Builds the model; may block.
+        Function that builds the model; may block.
     """
     return await asyncio.to_thread(lambda: _response(*_content(make())))
 
 
 async def rendered_now(make: Callable[[], DatedAnswer]) -> Response:
-    """Like `rendered` for the present state; the tag ignores the time of the answer.
+    """Build a model of the current state like `rendered`; its tag ignores the time of the answer.
 
     Parameters
     ----------
     make
-        Builds the model; may block. Its time must be the first time in it.
+        Function that builds the model; may block. Its field `time` must precede nested times.
     """
     return await asyncio.to_thread(lambda: _dated(make()))
 
 
 class Renderings:
-    """Cache of large answers that seldom change.
+    """LRU cache of large answers that seldom change.
 
     Parameters
     ----------
     n_kept
-        Maximum number of answers; the least recently used is dropped first.
+        Maximum number of cached answers; the least recently used answer is evicted first.
     """
 
     def __init__(self, n_kept: int = 16) -> None:
@@ -94,7 +94,7 @@ class Renderings:
         self._kept: dict[Hashable, tuple[object, bytes, str]] = {}
 
     async def of(self, key: Hashable, source: T, make: Callable[[T], BaseModel]) -> Response:
-        """Return the answer for a key; it is rendered again if its source is another object."""
+        """Return the answer for a key; render it again if `source` is not the cached object."""
         kept = self._kept.pop(key, None)
         if kept is None or kept[0] is not source:
             kept = (source, *await in_thread(lambda: _content(make(source))))
@@ -120,18 +120,18 @@ def _dated(model: DatedAnswer) -> Response:
 
 
 FRESH_S = 1.0
-"""Maximum age of an answer whose revision is unchanged: some states change with time alone."""
+"""Maximum age of an answer with unchanged revision, s: some states change with time alone."""
 
 
 class SharedAnswer:
-    """The newest answer of one route, shared by concurrent requests.
+    """Newest answer of one route, shared by concurrent requests.
 
     Parameters
     ----------
     make
-        Builds the model in a thread; may block.
+        Function that builds the model in a thread; may block.
     revision
-        Changes with everything that must be shown at once.
+        Function whose result changes with every state that must be shown immediately.
     """
 
     def __init__(
@@ -141,28 +141,28 @@ class SharedAnswer:
         self._made: tuple[int, float, asyncio.Task[Response]] | None = None
 
     async def answer(self) -> Response:
-        """Return the answer for one client."""
+        """Return a copy of the shared answer, which is rendered first if it is outdated."""
         revision, now_s = self._revision(), self._clock.monotonic_s()
         if self._made is None or self._made[0] != revision or now_s - self._made[1] >= FRESH_S:
             making = asyncio.create_task(rendered_now(self._make), context=_shared_context())
             self._made = (revision, now_s, making)
-        # a client that disconnects must not cancel the answer of the others
+        # a client that disconnects must not cancel the answer of other clients
         shared = await asyncio.shield(self._made[2])
         return _response(bytes(shared.body), shared.headers["etag"])
 
 
 def _shared_context() -> Context:
-    """Return a context without the first client, so that its disconnect stops no read."""
+    """Return a context without the client, whose disconnection must not cancel shared reads."""
     context = copy_context()
     context.run(ASKER.set, None)
     return context
 
 
 TIME_HEADER = "Padwatch-Time"
-"""Header with the time of the answer, from which clients advance ages in a cached body."""
+"""Header with the time of the answer; clients add the time since then to cached ages."""
 
 CACHE_CONTROL = "private, no-cache"
-"""Private caches only, revalidated before each use."""
+"""Cache-Control header: private caches only, revalidation before each use."""
 
 
 class Revalidation:
@@ -172,7 +172,7 @@ class Revalidation:
         self._app, self._clock = app, clock
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request and tag its answer."""
+        """Forward a request; add headers and the entity tag to its answer."""
         if scope["type"] != "http" or not scope["path"].startswith("/api/"):
             await self._app(scope, receive, send)
             return
@@ -181,7 +181,7 @@ class Revalidation:
 
 
 class _Answer:
-    """Holds back the head of an answer until its body, which determines the tag, is complete."""
+    """Buffer of the head of an answer until its body, which determines the tag, is complete."""
 
     def __init__(self, send: Send, clock: Clock, scope: Scope) -> None:
         self._send, self._clock = send, clock
@@ -202,7 +202,7 @@ class _Answer:
         await self._send(message)
 
     def _judged(self, head: Message, body: Message) -> Message:
-        """Set the tag; drop the body if the client has it."""
+        """Set the entity tag; answer with status 304 if the client has cached the body."""
         headers = MutableHeaders(scope=head)
         if "ETag" not in headers:
             headers["ETag"] = tag_of(digest_of(body.get("body", b"")))

@@ -1,4 +1,4 @@
-"""The HTTP application: routers, gate, published description."""
+"""HTTP application: routers, middleware, and the OpenAPI document."""
 
 import asyncio
 import json
@@ -45,7 +45,7 @@ from service.api.routes.trends import trend_router
 
 
 class GuardedApi(FastAPI):
-    """FastAPI application whose routes all declare what they need, behind a gate.
+    """FastAPI application in which every route declares the permission that it requires.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class GuardedApi(FastAPI):
             self.add_route(self.openapi_url, self._published, include_in_schema=False)
 
     def add_gate(self, authenticator: Authenticator) -> None:
-        """Add the gate; middleware added later runs before it."""
+        """Add the middleware `Gate`; middleware that is added later runs before it."""
         self.add_middleware(Gate, declared=lambda: self.declared, authenticator=authenticator)
 
     def require_declarations(self) -> None:
@@ -80,13 +80,13 @@ class GuardedApi(FastAPI):
 
     @property
     def declared(self) -> Mapping[str, Declared]:
-        """Needs of each operation by method and path."""
+        """Operations with their requirements, by method and path."""
         return self._declared
 
     def openapi(self) -> dict[str, Any]:
-        """Return the OpenAPI document, made once after all routes were added.
+        """Return the OpenAPI document, which is built once, after all routes were added.
 
-        Concurrent callers wait until it is complete.
+        Concurrent callers wait until the document is complete.
         """
         with self._describing:
             if self.openapi_schema is not None:
@@ -97,7 +97,7 @@ class GuardedApi(FastAPI):
             return document
 
     def rendered(self) -> tuple[bytes, str]:
-        """Return the OpenAPI document as JSON and its entity tag, made once in about 0.3 s."""
+        """Return the OpenAPI document as JSON, rendered once in about 0.3 s, and its entity tag."""
         with self._rendering:
             if self._rendered is None:
                 document = _json(self.openapi())
@@ -105,7 +105,7 @@ class GuardedApi(FastAPI):
             return self._rendered
 
     async def _published(self, _: Request) -> Response:
-        # made in a thread, not on the event loop
+        # render in a thread, not on the event loop
         rendered = self._rendered
         if rendered is None:
             rendered = await asyncio.to_thread(self.rendered)
@@ -126,13 +126,13 @@ Times are UTC, RFC 3339. Errors are problem documents (RFC 9457).
 
 
 def create_app(context: Context) -> GuardedApi:
-    """Build the API; the caller adds pages and evidence."""
+    """Build the application; the caller adds the routes of dashboard and evidence."""
     app = GuardedApi(
         title="padwatch",
         version=version("padwatch"),
         description=DESCRIPTION,
         openapi_url="/api/v1/openapi.json",
-        docs_url=None,  # its pages load scripts from other sites
+        docs_url=None,  # FastAPI's pages load scripts from other sites
         redoc_url=None,
         responses=EVERY_OPERATION,
     )

@@ -1,4 +1,4 @@
-"""The audit trail as a CSV file that is safe to open in a spreadsheet."""
+"""Export of the audit trail as a CSV file that is safe to open in a spreadsheet."""
 
 import csv
 from collections.abc import Iterable
@@ -11,13 +11,13 @@ from service.store.access.audit_entries import AuditEntry
 HEADER = ("time", *(field.name for field in fields(AuditEntry)))
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n", "|", "%", "'", "＝", "＋", "－", "＠")
-"""Beginnings of text that spreadsheets interpret; the quote, so that the guard is reversible."""
+"""Prefixes of spreadsheet formulas, and the quote, so that the escaping is reversible."""
 
 
 def write_csv(file: TextIO, entries: Iterable[AuditEntry]) -> int:
     """Write one row per entry; return the number of rows.
 
-    Text that a spreadsheet could take for a formula begins with a single quote.
+    Text that a spreadsheet could interpret as a formula is prefixed with a single quote.
     """
     rows = csv.writer(file, quoting=csv.QUOTE_ALL, lineterminator="\r\n")
     rows.writerow(HEADER)
@@ -29,7 +29,7 @@ def write_csv(file: TextIO, entries: Iterable[AuditEntry]) -> int:
 
 
 def harmless(text: str) -> str:
-    """Return text guarded against formulas; invalid characters are replaced."""
+    """Return text escaped against formula injection; invalid characters are replaced."""
     text = text.encode("utf-8", "replace").decode("utf-8").replace("\0", "\ufffd")
     is_formula = text.lstrip(" \u00a0\ufeff").startswith(FORMULA) or text.startswith(FORMULA)
     return f"'{text}" if is_formula else text

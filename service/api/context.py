@@ -40,7 +40,7 @@ from service.store.store import Store
 
 
 class LiveState(Protocol):
-    """Live state; see :class:`service.live.live_view.LiveView`."""
+    """Live state of all units; see :class:`service.live.live_view.LiveView`."""
 
     @property
     def revision(self) -> int:
@@ -48,40 +48,40 @@ class LiveState(Protocol):
 
     @property
     def store_error(self) -> str | None:
-        """Why results are not stored or read; None if they are."""
+        """Reason why results cannot be stored or read; None if they can."""
 
     @property
     def n_unstored(self) -> int:
-        """Number of dropped findings."""
+        """Number of results and events that are missing in the database."""
 
     def status(self, unit: str) -> UnitStatus:
         """Return the state of the source of a unit."""
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Return the newest blocks of a unit; raise `NotAvailableError` if there are none."""
+        """Return the newest blocks of a unit; raise `NotAvailableError` without blocks."""
 
     def newest_block(self, unit: str) -> SampleBlock | None:
-        """Return the newest block of a unit; None without one."""
+        """Return the newest block of a unit; None without a block."""
 
     def why_no_samples(self, unit: str) -> Reason | None:
-        """Return why the newest samples of a unit are not current; None if they are."""
+        """Return the reason why the samples of a unit are not current; None if they are current."""
 
     def data_age_s(self, unit: str) -> float | None:
-        """Return the age of the newest block; None without one."""
+        """Return the age of the newest block of a unit, s; None without a block."""
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """Return the newest result with spectrum and orbit; raise as `blocks` does."""
+        """Return the newest result with spectrum and orbit; raise errors as `blocks` does."""
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:
-        """Return the newest result; values that are not current are missing."""
+        """Return the newest result of a bearing; outdated readings have no values."""
 
 
 class FilmState(Protocol):
-    """The films of all bearings; see :class:`service.measuring.films.FilmMonitor`."""
+    """State of the films of all bearings; see :class:`service.measuring.films.FilmMonitor`."""
 
     @property
     def unwatched(self) -> Mapping[str, str]:
-        """Why films are not watched, by unit."""
+        """Reasons why the films of a unit are not watched, by unit."""
 
     @property
     def settings(self) -> FilmAlarmSettings:
@@ -91,25 +91,25 @@ class FilmState(Protocol):
         """Return the film rules of a unit; None if its films are not watched."""
 
     def place(self, unit: str, bearing: str) -> FilmPlace | None:
-        """Return a bearing with its estimator; None if it is not watched."""
+        """Return unit, bearing and estimator of a film; None if the film is not watched."""
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """Return the newest findings of a bearing."""
+        """Return the newest reading of a film with its findings; None without a reading."""
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
-        """Return the baseline in force of a bearing."""
+        """Return the baseline in force of a bearing; None without such a baseline."""
 
 
 class CaptureStatus(Protocol):
-    """Samples around alarms; see :class:`service.recordings.around_alarms.Captures`."""
+    """State of recordings around alarms; see :class:`service.recordings.around_alarms.Captures`."""
 
     @property
     def error(self) -> str | None:
-        """Why the newest recording failed; None if it did not."""
+        """Reason why the newest recording failed; None if it succeeded."""
 
     @property
     def trouble(self) -> str | None:
-        """Why samples are not recorded now."""
+        """Reason why samples cannot be recorded now; None if they can."""
 
     @property
     def n_running(self) -> int:
@@ -121,38 +121,38 @@ class CaptureStatus(Protocol):
 
     @property
     def being_made(self) -> Set[tuple[str, int]]:
-        """Alarms and occurrences of the recordings in progress."""
+        """Alarm identifier and occurrence of each recording in progress."""
 
 
 class OperationService(Protocol):
-    """Carries out operations in the process that analyses the unit."""
+    """Operations on alarms and baselines, executed in the process that analyses the unit."""
 
     async def operate(self, id_: str, action: Action) -> Alarm:
-        """Carry out an operation on an alarm; return the stored alarm.
+        """Execute an operation on an alarm; return the stored alarm.
 
         Raises
         ------
         LookupError
-            If there is no such alarm.
+            If the alarm does not exist.
         ActionRefusedError
             If the operation does not fit the state of the alarm.
         CommandFailedError
-            If no process carries it out, or the disk does not answer.
+            If no process executes the operation, or the disk does not answer.
         """
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
-        """Carry out an action on the baselines of a bearing; it is stored on return.
+        """Execute an action on the baselines of a bearing; the action is stored on return.
 
         Raises
         ------
         BaselineRefusedError
             If the action does not fit the baselines.
         CommandFailedError
-            If no process carries it out.
+            If no process executes the action.
         """
 
     async def refer_to(self, reference: VectorReference) -> None:
-        """Apply a 1× reference that was just stored."""
+        """Apply a newly stored 1× reference."""
 
 
 UnitId = Annotated[str, Path(description="Identifier of a unit.", examples=["U1"])]
@@ -169,35 +169,35 @@ class Context:
     Parameters
     ----------
     refresh_s
-        Period of results.
+        Period of the results, s.
     receivers
-        Returns the state of all receivers of alarm messages.
+        Function that returns the state of all receivers of alarm messages.
     evidence
-        State of the evidence of alarms; None where none is kept.
+        Function that returns the state of the alarm evidence; None without evidence.
     configuration
-        Plant file without secrets; None where none is kept.
+        Plant file without secrets; None if the configuration is not kept.
     metrics
-        Metrics for Prometheus; None without metrics.
+        Function that collects the metrics for Prometheus; None without metrics.
     loops
-        Fault of each loop of the program; None if it is alive.
+        Function that returns the fault of each loop of the program; None for an intact loop.
     stored_trouble
-        Known damage of stored data; None if there is none.
+        Function that returns known damage of stored data; None without damage.
     checks
-        Further checks of readiness by name; they are shown only.
+        Function that returns further health checks by name; they do not affect readiness.
     access
-        Identifies callers; None for one without logins on this computer.
+        Authenticator; if None, local callers can read without a login.
     space
-        Watch of the disks; None without one.
+        Monitor of free disk space; None without a monitor.
     load
-        Requests refused under load; None if none ever are.
+        Load monitor; None if requests are never refused under load.
     tape
-        Continuous recording; None if this process records nothing.
+        Continuous recorder; None if this process does not record.
     recordings
-        Folders of recordings, starting with recordings around alarms; None without any.
+        Folders of recordings, the first for recordings around alarms; None without recordings.
     faults
-        Faults of damaged recordings by name.
+        Function that returns the faults of damaged recordings, by name of the recording.
     refusals
-        Log of refused requests; None for one of the application's own.
+        Writer of audit entries for refused requests; if None, the application creates it.
     sources
         Sources with timed polls, by unit.
     """
@@ -233,13 +233,13 @@ class Context:
     faults: Callable[[], Mapping[str, str]] = dict
 
     def unit(self, unit: str) -> UnitSettings:
-        """Return a unit; raise a problem of status 404 without it."""
+        """Return the settings of a unit; raise a problem of status 404 for an unknown unit."""
         if unit not in self.units:
             raise ProblemError(404, "Unknown unit", f"there is no unit {unit!r} in this plant")
         return self.units[unit]
 
     def bearing(self, unit: str, bearing: str) -> BearingSettings:
-        """Return a bearing; raise a problem of status 404 without it."""
+        """Return the settings of a bearing; raise a problem of status 404 if it is unknown."""
         for settings in self.unit(unit).bearing:
             if settings.id == bearing:
                 return settings

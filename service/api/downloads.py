@@ -1,41 +1,41 @@
-"""Downloads in pieces, and a limit on concurrent heavy work for answers."""
+"""Streamed downloads, and a limit on concurrent expensive work for answers."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Generator
 from typing import TypeVar
 
 SLOTS = 2
-"""Maximum number of reports and pieces of downloads made concurrently."""
+"""Maximum number of reports and download pieces that are produced concurrently."""
 
 MAX_DOWNLOADS = 16
-"""Maximum number of concurrent downloads; each takes a slot only while a piece is made."""
+"""Maximum number of concurrent downloads; each uses a slot only to produce a piece."""
 
 T = TypeVar("T")
 
 
 class TooManyDownloadsError(Exception):
-    """Too many concurrent downloads."""
+    """Raised if the maximum number of concurrent downloads is reached."""
 
 
 class Downloads:
-    """Makes downloads in threads, as fast as clients read them."""
+    """Streamed downloads; threads produce the pieces as fast as clients read them."""
 
     def __init__(self) -> None:
         self._slots = asyncio.Semaphore(SLOTS)
         self._n = 0
 
     async def worked(self, do: Callable[[], T]) -> T:
-        """Run a function in a thread once a slot is free."""
+        """Run a function in a thread as soon as a slot is free; return its result."""
         async with self._slots:
             return await asyncio.to_thread(do)
 
     def require_room(self) -> None:
-        """Refuse a further download above the limit.
+        """Check that a further download is allowed.
 
         Raises
         ------
         TooManyDownloadsError
-            If there are `MAX_DOWNLOADS`.
+            If `MAX_DOWNLOADS` downloads are in progress.
         """
         if self._n >= MAX_DOWNLOADS:
             raise TooManyDownloadsError(f"{MAX_DOWNLOADS} downloads are in progress")
@@ -46,10 +46,10 @@ class Downloads:
         Raises
         ------
         TooManyDownloadsError
-            If there are too many downloads. Errors of the first piece are raised too.
+            If too many downloads are in progress. Errors of the first piece are raised too.
         """
         self.require_room()
-        first = await self.worked(lambda: next(pieces, b""))  # opens all files
+        first = await self.worked(lambda: next(pieces, b""))  # the first piece opens all files
         return self._sent(first, pieces)
 
     async def _sent(

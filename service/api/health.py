@@ -1,4 +1,4 @@
-"""Liveness, readiness and metrics."""
+"""Routes for liveness, readiness and metrics."""
 
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Literal
@@ -14,22 +14,22 @@ from service.store.access.identities import Permission
 
 
 class HealthModel(ApiModel):
-    """Whether the service can do its work."""
+    """Result of the health checks of the service."""
 
     status: Literal["ok", "not ready"]
-    """Overall state."""
+    """Overall result."""
 
     checks: dict[str, str]
-    """Result of each check."""
+    """Result of each check, by name of the check."""
 
 
 def health_router(context: Context) -> APIRouter:
-    """Return the routes of liveness and readiness."""
+    """Return the router for liveness and readiness."""
     router = APIRouter(tags=["health"], dependencies=[OPEN])
 
     @router.get("/livez", summary="Is the process alive?")
     async def livez() -> HealthModel:
-        """Answer while the event loop runs, whatever the state of DAQ or disk."""
+        """Answer 200 while the event loop runs, independent of the state of DAQ and disk."""
         return HealthModel(status="ok", checks={"event_loop": "turning"})
 
     @router.get(
@@ -74,12 +74,12 @@ ANSWER = {
 
 
 def metrics_router(look: Callable[[], Awaitable[Collector]]) -> APIRouter:
-    """Return the route of the metrics for Prometheus.
+    """Return the router for Prometheus metrics.
 
     Parameters
     ----------
     look
-        Collects all metrics.
+        Function that collects all metrics.
     """
     router = APIRouter(tags=["health"], dependencies=[needs(Permission.READ)])
 

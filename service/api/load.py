@@ -1,4 +1,4 @@
-"""Requests refused while the service cannot keep up, so that samples and alarms come first."""
+"""Load shedding: requests are refused under overload; samples and alarms have priority."""
 
 import re
 from collections import Counter, deque
@@ -17,13 +17,13 @@ from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.metrics import counter, gauge
 
 RELIEF_SHARE = 0.5
-"""Share of its limit below which the load must stay for `RELIEF_S` before requests are accepted."""
+"""Fraction of a limit below which the load must stay for `RELIEF_S` to lower the refusal level."""
 
 RELIEF_S = 5.0
 
 
 class Refused(IntEnum):
-    """Refused requests; a higher level includes the lower ones."""
+    """Level of refusal; a higher level refuses additional kinds of requests."""
 
     NOTHING = 0
     HISTORY = 1
@@ -31,20 +31,21 @@ class Refused(IntEnum):
 
 
 MAX_DELAY_S, MAX_WAITING_SHARE, MAX_LAG_S = 2.0, 0.2, 1.0
-"""Waiting time of the oldest block, fill level of the queue to the analysis, and lasting delay of
-the event loop above which requests for past values are refused; at twice these, live values too.
+"""Limits of the waiting time of the oldest block, of the fill level of the queue to the analysis,
+and of the delay of the event loop. At a limit, requests for past values are refused; at twice a
+limit, also requests for live values.
 
-In between, continuous recording stops (`service.recordings.continuous_recorder`)."""
+Between these levels, continuous recording stops (`service.recordings.continuous_recorder`)."""
 
 
 @dataclass(frozen=True)
 class RefusalState:
-    """Level of refusal.
+    """State of the load shedding.
 
     Parameters
     ----------
     relieved_s
-        Monotonic time since when a lower level suffices; None if it does not.
+        Monotonic time since which a lower level is sufficient; None if the level is needed.
     """
 
     refused: Refused = Refused.NOTHING
@@ -52,7 +53,7 @@ class RefusalState:
 
 
 def advance(state: RefusalState, over: float, now_s: float) -> RefusalState:
-    """Update the level of refusal: raise it at once, lower it after `RELIEF_S`."""
+    """Return the next state: raise the level at once, lower it by one after `RELIEF_S`."""
     wanted = Refused(min(int(over), Refused.VIEWS))
     if wanted >= state.refused or over > RELIEF_SHARE * state.refused:
         return RefusalState(max(wanted, state.refused))
@@ -67,7 +68,7 @@ log = structlog.get_logger()
 CHECK_PERIOD_S = 0.25
 
 N_CHECKS = 4
-"""Number of successive checks over the limit that make an overload."""
+"""Number of consecutive checks above a limit that count as overload."""
 
 
 WORDS = {
@@ -77,7 +78,7 @@ WORDS = {
 
 
 class LoadWatch:
-    """Watches the queue and the event loop, and counts refused requests.
+    """Monitor of the load of queue and event loop, with counts of refused requests.
 
     Parameters
     ----------
@@ -94,21 +95,21 @@ class LoadWatch:
 
     @property
     def refused(self) -> Refused:
-        """Level of refusal now."""
+        """Current level of refusal."""
         return self._state.refused
 
     @property
     def words(self) -> str | None:
-        """Refused requests in words; None if none are."""
+        """Description of the refused requests; None if no requests are refused."""
         return WORDS.get(self.refused)
 
     @property
     def lag_s(self) -> float:
-        """Smallest delay of the event loop within the last second."""
+        """Smallest delay of the event loop within the last second, s."""
         return min(self._lags)
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Check periodically."""
+        """Check the load periodically."""
         while True:
             pulse.beat(CHECK_PERIOD_S)
             due_s = self._clock.monotonic_s() + CHECK_PERIOD_S
@@ -116,12 +117,12 @@ class LoadWatch:
             self.look(self._clock.monotonic_s() - due_s)
 
     def look(self, late_s: float) -> None:
-        """Check once.
+        """Check the load once; update the level of refusal and log its changes.
 
         Parameters
         ----------
         late_s
-            Delay of the event loop.
+            Delay of the event loop, s.
         """
         self._lags.append(max(0.0, late_s))
         delay_s, waiting_share = self._bus.oldest_wait_s, self._bus.depth / self._bus.capacity
@@ -140,7 +141,7 @@ class LoadWatch:
             )
 
     def refuses(self, refused_from: Refused) -> bool:
-        """Whether a request of this kind is refused now; count it if so."""
+        """Whether a request is refused at the current level; count it if it is refused."""
         if refused_from is Refused.NOTHING or refused_from > self.refused:
             return False
         self.n_refused[refused_from] += 1
@@ -149,11 +150,11 @@ class LoadWatch:
 
 VITAL = re.compile(
     r"/(livez|readyz|metrics)"
-    r"|/api/v1/alarms(/[^/]+)?"  # the list, and one of it
+    r"|/api/v1/alarms(/[^/]+)?"  # the alarm list, and one alarm
     r"|/api/v1/session"
     r"|/(?!api/).*"  # the pages, which show the alarms
 )
-"""Paths that are never refused; neither are requests that change something."""
+"""Paths that are never refused; requests that change state are never refused either."""
 
 VIEWS = re.compile(
     r"/api/v1/overview"
@@ -161,13 +162,13 @@ VIEWS = re.compile(
     r"|/api/v1/units(/[^/]+(/channels)?)?"
     r"|/api/v1/units/[^/]+/bearings(/[^/]+(/latest|/orbit|/budgets/[^/]+)?)?"
 )
-"""Paths of live values, answered from memory."""
+"""Paths of live values, which are answered from memory."""
 
 READING = ("GET", "HEAD")
 
 
 def refused_from(method: str, path: str) -> Refused:
-    """Return the level of load that refuses a request; `Refused.NOTHING` for none."""
+    """Return the lowest level that refuses a request; `Refused.NOTHING` if it is never refused."""
     if method not in READING or (VITAL.fullmatch(path) and path != "/api/v1/alarms/rates"):
         return Refused.NOTHING
     return Refused.VIEWS if VIEWS.fullmatch(path) else Refused.HISTORY
@@ -182,13 +183,13 @@ OVERLOADED = Refusal(
 
 
 class LoadShedder:
-    """ASGI middleware that refuses requests while the service cannot keep up."""
+    """ASGI middleware that refuses requests while the service is overloaded."""
 
     def __init__(self, app: ASGIApp, load: LoadWatch) -> None:
         self._app, self._load = app, load
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse a request or forward it."""
+        """Forward a request, or refuse it under overload."""
         if scope["type"] == "http" and self._load.refuses(
             refused_from(scope["method"], scope["path"])
         ):
@@ -201,7 +202,7 @@ KINDS = (Refused.HISTORY, Refused.VIEWS)
 
 
 def load_metrics(load: LoadWatch | None) -> Iterator[Metric]:
-    """Yield metrics of refused requests; none without a load watch."""
+    """Yield metrics of refused requests and event loop; no metrics without a load monitor."""
     if load is None:
         return
     yield counter(
@@ -225,16 +226,16 @@ def load_metrics(load: LoadWatch | None) -> Iterator[Metric]:
 
 
 class TokenBucket:
-    """Token bucket.
+    """Token bucket for a rate limit.
 
     Parameters
     ----------
     n_at_once
-        Size of the bucket.
+        Capacity of the bucket, tokens; it is full at first.
     seconds_each
         Time in which one token is added, s.
     now_s
-        Monotonic time, s.
+        Monotonic time of the start, s.
     """
 
     def __init__(self, n_at_once: int, seconds_each: float, now_s: float) -> None:
@@ -242,7 +243,7 @@ class TokenBucket:
         self._n_free, self._seen_s = self._n_at_once, now_s
 
     def take(self, now_s: float) -> bool:
-        """Take a token; return whether there was one."""
+        """Take a token; return False if the bucket is empty."""
         self._n_free += (now_s - self._seen_s) / self._seconds_each
         self._n_free, self._seen_s = min(self._n_free, self._n_at_once), now_s
         if self._n_free < 1.0:

@@ -1,4 +1,4 @@
-"""The published description: names, headers, examples and access of every operation."""
+"""Additions to the OpenAPI document: names, headers, examples and access of operations."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -30,7 +30,7 @@ WORDS = {
     "previous_hash": "60303ae22b998861bce3b28f33eec1be758a213c86c93c076dbe9f558b3f8a2c",
     "sha256": "2c26b46b68ffc68ff99b453c1d30413413422d706483bfa0f98a5e886266e7ae",
 }
-"""Text examples by name of the field."""
+"""Example texts by field name."""
 
 NUMBERS = {
     "rated_speed_rpm": 90.9,
@@ -60,7 +60,7 @@ NUMBERS = {
     "bucket_s": 60.0,
     "n": 412,
 }
-"""Number examples by name of the field."""
+"""Example numbers by field name."""
 
 CHOSEN = {
     ("SourceModel", "state"): "connected",
@@ -103,7 +103,7 @@ CHOSEN = {
     ("QuantityModel", "name"): QUANTITY,
     ("QuantityModel", "unit"): "N/m",
 }
-"""Examples by model and field."""
+"""Example values by model and field name."""
 
 KEYS = {
     "readings": QUANTITY,
@@ -119,16 +119,16 @@ KEYS = {
     "chattering": ALARM,
     "files": "readings.parquet",
 }
-"""Keys of objects by name of the field."""
+"""Example keys of JSON objects by field name."""
 
 
 class Examples:
-    """Makes examples for the schemas of a description.
+    """Generator of examples for the schemas of an OpenAPI document.
 
     Parameters
     ----------
     schemas
-        Schemas that references point to.
+        Schemas by name, for resolving references.
     """
 
     def __init__(self, schemas: Mapping[str, Any]) -> None:
@@ -140,7 +140,7 @@ class Examples:
         Parameters
         ----------
         model, field
-            Model and field that the example is for.
+            Names of the model and of the field that has the schema.
         """
         if (model, field) in CHOSEN:
             return CHOSEN[model, field]
@@ -157,7 +157,7 @@ class Examples:
         return self._of_type(schema, model, field)
 
     def _one_of(self, choices: list[Mapping[str, Any]], model: str, field: str) -> Any:
-        """Return an example of the first choice but null; null for text without an example."""
+        """Return an example of the first non-null type; None for text without an example."""
         may_be_null = any(choice.get("type") == "null" for choice in choices)
         some = [choice for choice in choices if choice.get("type") != "null"]
         is_word = some[0].get("type") == "string" and not some[0].get("examples")
@@ -233,7 +233,7 @@ HEADERS = {
         "example": "1.0.0-1f2e3d4c",
     },
 }
-"""Headers of every answer of the API."""
+"""OpenAPI entries for the headers of successful answers."""
 
 PROBLEM_HEADERS: dict[str, dict[str, Any]] = {
     "401": {
@@ -251,7 +251,7 @@ PROBLEM_HEADERS: dict[str, dict[str, Any]] = {
         }
     },
 }
-"""Headers of some problems."""
+"""OpenAPI entries for the headers of problems, by status."""
 
 NOT_MODIFIED = {
     "description": "Unchanged since the answer of that `ETag`",
@@ -260,7 +260,7 @@ NOT_MODIFIED = {
 
 
 def describe_answers(document: dict[str, Any]) -> None:
-    """Add ids, examples, headers and tags to every operation."""
+    """Add operation ids, examples, headers and entity tags to an OpenAPI document."""
     schemas = document.setdefault("components", {}).setdefault("schemas", {})
     schemas.update(problem_schemas())
     examples = Examples(schemas)
@@ -275,7 +275,7 @@ def describe_answers(document: dict[str, Any]) -> None:
 
 
 def operation_id(method: str, path: str) -> str:
-    """Return the name of an operation, such as ``get_units_unit_bearings``."""
+    """Return the id of an operation, such as ``get_units_unit_bearings``."""
     words = path.removeprefix("/api/v1/").strip("/").translate(str.maketrans("/-.", "___", "{}"))
     return f"{method}_{words}"
 
@@ -320,7 +320,7 @@ SCHEMES = {
 }
 
 NEEDED = "x-padwatch-needs"
-"""Permission that an operation needs; null for open operations."""
+"""Extension key for the permission that an operation requires; null for open operations."""
 
 REFUSALS = {
     401: "Not authenticated",
@@ -329,7 +329,7 @@ REFUSALS = {
 
 
 def describe_access(document: dict[str, Any], operations: Mapping[str, Declared]) -> None:
-    """Add security schemes and the needed permission of each operation."""
+    """Add security schemes and the required permission of each operation."""
     document.setdefault("components", {})["securitySchemes"] = SCHEMES
     for path, methods in document["paths"].items():
         for method, operation in methods.items():

@@ -16,7 +16,7 @@ FIRST, LAST = datetime.min.replace(tzinfo=UTC), datetime.max.replace(tzinfo=UTC)
 
 
 def written_as_date(text: object) -> object:
-    """Reject a bare number, which could be a year or seconds since 1970.
+    """Return the text of a time; reject a number, which could be a year or seconds since 1970.
 
     Raises
     ------
@@ -29,7 +29,7 @@ def written_as_date(text: object) -> object:
 
 
 def ns_from_datetime(moment: datetime, parameter: str) -> int:
-    """Return nanoseconds since 1970, limited to the years 1 to 9999.
+    """Return a time in nanoseconds since 1970, clipped to the years 1 to 9999.
 
     Raises
     ------
@@ -73,14 +73,14 @@ def _bound(description: str, example: float) -> Any:
 
 
 def duration(longest_s: float, description: str, **options: Any) -> Any:
-    """Declare a query parameter for a duration, s."""
+    """Declare a query parameter for a duration in seconds."""
     return Query(gt=0.0, le=longest_s, allow_inf_nan=False, description=description, **options)
 
 
 async def time_range(
     start: Annotated[Moment, _START], end: Annotated[Moment, _END]
 ) -> tuple[int, int]:
-    """Return the checked time range."""
+    """Return the requested time range in nanoseconds since 1970."""
     start_ns, end_ns = ns_from_datetime(start, "start"), ns_from_datetime(end, "end")
     require_order(start_ns, end_ns)
     return start_ns, end_ns
@@ -89,7 +89,7 @@ async def time_range(
 async def optional_time_range(
     start: Annotated[Moment | None, _START] = None, end: Annotated[Moment | None, _END] = None
 ) -> tuple[int, int]:
-    """Return the checked time range; an omitted end of it is unlimited."""
+    """Return the requested time range in ns since 1970; without start or end it is unlimited."""
     start_ns = ns_from_datetime(start, "start") if start else -(2**63)
     end_ns = ns_from_datetime(end, "end") if end else 2**63 - 1
     require_order(start_ns, end_ns)
@@ -100,7 +100,7 @@ async def eccentricity_range(
     eccentricity_min: Annotated[float | None, _bound("Lowest eccentricity ratio.", 0.2)] = None,
     eccentricity_max: Annotated[float | None, _bound("Highest eccentricity ratio.", 0.4)] = None,
 ) -> ValueRange:
-    """Return the range of eccentricity ratios."""
+    """Return the requested range of eccentricity ratios."""
     return _ordered(eccentricity_min, eccentricity_max, "eccentricity_min")
 
 
@@ -108,7 +108,7 @@ async def oil_temperature_range(
     oil_temperature_min: Annotated[float | None, _bound("Lowest, °C.", 40.0)] = None,
     oil_temperature_max: Annotated[float | None, _bound("Highest, °C.", 50.0)] = None,
 ) -> ValueRange:
-    """Return the range of oil temperatures, °C."""
+    """Return the requested range of oil temperatures, °C."""
     return _ordered(oil_temperature_min, oil_temperature_max, "oil_temperature_min")
 
 
@@ -116,7 +116,7 @@ async def attitude_range(
     attitude_min: Annotated[float | None, _bound("Lowest attitude angle, degrees.", 40.0)] = None,
     attitude_max: Annotated[float | None, _bound("Highest, degrees.", 50.0)] = None,
 ) -> ValueRange:
-    """Return the range of attitude angles, degrees."""
+    """Return the requested range of attitude angles, degrees."""
     return _ordered(attitude_min, attitude_max, "attitude_min")
 
 
@@ -145,10 +145,10 @@ OnlyUnit = Annotated[
 
 
 def only(description: str, example: str, max_length: int | None = None) -> Any:
-    """Declare a query parameter that selects by text."""
+    """Declare a query parameter that selects the entries with a given text."""
     return Query(max_length=max_length, description=f"Only this {description}.", examples=[example])
 
 
 def before_number(description: str) -> Any:
-    """Declare a query parameter for the number before which a page ends."""
+    """Declare a query parameter for pages: only entries with smaller numbers are returned."""
     return Query(ge=1, le=10**15, description=description, examples=[117])

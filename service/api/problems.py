@@ -18,7 +18,7 @@ from service.store.port import QueryTooLargeError, StoreError
 MEDIA_TYPE = "application/problem+json"
 
 MAX_BYTES = 2048
-"""Maximum size of a problem document; a large wrong request gets no large answer."""
+"""Maximum size of a problem document, bytes; large wrong requests cause no large answers."""
 
 MAX_MISTAKES = 8
 """Maximum number of wrong parameters reported."""
@@ -33,13 +33,13 @@ WORDS = {
     422: "A wrong parameter",
     503: "The store cannot be used",
 }
-"""Descriptions of problems by status."""
+"""Default descriptions of problems in the OpenAPI document, by status."""
 
 log = structlog.get_logger()
 
 
 class Mistake(BaseModel):
-    """One wrong parameter of a request."""
+    """Wrong parameter of a request."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -50,7 +50,7 @@ class Mistake(BaseModel):
 
 
 class Problem(BaseModel):
-    """A problem document (RFC 9457)."""
+    """Problem document (RFC 9457)."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
@@ -65,7 +65,7 @@ class Problem(BaseModel):
 
 
 class ProblemError(Exception):
-    """Ends a request with a problem document."""
+    """Error that ends a request with a problem document."""
 
     def __init__(
         self,
@@ -89,7 +89,7 @@ EVERY_OPERATION: dict[int | str, dict[str, Any]] = {
     422: _documented(WORDS[422]),
     "default": _documented("Any other problem"),
 }
-"""OpenAPI entries for problems of every operation."""
+"""OpenAPI entries for the problems that every operation may return."""
 
 
 def problem_responses(
@@ -100,7 +100,7 @@ def problem_responses(
     Parameters
     ----------
     own
-        Descriptions of further statuses that `WORDS` does not fit.
+        Descriptions of further statuses, in place of those in `WORDS`.
     """
     words = {status: WORDS[status] for status in statuses} | dict(own or {})
     return {status: _documented(text) for status, text in words.items()}
@@ -112,7 +112,7 @@ async def refuse_unknown_parameters(request: Request) -> None:
     Raises
     ------
     ProblemError
-        For the first unknown parameter, with the known ones.
+        For the first unknown parameter; the message lists the known parameters.
     """
     operation = f"{request.method} {request.scope['route'].path}"
     known = request.app.declared[operation].query_parameters
@@ -123,13 +123,13 @@ async def refuse_unknown_parameters(request: Request) -> None:
 
 
 def problem_schemas() -> dict[str, Any]:
-    """Return the schemas that the entries refer to, by name."""
+    """Return the JSON schemas that the OpenAPI entries refer to, by name."""
     schema = Problem.model_json_schema(ref_template=f"{SCHEMAS}{{model}}")
     return {**schema.pop("$defs"), "Problem": schema}
 
 
 def install_problem_handlers(app: FastAPI) -> None:
-    """Render all errors of an application as problem documents."""
+    """Install exception handlers that render all errors as problem documents."""
 
     @app.exception_handler(ProblemError)
     async def _problem(request: Request, error: ProblemError) -> Response:
@@ -176,12 +176,12 @@ def install_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(Exception)
     async def _bug(request: Request, _: Exception) -> Response:
-        """Report a bug without details; they are logged."""
+        """Return a problem without details of the bug; the server logs its traceback."""
         return _render(request, 500, "Fault in padwatch", "a fault of the program; see its log")
 
 
 def problem_answer(request: Request, error: ProblemError) -> Response:
-    """Return the problem document of an error."""
+    """Return a response with the problem document of an error."""
     words = (error.status, error.title, error.detail)
     return _render(request, *words, error.errors, error.headers)
 
@@ -215,7 +215,7 @@ def _render(
 
 
 def _bounded(problem: Problem) -> bytes:
-    """Return a problem as JSON, with texts cut to at most `MAX_BYTES`."""
+    """Return a problem as JSON; texts are truncated to keep it within `MAX_BYTES`."""
     n_characters = MAX_BYTES // 2
     while len(document := _json(problem)) > MAX_BYTES:
         problem = Problem(

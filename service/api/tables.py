@@ -1,4 +1,4 @@
-"""Answers as tables: CSV or Parquet, made in threads."""
+"""Tabular answers as CSV or Parquet files, generated in threads."""
 
 import csv
 from collections.abc import Iterator, Sequence
@@ -51,7 +51,7 @@ COLUMN_KINDS: dict[type, ColumnKind] = {bool: "flag", int: "count", float: "numb
 
 
 def kind_of(annotation: Any) -> ColumnKind:
-    """Return the kind of column for values of a type, or of a list of it, such as `list[int]`."""
+    """Return the column kind for a type of values or for a list type, such as `list[int]`."""
     inner = [each for each in get_args(annotation) if each is not NoneType]
     is_leaf = not inner or isinstance(inner[0], str)  # text is a member of a Literal
     return COLUMN_KINDS.get(annotation, "text") if is_leaf else kind_of(inner[0])
@@ -59,14 +59,14 @@ def kind_of(annotation: Any) -> ColumnKind:
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table.
+    """Column of a tabular answer.
 
     Parameters
     ----------
     values
-        One value per row or None; times in nanoseconds since 1970.
+        Value or None for each row; times are in nanoseconds since 1970.
     unit
-        Unit and detector; None without a unit.
+        Unit and detector of the values; None if the values have no unit.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Column:
 
     @property
     def heading(self) -> str:
-        """Name, with the unit in brackets."""
+        """Column heading: the name, with the unit in brackets."""
         return harmless(self.name if self.unit is None else f"{self.name} [{self.unit}]")
 
 
@@ -90,7 +90,7 @@ async def wanted_format(
         ),
     ] = None,
 ) -> FormatName:
-    """Return the requested format."""
+    """Return the format requested by the query or by the header Accept; default: JSON."""
     if format is not None:
         return format
     accepted = request.headers.get("accept", "").split(",")
@@ -112,14 +112,14 @@ def table_content(words: str) -> dict[int | str, dict[str, Any]]:
 def table_response(
     wanted: FormatName, columns: Sequence[Column], name: str, next_cursor: str | None = None
 ) -> StreamingResponse:
-    """Return a table as a file.
+    """Return a response with a table as a CSV or Parquet file.
 
     Parameters
     ----------
     name
         Name of the file without suffix.
     next_cursor
-        Value of the header `CURSOR_HEADER`.
+        Value of the header `CURSOR_HEADER`; None omits the header.
     """
     pieces = csv_pieces(columns) if wanted == "csv" else iter([parquet_file(columns)])
     headers = {
@@ -133,7 +133,7 @@ def table_response(
 
 
 def csv_pieces(columns: Sequence[Column]) -> Iterator[bytes]:
-    """Yield a CSV file (RFC 4180) in pieces; cells are guarded against formulas."""
+    """Yield the pieces of a CSV file (RFC 4180); text is escaped against formula injection."""
     sink = StringIO(newline="")
     writer = csv.writer(sink)
     writer.writerow([column.heading for column in columns])
@@ -149,7 +149,7 @@ def csv_pieces(columns: Sequence[Column]) -> Iterator[bytes]:
 
 
 def parquet_file(columns: Sequence[Column]) -> bytes:
-    """Return a Parquet file; metadata of columns hold their units."""
+    """Return a table as a Parquet file; the metadata of each column contains its unit."""
     fields = [
         pa.field(each.name, ARROW_TYPES[each.kind], metadata={"unit": each.unit or ""})
         for each in columns

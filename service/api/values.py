@@ -1,4 +1,4 @@
-"""Models that several subjects share: quality, reading, uncertainty, window, condition."""
+"""API models for several subjects: quality, reading, uncertainty, window, condition."""
 
 import math
 from collections.abc import Iterable
@@ -30,10 +30,10 @@ from service.runtime.times import rfc3339
 
 
 class ApiModel(BaseModel):
-    """Model of an answer, without NaN or infinity; field docstrings are its documentation.
+    """Base class of answers, without NaN or infinity; OpenAPI shows the docstrings of its fields.
 
-    A model can be made from the attributes of an object: a field takes the attribute of its name,
-    or of its name with the suffix ``_ns`` for times.
+    A model can be built from the attributes of an object: a field is read from the attribute with
+    its name, or for times from the attribute with its name and the suffix ``_ns``.
     """
 
     model_config = ConfigDict(
@@ -47,12 +47,12 @@ class ApiModel(BaseModel):
 
     @classmethod
     def of(cls, *sources: object, **values: object) -> Self:
-        """Return a model of given values and, for the other fields, of attributes of objects."""
+        """Return a model from keyword values and, for other fields, attributes of `sources`."""
         return cls.model_validate(_Merged(SimpleNamespace(**values), *sources))
 
 
 class _Merged:
-    """Attributes of several objects; the first object with an attribute counts."""
+    """Merged view of the attributes of several objects; earlier objects take precedence."""
 
     def __init__(self, *sources: object) -> None:
         self._sources = sources
@@ -65,18 +65,18 @@ class _Merged:
 
 
 MAX_UNKNOWN = 8
-"""Maximum number of unknown members reported one by one."""
+"""Maximum number of unknown members that are reported individually."""
 
 
 class RequestModel(ApiModel):
-    """Body of a request, without unknown members or type conversions."""
+    """Base class of request bodies, without unknown members or type conversions."""
 
     model_config = ConfigDict(strict=True, alias_generator=None, from_attributes=False)
 
     @model_validator(mode="before")
     @classmethod
     def _reject_many_members(cls, body: Any) -> Any:
-        """Reject thousands of members at once; one error each would cost 10 µs each."""
+        """Reject too many members with one error; one error per member would take 10 µs each."""
         if isinstance(body, dict) and len(body) > len(cls.model_fields) + MAX_UNKNOWN:
             known = ", ".join(cls.model_fields)
             raise ValueError(f"{len(body)} members are too many; known: {known}")
@@ -112,10 +112,10 @@ NoteText = Annotated[
 
 
 class ActorModel(RequestModel):
-    """Request with the name of the person acting."""
+    """Base class of requests with the name of the acting person."""
 
     actor: ActorName | None = None
-    """Person acting, 1 to 80 printable characters; ignored if the request is authenticated."""
+    """Acting person, 1 to 80 printable characters; ignored if the request is authenticated."""
 
 
 LevelName = Literal["good", "uncertain", "bad"]
@@ -145,10 +145,10 @@ ByName = BeforeValidator(_name)
 
 
 class DatedAnswer(ApiModel):
-    """Answer with the present time, which its entity tag ignores."""
+    """Answer that contains the current time; its entity tag ignores this time."""
 
     time: Time
-    """Present time."""
+    """Current time."""
 
 
 class BearingAnswer(ApiModel):
@@ -172,23 +172,23 @@ class BearingHistory(BearingAnswer):
 
 
 class SampleRange(ApiModel):
-    """Consecutive samples of a unit."""
+    """Range of consecutive samples of a unit."""
 
     epoch: int
-    """Changes when the device restarts its count."""
+    """Epoch of the sample index; it changes when the device restarts its count."""
 
     first_index: int
     """Index of the first sample."""
 
     rate_hz: float
-    """Samples per second."""
+    """Sampling rate, Hz."""
 
 
 class QualityModel(ApiModel):
     """Quality of a value."""
 
     level: Annotated[LevelName, ByName]
-    """Worst level of everything it is derived from."""
+    """Quality level: the worst level of all readings that the value is derived from."""
 
     reason: Annotated[str, Field(examples=["insufficient_excitation"])]
     """Reason of the level; "ok" if it is good."""
@@ -198,29 +198,29 @@ class UncertaintyModel(ApiModel):
     """Standard uncertainties (GUM), in the unit of the value."""
 
     random: float | None
-    """Random part."""
+    """Random component; null if unknown."""
 
     systematic: float | None
-    """Systematic part, from transducers and bracket."""
+    """Systematic component, from transducers and bracket; null if unknown."""
 
     low_95: float
     """Lower end of the 95 % coverage interval."""
 
     high_95: float
-    """Upper end of that interval."""
+    """Upper end of the 95 % coverage interval."""
 
 
 class ReadingModel(ApiModel):
-    """One quantity with its quality."""
+    """Reading of one quantity, with its quality."""
 
     value: Annotated[float | None, Field(examples=[0.6914e9])]
-    """Null if and only if the level is bad."""
+    """Value of the reading; null if and only if the level is bad."""
 
     unit: Annotated[str, Field(examples=["N/m"])]
-    """Unit, and detector where it is an amplitude."""
+    """Unit of the value; for an amplitude, also the detector."""
 
     label: Annotated[str, Field(examples=["Effective stiffness x, 1×"])]
-    """Description in words."""
+    """Description of the quantity in words."""
 
     level: LevelName
     """Quality level."""
@@ -229,14 +229,14 @@ class ReadingModel(ApiModel):
     """Reason of the level."""
 
     uncertainty: UncertaintyModel | None
-    """Uncertainty of stiffness and damping; null if unknown."""
+    """Uncertainty of a stiffness or damping; null for other quantities and if unknown."""
 
 
 class WindowModel(ApiModel):
-    """Samples of a result."""
+    """Averaging window of a result: range of samples and segments."""
 
     epoch: int
-    """Changes when the device restarts its count."""
+    """Epoch of the sample index; it changes when the device restarts its count."""
 
     first_index: int
     """Index of the first sample."""
@@ -245,16 +245,16 @@ class WindowModel(ApiModel):
     """Index of the last sample."""
 
     n_segments: int
-    """Segments in the average in which all four channels were usable."""
+    """Number of segments in the average; all four channels are usable in each of them."""
 
     n_segments_wanted: int
-    """Segments of a full average."""
+    """Number of segments of a full average."""
 
     n_voided: int
-    """Segments lost to gaps since the service started."""
+    """Number of segments discarded because of gaps since the service started."""
 
     coverage: float
-    """Share of the possible segments in the average."""
+    """Fraction of the possible segments that are in the average."""
 
     duration_s: float
     """Time from the first to the last sample, s."""
@@ -266,7 +266,7 @@ OperatingStateName = Literal[
 
 
 class CellModel(ApiModel):
-    """Cell of operating conditions whose readings are comparable."""
+    """Cell of the grid of operating conditions; readings in one cell are comparable."""
 
     eccentricity_low: Annotated[float, Field(examples=[0.35])]
     """Lower bound of the eccentricity ratio."""
@@ -281,26 +281,26 @@ class CellModel(ApiModel):
     """Upper bound of the oil temperature, °C."""
 
     attitude_low_deg: float | None
-    """Lower bound of the attitude angle; null where cells do not depend on it."""
+    """Lower bound of the attitude angle; null if cells do not depend on the attitude angle."""
 
     attitude_high_deg: float | None
-    """Upper bound, likewise."""
+    """Upper bound of the attitude angle; null if cells do not depend on the attitude angle."""
 
 
 class FilmConditionModel(ApiModel):
     """Operating condition of a bearing."""
 
     time: Time
-    """Time."""
+    """Time of the operating condition."""
 
     operating_state: Annotated[OperatingStateName, ByName]
     """Operating state of the unit."""
 
     is_settled: bool
-    """Whether the state has lasted long enough, after the warm-up, for films to be compared."""
+    """Whether the state has lasted long enough, after the warm-up, for a comparison of films."""
 
     cell: CellModel | None
-    """Cell; null if eccentricity or oil temperature is unknown."""
+    """Cell of the condition; null if eccentricity or oil temperature is unknown."""
 
 
 PlaceName = Literal["shaft_x", "shaft_y", "bearing_x", "bearing_y"]
@@ -314,7 +314,7 @@ LEVEL_NAMES: dict[Level, LevelName] = {
 
 
 def level_names(levels: Iterable[Level | None]) -> list[LevelName | None]:
-    """Return the names of levels."""
+    """Return the names of quality levels; None remains None."""
     return [None if level is None else LEVEL_NAMES[level] for level in levels]
 
 
@@ -327,7 +327,7 @@ PLACES: dict[PlaceName, int] = {
 
 
 def reading_model(name: str, reading: Reading) -> ReadingModel:
-    """Return a reading with unit and label from the catalogue."""
+    """Return the API model of a reading, with unit and label from the catalogue."""
     quantity = BY_NAME[name]
     return ReadingModel(
         value=reading.value,
@@ -351,7 +351,7 @@ def _uncertainty(reading: Reading) -> UncertaintyModel | None:
 
 
 def window_model(window: AveragingWindow) -> WindowModel:
-    """Return the samples of a result."""
+    """Return the API model of an averaging window."""
     return WindowModel.of(window, last_index=window.stop_index - 1)
 
 
@@ -359,14 +359,14 @@ STATE_NAMES = {state: cast("OperatingStateName", state.name.lower()) for state i
 
 
 def states_named(names: list[OperatingStateName] | None) -> tuple[OperatingState, ...]:
-    """Return operating states by name; none selects all."""
+    """Return the operating states with the given names; without names, an empty tuple for all."""
     return tuple(OperatingState[name.upper()] for name in names or ())
 
 
 def condition_model(
     time_ns: int, condition: BearingCondition, grid: CellGrid
 ) -> FilmConditionModel:
-    """Return the operating condition of a bearing."""
+    """Return the API model of the operating condition of a bearing."""
     cell = None if condition.cell is None else cell_model(condition.cell, grid)
     return FilmConditionModel.of(
         condition, time=time_ns, operating_state=condition.state, cell=cell
@@ -374,7 +374,7 @@ def condition_model(
 
 
 def cell_of(point: OperatingPoint, grid: CellGrid) -> CellModel | None:
-    """Return the cell of a point; None if one of its axes is unknown."""
+    """Return the cell of an operating point; None if a coordinate of the point is unknown."""
     axes = (point.eccentricity_ratio, point.oil_temperature_c, point.attitude_deg)
     here = FilmConditions.one(*(math.nan if value is None else value for value in axes))
     if not grid.is_known(here)[0]:
@@ -383,7 +383,7 @@ def cell_of(point: OperatingPoint, grid: CellGrid) -> CellModel | None:
 
 
 def cell_model(cell: Cell, grid: CellGrid) -> CellModel:
-    """Return the bounds of a cell."""
+    """Return the API model of a cell: the bounds on each axis."""
     eccentricity, temperature, *attitude = cell
     low_e, high_e = bounds(eccentricity, grid.eccentricity_width)
     low_c, high_c = bounds(temperature, grid.temperature_width_c)
@@ -400,10 +400,10 @@ def cell_model(cell: Cell, grid: CellGrid) -> CellModel:
 
 
 def bounds(number: int, width: float) -> tuple[float, float]:
-    """Return the bounds of a bin, rounded."""
+    """Return the lower and upper bound of a bin, rounded to 9 decimals."""
     return round(number * width, 9), round((number + 1) * width, 9)
 
 
 def listed(values: FloatArray) -> list[float | None]:
-    """Return values with None in place of NaN."""
+    """Return the values of an array as a list, with None in place of NaN."""
     return [None if np.isnan(value) else value for value in values.tolist()]

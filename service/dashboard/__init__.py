@@ -1,1 +1,1 @@
-"""The dashboard: static pages over the HTTP API, no build step."""
+"""Dashboard: static pages that use the HTTP API; they need no build step."""

@@ -1,4 +1,4 @@
-"""Files of the dashboard in memory, with media types, entity tags and their edition."""
+"""Files of the dashboard in memory, with media types, entity tags and a common edition."""
 
 import gzip
 import hashlib
@@ -22,30 +22,30 @@ MEDIA_TYPES = {
 
 @dataclass(frozen=True)
 class Asset:
-    """A file of the dashboard."""
+    """File of the dashboard: content and media type."""
 
     body: bytes
     media_type: str
 
     @cached_property
     def etag(self) -> str:
-        """Entity tag that changes whenever a byte of the file does."""
+        """Entity tag: a hash of the content, in quotation marks."""
         return f'"{hashlib.sha256(self.body).hexdigest()[:32]}"'
 
     @cached_property
     def gzipped(self) -> bytes:
-        """The file compressed by gzip."""
+        """Content compressed by gzip."""
         return gzip.compress(self.body, mtime=0)
 
 
 @cache
 def pages() -> dict[str, Asset]:
-    """Read the files of the dashboard, and make those with tables of the program.
+    """Read the files of the dashboard, and generate ``alarm_kinds.js`` from `ALARM_KINDS`.
 
     Returns
     -------
     dict of str to Asset
-        By path below ``static/``, for example ``charts/trend.js``.
+        Files by path below ``static/``, for example ``charts/trend.js``.
     """
     kinds = Asset(_alarm_kinds().encode(), MEDIA_TYPES["js"])
     return dict(_below(files("service.dashboard") / "static", "")) | {"alarm_kinds.js": kinds}
@@ -60,9 +60,9 @@ def plotly() -> Asset:
 
 @cache
 def edition() -> str:
-    """Return the edition of program, chart library and files, such as ``0.6.0-1f2e3d4c``.
+    """Return the program version and a hash of all files, such as ``0.6.0-1f2e3d4c``.
 
-    An open page compares it with the edition of answers and so detects an upgrade.
+    An open page compares its edition with that of new answers and so detects an upgrade.
     """
     tags = "".join(f"{path} {asset.etag}" for path, asset in sorted(pages().items()))
     tags += version("plotly")
@@ -70,7 +70,7 @@ def edition() -> str:
 
 
 def _alarm_kinds() -> str:
-    """Return a JavaScript module with the kinds of alarms by name."""
+    """Return the source of a JavaScript module with the table of alarm kinds by name."""
     table = {
         name: {key: getattr(kind, key) for key in ("label", "subject", "rule", "advice")}
         for name, kind in ALARM_KINDS.items()

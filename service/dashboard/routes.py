@@ -1,4 +1,4 @@
-"""Routes of the dashboard: the page, its files, and the chart library."""
+"""Routes of the dashboard: the page, its static files, and the chart library."""
 
 from functools import cache
 
@@ -15,29 +15,29 @@ SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
 }
-"""Scripts from this server only; plotly adds style elements, hence the inline styles."""
+"""Security headers: scripts from this server only; inline styles, because plotly adds them."""
 
 REVALIDATE = "no-cache"
-"""Cache control of the page, which names the files of the running edition."""
+"""Cache-Control header of the page; the page links to the files of the running edition."""
 
 KEEP = "public, max-age=31536000, immutable"
-"""Cache control of the files, whose paths contain their edition."""
+"""Cache-Control header of the files; their paths contain the edition."""
 
 
 def files() -> str:
-    """Return the path of the files of this edition."""
+    """Return the URL path below which the files of the running edition are served."""
     return f"/static/{edition()}/"
 
 
 @cache
 def index() -> Asset:
-    """Return the page, which names the files of this edition."""
+    """Return ``index.html`` with links to the files of the running edition."""
     page = pages()["index.html"]
     return Asset(page.body.replace(b"/static/", files().encode()), page.media_type)
 
 
 def dashboard_router() -> APIRouter:
-    """Build the routes ``/``, ``/static/EDITION/…`` and ``/static/EDITION/plotly.min.js``."""
+    """Return a router for ``/``, ``/static/EDITION/…`` and ``/static/EDITION/plotly.min.js``."""
     router = APIRouter(include_in_schema=False, dependencies=[OPEN])
     router.add_api_route("/", _index)
     router.add_api_route(f"{files()}plotly.min.js", _plotly)
@@ -54,7 +54,7 @@ async def _index(request: Request) -> Response:
 
 
 def _plotly(request: Request) -> Response:
-    """Return the chart library, in a thread: the first call compresses five megabytes."""
+    """Return the chart library, from a thread, because the first call compresses 5 MB."""
     return _sent(plotly(), request, KEEP)
 
 

@@ -1,1 +1,1 @@
-"""Authentication and authorisation between the HTTP server and the routes."""
+"""Authentication of callers and authorisation of their requests."""

@@ -1,4 +1,4 @@
-"""Accounts of people and keys of machines, for admins."""
+"""Routes for admins: accounts of people and API keys of machines."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -40,7 +40,7 @@ UnitName = Annotated[str, Field(max_length=32, examples=["U1"])]
 
 
 class AccountModel(ApiModel):
-    """An account of a person."""
+    """Account of a person."""
 
     name: Annotated[str, Field(examples=["anna"])]
     """Login name."""
@@ -49,10 +49,10 @@ class AccountModel(ApiModel):
     """Role of the account."""
 
     created: Time
-    """Time when it was added."""
+    """Time of creation of the account."""
 
     password_set: Time
-    """Time when its password was set."""
+    """Time when the password was last set."""
 
 
 class NewAccountModel(RequestModel):
@@ -65,25 +65,25 @@ class NewAccountModel(RequestModel):
     """Role of the account."""
 
     password: Password
-    """Its first password: 12 to 256 characters, at least 6 different ones."""
+    """First password of the account: 12 to 256 characters, at least 6 different characters."""
 
 
 class SetRoleModel(RequestModel):
     """Request to change a role."""
 
     role: Annotated[RoleName, Field(examples=["engineer"])]
-    """Role from the next request on."""
+    """New role, effective from the next request of the account."""
 
 
 class SetPasswordModel(RequestModel):
     """Request to set a password."""
 
     password: Password
-    """The new password: 12 to 256 characters, at least 6 different ones."""
+    """New password: 12 to 256 characters, at least 6 different characters."""
 
 
 class KeyModel(ApiModel):
-    """A key of a machine, without its secret."""
+    """API key of a machine, without its secret."""
 
     id: Annotated[str, Field(examples=["5f0c6f3a9b1e"])]
     """Public part of the key."""
@@ -92,10 +92,10 @@ class KeyModel(ApiModel):
     """Name of the key."""
 
     role: Annotated[RoleName, Field(examples=["viewer"])]
-    """Role of the machine."""
+    """Role of the machine that uses the key."""
 
     units: Annotated[list[str], Field(examples=[["U1", "U2"]])]
-    """Units that it is valid for; empty for all."""
+    """Units for which the key is valid; empty if it is valid for all units."""
 
     state: Literal["valid", "expired", "revoked"]
     """State of the key."""
@@ -107,10 +107,10 @@ class KeyModel(ApiModel):
     """Time of expiry."""
 
     used: Time | None
-    """Time of last use, to a minute; null if never used."""
+    """Time of last use, accurate to a minute; null if the key was never used."""
 
     revoked: Time | None
-    """Time of revocation; null if not revoked."""
+    """Time of revocation; null if the key is not revoked."""
 
 
 class NewKeyModel(RequestModel):
@@ -120,35 +120,35 @@ class NewKeyModel(RequestModel):
     """Name of the key: a-z 0-9 . _ @ -."""
 
     role: Annotated[RoleName, Field(examples=["viewer"])]
-    """Role of the machine."""
+    """Role of the machine that uses the key."""
 
     units: Annotated[list[UnitName], FailFast(), Field(max_length=200, default_factory=list)]
-    """Units that it is valid for; empty for all."""
+    """Units for which the key is valid; empty if it is valid for all units."""
 
     days: Annotated[int, Field(ge=1, le=MAX_DAYS, examples=[365])] = 365
     """Validity in days."""
 
 
 class CreatedKeyModel(KeyModel):
-    """A new key."""
+    """New API key, with its secret."""
 
     key: Annotated[str, Field(examples=["pw_5f0c6f3a9b1e_…"])]
-    """The key itself, shown once and not stored."""
+    """Complete key with its secret, contained in this answer only and not stored."""
 
 
 def account_model(account: Account) -> AccountModel:
-    """Return an account without the hash of its password."""
+    """Return the API model of an account, without its password hash."""
     return AccountModel.of(account, password_set=account.password_ns)
 
 
 @contextmanager
 def refusals_as_problems(password: str = "password") -> Iterator[None]:  # noqa: S107
-    """Turn refusals of names, passwords, accounts and keys into problems.
+    """Convert errors of names, passwords, accounts and keys to `ProblemError`.
 
     Parameters
     ----------
     password
-        Name of the parameter with the new password.
+        Name of the request parameter that contains the new password.
     """
     try:
         yield
@@ -179,7 +179,7 @@ CHANGE_PROBLEMS = problem_responses(
 
 
 def account_router(authenticator: Authenticator) -> APIRouter:
-    """Return the routes of accounts."""
+    """Return the router for accounts."""
     stored, people, work, now_ns = (
         authenticator.store.accounts,
         authenticator.people,
@@ -191,12 +191,12 @@ def account_router(authenticator: Authenticator) -> APIRouter:
 
     @router.get("", summary="Accounts", responses=problem_responses(503))
     async def accounts() -> list[AccountModel]:
-        """List all accounts by name."""
+        """List all accounts, sorted by name."""
         return [account_model(account) for account in await work.run(stored.all)]
 
     @router.post("", summary="Add an account", status_code=201, responses=CHANGE_PROBLEMS)
     async def add(asked: NewAccountModel) -> AccountModel:
-        """Add an account with a password to change at the first login."""
+        """Add an account; its password must be changed at the first login."""
         new = asked.name, Role(asked.role), asked.password
         with refusals_as_problems():
             name = await work.run_hashing(lambda: people.add(*new, now_ns(), must_change=True))
@@ -204,7 +204,7 @@ def account_router(authenticator: Authenticator) -> APIRouter:
 
     @router.put("/{name}/role", summary="Change a role", responses=CHANGE_PROBLEMS)
     async def set_role(name: AccountName, asked: SetRoleModel) -> AccountModel:
-        """Change the role of an account from its next request on."""
+        """Change the role of an account, effective from its next request."""
         await _one(authenticator, name)
         with refusals_as_problems():
             await work.run(lambda: stored.set_role(name, Role(asked.role), now_ns()))
@@ -214,7 +214,10 @@ def account_router(authenticator: Authenticator) -> APIRouter:
     async def set_password(
         request: Request, name: AccountName, asked: SetPasswordModel
     ) -> AccountModel:
-        """Set the password of another account, to change at the next login; its sessions end."""
+        """Set the password of another account and end its sessions.
+
+        The person must change this password at the next login.
+        """
         if _is_own(request, name):
             detail = "change your own password with POST /session/password"
             raise ProblemError(409, "Does not fit", detail)
@@ -228,7 +231,7 @@ def account_router(authenticator: Authenticator) -> APIRouter:
         "/{name}", summary="Remove an account", status_code=204, responses=CHANGE_PROBLEMS
     )
     async def remove(request: Request, name: AccountName) -> None:
-        """Remove an account and end its sessions; the own account cannot be removed."""
+        """Remove an account and end its sessions; callers cannot remove their own account."""
         if _is_own(request, name):
             raise ProblemError(409, "Does not fit", "you cannot remove your own account")
         await _one(authenticator, name)
@@ -239,7 +242,7 @@ def account_router(authenticator: Authenticator) -> APIRouter:
 
 
 def _is_own(request: Request, name: str) -> bool:
-    """Whether an account is that of the caller."""
+    """Whether the caller has logged in with an account of this name."""
     identity = identity_of(request)
     return identity.means is Means.SESSION and identity.name == name
 
@@ -257,20 +260,20 @@ KeyId = Annotated[
 
 
 def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
-    """Return the routes of keys."""
+    """Return the router for API keys."""
     stored, work, clock = authenticator.store.keys, authenticator.work, authenticator.clock
     router = subject_router("/keys", "access", Permission.CHANGE_ACCESS, Reach.NO_UNIT)
     router.dependencies.append(Depends(name_caller))
 
     @router.get("", summary="Keys", responses=problem_responses(503))
     async def keys() -> list[KeyModel]:
-        """List all keys that were ever created, oldest first, without their secrets."""
+        """List all keys, also expired and revoked keys, oldest first, without their secrets."""
         keys, now_ns = await work.run(stored.all), clock.now_ns()
         return [KeyModel.of(key, state=key.state(now_ns)) for key in keys]
 
     @router.post("", summary="Create a key", status_code=201, responses=CHANGE_PROBLEMS)
     async def create(asked: NewKeyModel) -> CreatedKeyModel:
-        """Create a key for a machine and show it once."""
+        """Create a key for a machine; its secret is contained in this answer only."""
         for unit in asked.units:
             if unit not in context.units:
                 detail = "there is no such unit in this plant"
@@ -282,7 +285,7 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
 
     @router.delete("/{key}", summary="Revoke a key", status_code=204, responses=CHANGE_PROBLEMS)
     async def revoke(key: KeyId) -> None:
-        """Revoke a key permanently; repeating the request changes nothing."""
+        """Revoke a key permanently; the request is idempotent."""
         if await work.run(lambda: stored.get(key)) is None:
             raise ProblemError(404, "Unknown key", "there is no such key")
         await work.run(lambda: stored.revoke(key, clock.now_ns()))

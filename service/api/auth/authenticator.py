@@ -1,4 +1,4 @@
-"""Logins, and identification of callers."""
+"""Authentication: logins, and identification of callers by session cookie or API key."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -39,7 +39,7 @@ def immediately(note: Callable[[], None]) -> None:
 
 @dataclass(frozen=True)
 class LoggedIn:
-    """A successful login.
+    """Result of a successful login.
 
     Parameters
     ----------
@@ -53,26 +53,26 @@ class LoggedIn:
 
 @dataclass(frozen=True)
 class NotLoggedIn:
-    """A failed login: wrong name, wrong password or a wait, without saying which.
+    """Result of a failed login; wrong names and wrong passwords are not distinguished.
 
     Parameters
     ----------
     wait_s
-        Time until the next attempt is checked; 0 if this one was.
+        Time until a login may be tried again, s; 0 if this attempt was checked.
     """
 
     wait_s: float = 0.0
 
 
 class CredentialChecker:
-    """Checks passwords, sessions and keys. It blocks while hashing: call it from a thread.
+    """Checker of passwords, sessions and keys. Its methods block: call them from a thread.
 
     Parameters
     ----------
     store
         Accounts, sessions and keys.
     note
-        Runs writes of times of use, by default immediately; a login does not depend on them.
+        Runs writes of last-use times and of expired sessions; by default immediately.
     """
 
     def __init__(
@@ -90,16 +90,16 @@ class CredentialChecker:
     def log_in(
         self, name: str, password: str, peer: str, now_ns: int, ticks_ns: int
     ) -> LoggedIn | NotLoggedIn:
-        """Start a session for the right password of an account.
+        """Check the password of an account; start a session if it is correct.
 
         Parameters
         ----------
         peer
             Address of the client.
         now_ns
-            Time by the host's clock.
+            Time by the host's clock, ns since 1970.
         ticks_ns
-            Monotonic time.
+            Monotonic time, ns.
         """
         name = tidy_name(name)
         if wait_s := self._backoff.attempt(name, peer, ticks_ns):
@@ -114,12 +114,12 @@ class CredentialChecker:
         return LoggedIn(token, _person(account))
 
     def log_out(self, token: str) -> None:
-        """End a session; an ended one is ignored."""
+        """End the session of a token; an unknown token is ignored."""
         if is_token(token):
             self._store.sessions.end(digest(token))
 
     def person(self, token: str, now_ns: int) -> Identity | None:
-        """Return the identity of a session token; None if it is unknown or expired."""
+        """Return the identity of a session token; None if the session is unknown or expired."""
         found = self._store.sessions.get(digest(token)) if is_token(token) else None
         if found is None:
             return None
@@ -132,7 +132,7 @@ class CredentialChecker:
         return _person(account)
 
     def machine(self, key: str, now_ns: int) -> Identity | None:
-        """Return the identity of a key; None if it is unknown, expired or revoked."""
+        """Return the identity of an API key; None if the key is unknown, expired or revoked."""
         id_ = key_id(key)
         stored = None if id_ is None else self._store.keys.get(id_)
         if stored is None or not is_token_of(key, stored.digest):
@@ -170,10 +170,10 @@ def _person(account: Account) -> Identity:
 
 
 COOKIE = "__Host-padwatch"
-"""Cookie that browsers accept only from a secure origin, for that host and every path."""
+"""Name of the session cookie over HTTPS; ``__Host-`` restricts it to one host and to HTTPS."""
 
 PLAIN_COOKIE = "padwatch"
-"""Cookie over plain HTTP: some browsers reject a secure cookie from loopback."""
+"""Name of the session cookie over HTTP: some browsers reject secure cookies from loopback."""
 
 BEARER = "bearer"
 
@@ -181,7 +181,7 @@ Headers = Iterable[tuple[bytes, bytes]]
 
 
 class Kind(Enum):
-    """Kind of credentials."""
+    """Kind of the credentials in a request."""
 
     NOTHING = auto()
     SESSION = auto()
@@ -220,7 +220,7 @@ def credentials_of(headers: Headers, scheme: str) -> Credentials:
 
 
 def _keys(values: Iterable[str]) -> Iterator[str]:
-    """Yield bearer keys; other schemes belong to the login of a proxy."""
+    """Yield the bearer keys of Authorization headers; other schemes are for a proxy's login."""
     for value in values:
         scheme, _, key = value.partition(" ")
         if scheme.lower() == BEARER:
@@ -246,16 +246,16 @@ def is_from_here(scope: Scope) -> bool:
 
 @dataclass(frozen=True)
 class Caller:
-    """Sender of a request.
+    """Sender of a request, authenticated or not.
 
     Parameters
     ----------
     identity
-        Identity; None if unauthenticated.
+        Identity of the caller; None if unauthenticated.
     shown
-        Credentials, valid or not.
+        Credentials in the request, valid or not.
     must_log_in
-        Whether requests from that address need a login.
+        Whether requests from the caller's address require a login.
     """
 
     identity: Identity | None
@@ -264,7 +264,7 @@ class Caller:
 
 
 class Authenticator:
-    """Identifies callers and logs people in, without blocking the event loop.
+    """Asynchronous authentication of callers; blocking operations run in threads.
 
     Parameters
     ----------
@@ -273,7 +273,7 @@ class Authenticator:
     local_role
         Role of callers on this computer without credentials; None if they must log in.
     hashing
-        Password hashing; default: argon2id with the present parameters.
+        Password hasher; default: argon2id with the current parameters.
     """
 
     def __init__(
@@ -306,7 +306,7 @@ class Authenticator:
         return Caller(identity, shown, must_log_in=local_role is None)
 
     async def log_in(self, name: str, password: str, peer: str) -> LoggedIn | NotLoggedIn:
-        """Start a session for the right password of an account.
+        """Check the password of an account; start a session if it is correct.
 
         Raises
         ------
@@ -320,7 +320,7 @@ class Authenticator:
         )
 
     async def log_out(self, token: str) -> None:
-        """End a session; an ended one is ignored."""
+        """End the session of a token; an unknown token is ignored."""
         await self.work.run(lambda: self._checker.log_out(token))
 
     async def set_up(self, token: str, name: str, password: str) -> bool:
@@ -329,7 +329,7 @@ class Authenticator:
         Raises
         ------
         NameRefusedError, PasswordRefusedError, TooManyLoginsError
-            If one is not accepted, or there are too many concurrent logins.
+            If the name or password is rejected, or there are too many concurrent logins.
         """
         now_ns = self.clock.now_ns()
         return await self.work.run_hashing(
@@ -337,18 +337,18 @@ class Authenticator:
         )
 
     async def offer_set_up(self) -> str | None:
-        """Return a token for creating the first account; None if none is needed."""
+        """Return a set-up token for the first account; None if no set-up is needed."""
         if self.local_role is Role.ADMIN:
             return None
         now_ns = self.clock.now_ns()
         return await self.work.run(lambda: self.people.offer_set_up(now_ns))
 
     async def has_accounts(self) -> bool:
-        """Whether there is an account."""
+        """Whether any account exists."""
         return bool(await self.work.run(self.store.accounts.all))
 
     def close(self) -> None:
-        """Stop the threads; no further request is served."""
+        """Shut down the threads; no request can be authenticated afterwards."""
         self.work.close()
 
     async def _proven(self, shown: Credentials) -> Identity | None:

@@ -1,4 +1,4 @@
-"""Waits after failed logins, by account and by address of the client."""
+"""Exponential backoff after failed logins, by account and by client address."""
 
 from collections import OrderedDict
 from collections.abc import Hashable
@@ -9,21 +9,21 @@ from threading import Lock
 NS_PER_S = 1_000_000_000
 MAX_REMEMBERED = 4096
 IPV6_NETWORK_BITS = 64
-"""Prefix of an IPv6 address that counts as one client."""
+"""Length of the IPv6 prefix that identifies one client, bits."""
 
 
 @dataclass(frozen=True)
 class WaitRule:
-    """Growth of waits.
+    """Parameters of an exponential backoff.
 
     Parameters
     ----------
     n_free
-        Failures without a wait; the next waits 1 s, each further one twice as long.
+        Number of attempts without a wait; then the wait is 1 s and doubles with each failure.
     longest_s
-        Maximum wait.
+        Maximum wait, s.
     forget_s
-        Time without a failure after which all are forgotten.
+        Time without a failure after which the number of failures is reset, s.
     """
 
     n_free: int
@@ -31,7 +31,7 @@ class WaitRule:
     forget_s: float = 3600.0
 
     def wait_ns(self, n_failures: int) -> int:
-        """Return the wait after a number of failures."""
+        """Return the wait after a number of consecutive failures, ns."""
         if n_failures < self.n_free:
             return 0
         doubled_s = 2.0 ** min(n_failures - self.n_free, 30)
@@ -39,27 +39,27 @@ class WaitRule:
 
 
 ACCOUNT_RULE = WaitRule(n_free=5, longest_s=60.0)
-"""Waits of an account; short, so that failures of others do not lock a person out."""
+"""Backoff of an account; short, so that failures of attackers do not lock out its owner."""
 
 PEER_RULE = WaitRule(n_free=10, longest_s=900.0)
-"""Waits of an address; more failures are free, since a control room may share one."""
+"""Backoff of an address; it tolerates more failures, since a control room may share one address."""
 
 
 @dataclass(frozen=True)
 class Failures:
-    """Number of consecutive failures and time of the newest."""
+    """Number of consecutive failures, and time of the newest failure."""
 
     number: int
     newest_ns: int
 
 
 class Backoff:
-    """Recent failed logins, in bounded memory, safe for several threads.
+    """Thread-safe backoff of logins, with a limited number of remembered failures.
 
-    Failures from elsewhere do not delay an account at addresses from which it has logged in since
-    the service started.
+    Failures at other addresses do not delay an account at an address from which it has logged in
+    since the service started.
 
-    Times are monotonic.
+    All times are monotonic.
     """
 
     def __init__(
@@ -78,8 +78,8 @@ class Backoff:
         """Return the wait before a login may be tried, s; 0 if it may be tried now.
 
         An attempt counts as a failure until it succeeds, so that concurrent attempts all count.
-        Unknown names count too, so that waits reveal nothing. An attempt that must wait does not
-        count.
+        Unknown names count too, so that waits do not reveal which accounts exist. An attempt that
+        must wait does not count.
         """
         place = client_of(peer)
         with self._lock:
@@ -87,21 +87,22 @@ class Backoff:
             account_ns = 0 if is_known else self._accounts.wait(name, now_ns)
             if wait_ns := max(account_ns, self._peers.wait(place, now_ns)):
                 return wait_ns / NS_PER_S
-            if place:  # clients of a proxy that forwards no address share one
+            if place:  # empty for all clients of a proxy that forwards no address
                 self._peers.add(place, now_ns)
             if not is_known:
                 self._accounts.add(name, now_ns)
         return 0.0
 
     def knows(self, name: str, peer: str) -> bool:
-        """Whether an account has logged in from a peer since the service started."""
+        """Whether an account has logged in from an address since the service started."""
         with self._lock:
             return (name, client_of(peer)) in self._known
 
     def succeeded(self, name: str, peer: str) -> None:
-        """Remember the address of a login; earlier failures of that address remain.
+        """Reset the failures of an account after a login, and remember its address.
 
-        Otherwise the owner of one account could try others without limit by logging in between.
+        Earlier failures of the address still count. Otherwise the owner of one account could try
+        passwords of other accounts without limit by logging in between.
         """
         place = client_of(peer)
         with self._lock:
@@ -114,7 +115,7 @@ class Backoff:
 
 
 class FailureCounts:
-    """Failures by account or address; the least recently used is forgotten first."""
+    """Failures by account or by address; the entry that is unchanged longest is evicted first."""
 
     def __init__(self, rule: WaitRule, max_remembered: int) -> None:
         self._rule, self._max_remembered = rule, max_remembered
@@ -124,14 +125,14 @@ class FailureCounts:
         return len(self._failures)
 
     def wait(self, key: Hashable, now_ns: int) -> int:
-        """Return the time until the next attempt, ns."""
+        """Return the time until the next attempt is allowed, ns; 0 if it is allowed now."""
         found = self._recent(key, now_ns)
         if found is None:
             return 0
         return max(0, found.newest_ns + self._rule.wait_ns(found.number) - now_ns)
 
     def add(self, key: Hashable, now_ns: int) -> None:
-        """Count a failure."""
+        """Add one failure of an account or address."""
         before = self._recent(key, now_ns)
         self._failures[key] = Failures((before.number if before else 0) + 1, now_ns)
         self._failures.move_to_end(key)
@@ -139,13 +140,13 @@ class FailureCounts:
             self._failures.popitem(last=False)
 
     def revoke_again(self, key: Hashable) -> None:
-        """Count one failure less."""
+        """Subtract one failure of an account or address."""
         found = self._failures.pop(key, None)
         if found is not None and found.number > 1:
             self._failures[key] = Failures(found.number - 1, found.newest_ns)
 
     def forget(self, key: Hashable) -> None:
-        """Forget the failures."""
+        """Delete all failures of an account or address."""
         self._failures.pop(key, None)
 
     def _recent(self, key: Hashable, now_ns: int) -> Failures | None:
@@ -156,7 +157,7 @@ class FailureCounts:
 
 
 def client_of(peer: str) -> str:
-    """Return the client of an address: an IPv4 address, an IPv6 network, or the text itself."""
+    """Return the client of a peer address: IPv4 address, IPv6 network, or the text itself."""
     try:
         address = ip_address(peer.partition("%")[0])
     except ValueError:

@@ -1,4 +1,4 @@
-"""Permissions that routes declare; the service does not start if a declaration is missing."""
+"""Permissions that routes declare; a missing declaration prevents the start of the service."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,21 +15,21 @@ from service.store.access.identities import Permission
 
 
 class Reach(StrEnum):
-    """Units that a route concerns if its path contains none."""
+    """Units that a route concerns if its path contains no unit."""
 
     PLANT = "plant"
-    """All units; refused to a key of some units."""
+    """All units; a key that is limited to some units is refused."""
 
     NO_UNIT = "no_unit"
-    """No unit."""
+    """No unit; a key that is limited to some units can only read."""
 
     ASKED = "asked"
-    """The unit of the parameter ``unit``; all units without it."""
+    """Unit of the query parameter ``unit``; all units if the parameter is absent."""
 
 
 @dataclass(frozen=True)
 class Needs:
-    """Permission and reach that a route requires; an open route requires no permission."""
+    """Permission and reach that a route requires; the permission of an open route is None."""
 
     permission: Permission | None
     reach: Reach = Reach.PLANT
@@ -39,28 +39,28 @@ class Needs:
 
 
 def needs(permission: Permission, reach: Reach = Reach.PLANT) -> Any:
-    """Declare the permission of a route, or of all routes of a router."""
+    """Return a dependency that declares the permission of a route or of all routes of a router."""
     return Depends(Needs(permission, reach))
 
 
 OPEN: Any = Depends(Needs(None, Reach.NO_UNIT))
-"""Declares an open route."""
+"""Dependency that declares an open route."""
 
 
 def subject_router(
     path: str, tag: str, permission: Permission = Permission.READ, reach: Reach = Reach.PLANT
 ) -> APIRouter:
-    """Return a router for one subject; a single route may declare another permission."""
+    """Return a router for one subject; its routes may override the declared permission."""
     return APIRouter(prefix=f"/api/v1{path}", tags=[tag], dependencies=[needs(permission, reach)])
 
 
 class UndeclaredRouteError(Exception):
-    """A route without a declaration; the message names it."""
+    """Raised if a route has no declaration or occurs twice; the message names the route."""
 
 
 @dataclass(frozen=True)
 class Declared:
-    """A route with its requirements."""
+    """Operation of the API: method, path, route and requirements."""
 
     method: str
     path: str
@@ -69,17 +69,17 @@ class Declared:
 
     @property
     def operation(self) -> str:
-        """Method and path."""
+        """Name of the operation: method and path."""
         return f"{self.method} {self.path}"
 
     @property
     def is_open(self) -> bool:
-        """Whether the route is open."""
+        """Whether the operation requires no permission."""
         return self.needs.permission is None
 
     @cached_property
     def query_parameters(self) -> Sequence[str]:
-        """Names of its query parameters."""
+        """Names of the query parameters of the operation."""
         if not isinstance(self.route, APIRoute):
             return ()
         return tuple(dict.fromkeys(_query_names(self.route.dependant)))
@@ -90,12 +90,14 @@ class Declared:
 
 
 def declared(app: FastAPI) -> Mapping[str, Declared]:
-    """Return the requirements of each operation of an application, by method and path.
+    """Return the operations of an application with their requirements, by method and path.
+
+    The declaration of a route overrides the declaration of its router.
 
     Raises
     ------
     UndeclaredRouteError
-        If a route has no declaration. The declaration of a route overrides that of its router.
+        If a route has no declaration, or an operation occurs twice.
     """
     found: dict[str, Declared] = {}
     for one in _all(app):
@@ -106,10 +108,10 @@ def declared(app: FastAPI) -> Mapping[str, Declared]:
 
 
 def allowed_methods(operations: Iterable[Declared], path: str) -> list[str]:
-    """Return the methods of a path; none for an unknown path.
+    """Return the allowed HTTP methods of a path; an empty list for an unknown path.
 
-    Of two matching templates, such as `/x/{version}` and `/x/freeze`, the one with fewer
-    parameters counts.
+    If several path templates match, such as `/x/{version}` and `/x/freeze`, the template with
+    fewest parameters applies.
     """
     fitting = [operation for operation in operations if operation.matches(path)]
     n_parameters = min((operation.path.count("{") for operation in fitting), default=0)
@@ -138,7 +140,7 @@ def _needs_in(dependencies: Sequence[Any]) -> list[Needs]:
 
 
 def _query_names(dependant: Dependant) -> Iterator[str]:
-    """Yield the names of query parameters of an operation and of its dependencies."""
+    """Yield the names of the query parameters of an operation and of its dependencies."""
     for field in dependant.query_params:
         yield field.alias
     for inner in dependant.dependencies:

@@ -1,4 +1,4 @@
-"""Identification of callers before all routes, and the check of their permissions."""
+"""Middleware that authenticates callers, and the check of their permissions by route."""
 
 from collections.abc import Callable, Iterable, Mapping
 from urllib.parse import urlsplit
@@ -14,23 +14,23 @@ from service.store.access.identities import LOCAL, Identity
 from service.store.port import StoreError
 
 SAFE = ("GET", "HEAD", "OPTIONS")
-"""Methods that change nothing."""
+"""Safe HTTP methods, which change no state."""
 
 OWN_SITES = (b"same-origin", b"none")
-"""Values of `Sec-Fetch-Site` for pages of the dashboard and for typed addresses."""
+"""Values of `Sec-Fetch-Site` in requests of dashboard pages and of typed addresses."""
 
 
 def is_foreign(scheme: str, headers: Iterable[tuple[bytes, bytes]], requires_origin: bool) -> bool:
     """Whether a request may come from a page of another origin (cross-site request forgery).
 
-    Browsers send cookies, and can reach loopback, for pages of any site.
+    Browsers send cookies with requests of pages of any site, and let these pages reach loopback.
 
     Parameters
     ----------
     scheme
         Scheme of the request.
     requires_origin
-        Whether a request without headers of its origin counts as foreign; browsers send them.
+        Whether a request without headers ``Origin`` and ``Sec-Fetch-Site`` counts as foreign.
     """
     found = list(headers)
     hosts = _all(found, b"host")
@@ -51,23 +51,23 @@ def _is_own(origin: bytes, scheme: str, hosts: list[bytes]) -> bool:
         given = urlsplit(origin.decode("ascii"))
     except ValueError:
         return False
-    # behind a proxy that terminates TLS the page has https and the request http
+    # behind a proxy that terminates TLS, the page uses https and the request http
     is_scheme = given.scheme in (scheme, "https")
     return is_scheme and len(hosts) == 1 and given.netloc.encode() == hosts[0]
 
 
 BEARER_ONLY = {"WWW-Authenticate": 'Bearer realm="padwatch"'}
-"""Scheme for which browsers open no login dialog."""
+"""Header of answers with status 401; browsers open no login dialog for the scheme Bearer."""
 
 
 def not_logged_in() -> ProblemError:
-    """Return the problem of an unauthenticated request."""
+    """Return the error for an unauthenticated request, status 401."""
     detail = "log in, or send a key that is valid"
     return ProblemError(401, "Not logged in", detail, headers=BEARER_ONLY)
 
 
 def not_this_unit() -> ProblemError:
-    """Return the problem of a key that is not valid for the unit."""
+    """Return the error for a key that is not valid for the requested unit, status 403."""
     detail = "this key is valid for some units only; request one of them"
     return ProblemError(403, "Not allowed", detail)
 
@@ -75,16 +75,16 @@ def not_this_unit() -> ProblemError:
 CHANGE_PASSWORD = "POST /api/v1/session/password"  # noqa: S105  an operation
 
 CALLER = "caller"
-"""Key of the caller in the state of a request."""
+"""Key of the caller in the ``state`` of a request scope."""
 
 
 class Gate:
-    """ASGI middleware that identifies callers; unauthenticated ones reach open routes only.
+    """ASGI middleware that authenticates callers; unauthenticated callers reach only open routes.
 
     Parameters
     ----------
     declared
-        Returns the requirements of each operation.
+        Function that returns the operations of the application with their requirements.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Gate:
         self._app, self._declared, self._desk = app, declared, authenticator
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward an admitted request."""
+        """Forward a request, or answer with a problem if the caller is not admitted."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
@@ -128,7 +128,7 @@ class Gate:
 
 
 def _require_own_page(scope: Scope, caller: Caller) -> None:
-    """Refuse changes requested by a page of another origin."""
+    """Raise an error if a page of another origin requests a change."""
     if scope["method"] in SAFE or caller.shown.kind is Kind.KEY:
         return
     requires_origin = caller.shown.kind is not Kind.NOTHING
@@ -175,7 +175,7 @@ async def require_declared(request: Request) -> None:
 
 
 def identity_of(request: Request) -> Identity:
-    """Return the identity of the caller."""
+    """Return the identity of an authenticated caller; otherwise raise an error."""
     identity = caller_of(request).identity
     if identity is None:
         raise not_logged_in()
@@ -183,7 +183,7 @@ def identity_of(request: Request) -> Identity:
 
 
 def _unit_of(parameters: Mapping[str, str]) -> str | None:
-    """Return the unit of a path."""
+    """Return the unit in the path, also as a part of an alarm identifier; None without a unit."""
     if "unit" in parameters:
         return parameters["unit"]
     if "alarm" in parameters:
@@ -192,19 +192,19 @@ def _unit_of(parameters: Mapping[str, str]) -> str | None:
 
 
 def _unit_asked(request: Request) -> str | None:
-    """Return the unit of the query; None without one or with several."""
+    """Return the unit in the query; None if the query contains no unit or several units."""
     units = request.query_params.getlist("unit")
     return units[0] if len(units) == 1 else None
 
 
 def actor_or(given: str | None) -> str:
-    """Return the authenticated name, else the given one, else the local name."""
+    """Return the name of the actor: authenticated name, else given name, else `LOCAL`."""
     return acting().actor or given or LOCAL
 
 
 async def name_caller(request: Request) -> None:
-    """Record the name of the caller for the audit trail, also without a login.
+    """Set the caller as the actor of audit entries, also for callers without a login.
 
-    It is a coroutine: a plain function would run in a thread, with a context of its own.
+    The function is a coroutine, since a plain dependency runs in a thread with a separate context.
     """
     name_actor(identity_of(request).actor)

@@ -1,4 +1,4 @@
-"""Passwords: rules, argon2id hashes, and the threads that make them."""
+"""Password rules, argon2id hashes, and the thread pools that compute the hashes."""
 
 import asyncio
 import unicodedata
@@ -22,32 +22,32 @@ MIN_DIFFERENT = 6
 TIME_COST = 3
 MEMORY_KIB = 65_536
 PARALLELISM = 4
-"""The second recommendation of RFC 9106, section 4: three passes over 64 MiB in four lanes."""
+"""Argon2id parameters, second recommendation of RFC 9106, section 4: 3 passes, 64 MiB, 4 lanes."""
 
 MAX_AT_ONCE = 2
-"""Maximum number of concurrent hashes, which limits memory and cores."""
+"""Maximum number of hashes computed concurrently; it limits the use of memory and cores."""
 
 NO_ACCOUNT = "no account has this password"
 
 
 class PasswordRefusedError(ValueError):
-    """A rejected password; the message gives the reason, not the password."""
+    """Raised if a new password is rejected; the message gives the reason, not the password."""
 
 
 def plant_hasher() -> PasswordHasher:
-    """Return argon2id with the present parameters."""
+    """Return an argon2id hasher with the current parameters."""
     return PasswordHasher(time_cost=TIME_COST, memory_cost=MEMORY_KIB, parallelism=PARALLELISM)
 
 
 def new_password(written: str, name: str) -> str:
-    """Check a new password of an account.
+    """Check a new password of an account; return it in Unicode normal form.
 
-    Length counts; there are no rules of composition and none of age (NIST SP 800-63B, 3.1.1).
+    The rules require length, but no classes of characters and no expiry (NIST SP 800-63B, 3.1.1).
 
     Raises
     ------
     PasswordRefusedError
-        If it is too short, too long, has too few different characters, or contains the name.
+        If it is too short or too long, has too few different characters, or contains the name.
     """
     password = _normal(written)
     if not MIN_LENGTH <= len(password) <= MAX_LENGTH:
@@ -62,12 +62,12 @@ def new_password(written: str, name: str) -> str:
 
 
 class Hashing:
-    """Makes and verifies hashes of passwords, a few at a time.
+    """Password hasher that limits the number of concurrent computations.
 
     Parameters
     ----------
     hasher
-        Argon2id with the present parameters; hashes with other parameters are verified too.
+        Argon2id hasher for new hashes; stored hashes with other parameters are verified too.
     """
 
     def __init__(self, hasher: PasswordHasher | None = None) -> None:
@@ -75,7 +75,7 @@ class Hashing:
         self._places = BoundedSemaphore(MAX_AT_ONCE)
 
     def prepare(self) -> None:
-        """Make the hash for unknown accounts, so that the first refusal takes no longer."""
+        """Compute the dummy hash for unknown accounts, so that the first refusal is not slower."""
         _ = self._unused_hash
 
     def hash(self, password: str) -> str:
@@ -84,11 +84,11 @@ class Hashing:
             return self._hasher.hash(_bytes(password))
 
     def verify(self, stored: str | None, password: str) -> bool:
-        """Whether a password matches a stored hash; False, in the same time, without a hash.
+        """Whether a password matches a stored hash; False after the same time if the hash is None.
 
-        An overlong password is hashed up to its limit and does not match.
+        A password above the maximum length is truncated before hashing and does not match.
         """
-        # normalised before it is cut: one character may have several encodings
+        # normalise before truncation: one character may have several encodings
         tried = _bytes(_normal(password)[: MAX_LENGTH + 1])
         with self._places:
             try:
@@ -102,42 +102,42 @@ class Hashing:
         return self._hasher.hash(NO_ACCOUNT)
 
     def is_outdated(self, stored: str) -> bool:
-        """Whether a hash was made with other parameters than the present ones."""
+        """Whether a hash was computed with parameters other than the current ones."""
         return self._hasher.check_needs_rehash(stored)
 
 
 def _normal(password: str) -> str:
-    """Return the normal form of a password (NFKC)."""
+    """Return the Unicode normal form NFKC of a password."""
     return unicodedata.normalize("NFKC", password)
 
 
 def _bytes(password: str) -> bytes:
-    """Return the bytes to hash; lone surrogates, which JSON can carry, are allowed."""
+    """Return the bytes of a password for hashing; lone surrogates, valid in JSON, are allowed."""
     return _normal(password).encode("utf-8", "surrogatepass")
 
 
 log = structlog.get_logger()
 
 MAX_WAITING = 16
-"""Maximum number of passwords hashed or waiting; each takes about a third of a second."""
+"""Maximum number of running and queued hashes; each takes about a third of a second."""
 
 MAX_KNOWN_WAITING = 8
-"""Further places reserved for accounts that have logged in before from the same address."""
+"""Additional queue places for accounts that have logged in before from the same address."""
 
 LOOKUP_THREADS = 2
 
 MAX_NOTES = 64
-"""Maximum number of waiting writes of times of use; more are dropped."""
+"""Maximum number of queued writes of last-use times; further writes are dropped."""
 
 T = TypeVar("T")
 
 
 class TooManyLoginsError(Exception):
-    """Too many passwords wait to be hashed."""
+    """Raised if the queue of passwords to hash is full."""
 
 
 class AccessThreads:
-    """Threads for reads of the store, for hashing, and for writing times of use."""
+    """Thread pools for store access, password hashing, and writes of last-use times."""
 
     def __init__(self) -> None:
         self._lookups = ThreadPoolExecutor(LOOKUP_THREADS, "access")
@@ -148,11 +148,11 @@ class AccessThreads:
         self._note_places = BoundedSemaphore(MAX_NOTES)
 
     async def run(self, look: Callable[[], T]) -> T:
-        """Run a short read of the store in a thread."""
+        """Run a short store operation in a thread; return its result."""
         return await asyncio.wrap_future(self._lookups.submit(copy_context().run, look))
 
     async def run_hashing(self, work: Callable[[], T], is_known: bool = True) -> T:
-        """Run a function that hashes a password in a thread.
+        """Run a function that hashes a password in a thread; return its result.
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class AccessThreads:
         Raises
         ------
         TooManyLoginsError
-            If too many are waiting.
+            If the queue is full.
         """
         places = self._places
         if not places.acquire(blocking=False):
@@ -174,12 +174,12 @@ class AccessThreads:
         return await asyncio.wrap_future(running)
 
     def close(self) -> None:
-        """Start no further work; running work is short."""
+        """Shut down the thread pools and cancel queued work; running work finishes soon."""
         for threads in (self._lookups, self._hashes, self._notes):
             threads.shutdown(wait=False, cancel_futures=True)
 
     def note(self, write: Callable[[], None]) -> None:
-        """Run a write in a thread; it may fail, which is logged."""
+        """Run a write in a thread without waiting for it; a failure is logged."""
         if self._note_places.acquire(blocking=False):
             running = self._notes.submit(_tried, write)
             running.add_done_callback(lambda _: self._note_places.release())

@@ -1,4 +1,4 @@
-"""Changes of accounts and keys, and the first account."""
+"""Changes of accounts and API keys, and creation of the first account."""
 
 from collections.abc import Sequence
 
@@ -18,11 +18,11 @@ from service.store.access.tables import AccessRefusedError, AccessStore
 
 NS_PER_S = 1_000_000_000
 SET_UP_S = 3600.0
-"""Validity of the set-up token, s."""
+"""Validity period of the set-up token, s."""
 
 
 class AccountService:
-    """Changes accounts. It blocks while hashing: call it from a thread.
+    """Changes of accounts. Its methods block: call them from a thread.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class AccountService:
     def add(
         self, name: str, role: Role, password: str, now_ns: int, must_change: bool = False
     ) -> str:
-        """Add an account; return its name as it is stored.
+        """Add an account; return its normalised name.
 
         Parameters
         ----------
@@ -46,7 +46,7 @@ class AccountService:
         Raises
         ------
         NameRefusedError, PasswordRefusedError
-            If one is not accepted.
+            If the name or password is rejected.
         AccessRefusedError
             If the name is taken.
         """
@@ -63,20 +63,20 @@ class AccountService:
         Parameters
         ----------
         must_change
-            Whether it must be changed at the next login.
+            Whether the password must be changed at the next login.
 
         Raises
         ------
         PasswordRefusedError
-            If it is not accepted.
+            If the password is rejected.
         AccessRefusedError
-            If there is no such account.
+            If the account does not exist.
         """
         hashed = self._hashing.hash(new_password(password, name))
         self._store.accounts.set_password(name, hashed, now_ns, must_change)
 
     def offer_set_up(self, now_ns: int) -> str | None:
-        """Return a token for creating the first account; None if there is an account.
+        """Return a new set-up token for the first account; None if an account exists.
 
         An earlier token becomes invalid.
         """
@@ -90,12 +90,12 @@ class AccountService:
         Raises
         ------
         NameRefusedError, PasswordRefusedError
-            If one is not accepted; the token is not used up then.
+            If the name or password is rejected; the token remains valid then.
         """
         name = account_name(name)
         password = new_password(password, name)
         if not is_token(token) or not self._store.set_up.holds(digest(token), now_ns):
-            return False  # before hashing, which costs time
+            return False  # checked before hashing, which is slow
         hashed = self._hashing.hash(password)
         return self._store.set_up.take(digest(token), name, hashed, now_ns)
 
@@ -103,14 +103,14 @@ class AccountService:
 def create_key(
     store: AccessStore, name: str, role: Role, units: Sequence[str], days: int, now_ns: int
 ) -> tuple[ApiKey, str]:
-    """Create a key for a machine; return the stored part and the key itself, which is not stored.
+    """Create an API key; return its stored record and the complete key, which is not stored.
 
     Raises
     ------
     NameRefusedError
-        If the name is not accepted.
+        If the name is rejected.
     AccessRefusedError
-        If its validity is out of range, or an admin key is limited to units.
+        If the validity period is out of range, or an admin key is limited to units.
     """
     if not 1 <= days <= MAX_DAYS:
         raise AccessRefusedError(f"a key is valid for 1 to {MAX_DAYS} days, not for {days}")

@@ -1,4 +1,4 @@
-"""Refused requests in the audit trail."""
+"""Audit entries of refused requests, with a rate limit."""
 
 import asyncio
 import json
@@ -16,14 +16,14 @@ from service.store.port import StoreError
 log = structlog.get_logger()
 
 N_AT_ONCE = 20
-"""Number of refusals in a row with an entry each."""
+"""Burst limit: number of refusals in quick succession that are all recorded."""
 
 SECONDS_EACH = 30.0
-"""Time after which one more gets an entry: at most 2,880 a day."""
+"""Time after which one more refusal may be recorded, s: at most 2,880 a day."""
 
 
 class Refusals:
-    """Writes refused requests to the audit trail, and counts those beyond a rate limit.
+    """Writer of refused requests to the audit trail; above a rate limit they are only counted.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class Refusals:
         self.n_more = 0
 
     async def note(self, deed: AuditAction, status: int) -> None:
-        """Write a refusal with the number of unwritten ones before it, or count it."""
+        """Write a refusal to the audit trail; above the rate limit, count it for the next entry."""
         if not self._allowance.take(self._clock.monotonic_s()):
             self.n_more += 1
             return
@@ -58,12 +58,12 @@ MAX_PROBLEM = 8192
 
 
 class AuditTrail:
-    """ASGI middleware that records the origin of requests and refused changes.
+    """ASGI middleware that sets the client of audit entries and records refused changes.
 
     Parameters
     ----------
     refusals
-        Receives refused requests that would have changed something.
+        Writer of refused requests; it receives those whose method is not safe.
     """
 
     def __init__(self, app: ASGIApp, refusals: Refusals, clock: Clock) -> None:
@@ -95,7 +95,7 @@ class AuditTrail:
 
 
 class _Answer:
-    """Forwards an answer; keeps its status and the problem document of a refusal."""
+    """Forwarder of an answer that keeps its status and the problem document of a refusal."""
 
     def __init__(self, send: Send) -> None:
         self._send = send
@@ -111,7 +111,7 @@ class _Answer:
 
     @property
     def detail(self) -> str:
-        """Detail of the problem document; empty without one."""
+        """Detail of the problem document; empty without a problem document."""
         try:
             problem = json.loads(self._body[:MAX_PROBLEM])
         except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""Login, logout, change of password, and the first account."""
+"""Routes for login, logout, change of the own password, and creation of the first account."""
 
 import asyncio
 from contextlib import suppress
@@ -33,59 +33,59 @@ PermissionName = Literal["read", "act_on_alarms", "change_measuring", "read_audi
 
 
 class SessionModel(ApiModel):
-    """The caller and its permissions."""
+    """Identity and permissions of the caller."""
 
     login_required: bool
-    """Whether this client must log in to see the plant; changes need a login everywhere except in
-    the demonstration."""
+    """Whether this client must log in to read data. Changes always require a login, except in the
+    demonstration."""
 
     set_up_needed: bool
-    """Whether there is no account yet."""
+    """Whether the first account must still be created."""
 
     password_change_needed: bool
-    """Whether the password, set by an administrator, must be changed first."""
+    """Whether the caller must first change the password, which an administrator has set."""
 
     name: Annotated[str | None, Field(examples=["anna"])]
     """Name of the account or key; null without a login."""
 
     role: Annotated[RoleName | None, Field(examples=["operator"])]
-    """Role; null if a login is needed. Callers on this computer without a login are viewers."""
+    """Role of the caller; null if a login is needed. Local callers without a login are viewers."""
 
     permissions: Annotated[list[PermissionName], Field(examples=[["read", "act_on_alarms"]])]
-    """Permissions; empty if a login is needed."""
+    """Permissions of the caller; empty if a login is needed."""
 
 
 class LoginModel(RequestModel):
     """Request to log in."""
 
     name: LoginName
-    """Name of the account; upper and lower case are the same."""
+    """Name of the account; not case-sensitive."""
 
     password: Password
-    """Its password."""
+    """Password of the account."""
 
 
 class NewPasswordModel(RequestModel):
     """Request to change the own password."""
 
     password: Password
-    """Present password."""
+    """Current password."""
 
     new_password: Password
-    """New password: 12 to 256 characters, at least 6 different ones."""
+    """New password: 12 to 256 characters, at least 6 different characters."""
 
 
 class SetUpModel(RequestModel):
     """Request to create the first account."""
 
     token: Annotated[str, Field(max_length=256, examples=["the token that the service printed"])]
-    """The token that the service printed when it started."""
+    """Set-up token that the service printed when it started."""
 
     name: LoginName
     """Name of the account: a-z 0-9 . _ @ -."""
 
     password: Password
-    """Its password: 12 to 256 characters, at least 6 different ones."""
+    """Password of the account: 12 to 256 characters, at least 6 different characters."""
 
 
 BEGUN, ENDED = "session.begun", "session.ended"
@@ -97,7 +97,7 @@ async def record(audit: AuditStore, clock: Clock, action: str, name: str) -> Non
     Raises
     ------
     StoreError
-        If it cannot be stored.
+        If the entry cannot be stored.
     """
     name_actor(name)
     who = acting()
@@ -127,12 +127,12 @@ SET_UP_PROBLEMS = problem_responses(
 
 
 def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
-    """Return the routes of sessions."""
+    """Return the router for sessions."""
     router = APIRouter(prefix="/api/v1", tags=["access"])
 
     @router.get("/session", summary="The caller", dependencies=[OPEN])
     async def session(request: Request) -> SessionModel:
-        """Show whether a login is needed, the caller, and its permissions."""
+        """Return the identity and permissions of the caller, and whether a login is needed."""
         return await session_model(caller_of(request), authenticator)
 
     @router.post(
@@ -143,7 +143,7 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
         dependencies=[OPEN],
     )
     async def log_in(request: Request, response: Response, asked: LoginModel) -> SessionModel:
-        """Start a session, kept in a cookie; an earlier session of the browser ends."""
+        """Start a session and set its cookie; an earlier session of the browser ends."""
         logged_in = await _log_in(authenticator, request, asked.name, asked.password)
         await _end(authenticator, caller_of(request))
         await _record_login(context, authenticator, logged_in)
@@ -151,7 +151,7 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
 
     @router.delete("/session", summary="Log out", status_code=204, dependencies=[OPEN])
     async def log_out(request: Request, response: Response) -> None:
-        """End the session, if there is one."""
+        """End the session of the browser, if any, and delete its cookie."""
         caller = caller_of(request)
         await _end(authenticator, caller)
         if caller.identity is not None and caller.identity.means is Means.SESSION:
@@ -169,7 +169,7 @@ def session_router(context: Context, authenticator: Authenticator) -> APIRouter:
     async def change_password(
         request: Request, response: Response, asked: NewPasswordModel
     ) -> SessionModel:
-        """Change the password; all sessions of the account end, and this browser gets a new one."""
+        """Change the own password; all sessions of the account end, and a new session starts."""
         identity = _person(identity_of(request))
         await _log_in(authenticator, request, identity.name, asked.password)
         new = identity.name, asked.new_password
@@ -219,7 +219,7 @@ async def _log_in(
 async def _record_login(
     context: Context, authenticator: Authenticator, logged_in: LoggedIn
 ) -> None:
-    """Record a login in the audit trail; end the session if that fails."""
+    """Record a login in the audit trail; if this fails, end the session."""
     try:
         await record(context.store.audit, context.clock, BEGUN, logged_in.identity.name)
     except StoreError:
@@ -241,7 +241,7 @@ async def _begun(
 
 
 def _is_secure(request: Request) -> bool:
-    """Whether the browser uses https; a proxy may forward http."""
+    """Whether the browser uses HTTPS, also through a proxy that forwards requests over HTTP."""
     return "https" in (request.url.scheme, request.headers.get("origin", "").partition(":")[0])
 
 
@@ -258,7 +258,7 @@ def _person(identity: Identity) -> Identity:
 
 
 async def session_model(caller: Caller, authenticator: Authenticator) -> SessionModel:
-    """Return the caller and its permissions."""
+    """Return the API model of a caller and its permissions."""
     identity = caller.identity
     may_all = identity is not None and (identity.is_proven or identity.role is Role.ADMIN)
     needs_set_up = not may_all and not await authenticator.has_accounts()

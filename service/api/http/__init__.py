@@ -1,1 +1,1 @@
-"""The HTTP server, and its limits on time, size, number, hosts and headers."""
+"""HTTP server with limits on the duration, size and number of requests, and host checks."""

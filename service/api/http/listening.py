@@ -1,4 +1,4 @@
-"""Sockets of the HTTP server: port, socket file, TLS."""
+"""Listening sockets of the HTTP server: TCP port, Unix socket file, TLS."""
 
 import os
 import socket
@@ -10,28 +10,28 @@ from pathlib import Path
 
 
 class PortInUseError(Exception):
-    """A port or socket file cannot be listened on; the message gives the reason."""
+    """Raised if a port or socket file cannot be opened; the message gives the reason."""
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Listen on a port.
+    """Return a socket that listens on a TCP port.
 
     Raises
     ------
     PortInUseError
-        If that is not possible.
+        If the port cannot be opened.
     """
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         return socket.create_server((host, port), family=family)
     except OSError as error:
-        # without the address, which Python repeats in brackets
+        # omit the address, which Python repeats in brackets
         why = (error.strerror or str(error)).partition(" (")[0]
         raise PortInUseError(f"cannot listen on {host} port {port}: {why}") from error
 
 
 def url_of(listener: socket.socket, has_tls: bool = False) -> str:
-    """Return the URL of the service."""
+    """Return the URL of the service on a listening socket."""
     if listener.family == socket.AF_UNIX:
         return f"unix:{listener.getsockname()}"
     host, port = listener.getsockname()[:2]
@@ -40,17 +40,17 @@ def url_of(listener: socket.socket, has_tls: bool = False) -> str:
 
 
 MODE = 0o660
-"""Mode of a socket file: padwatch's user and group, to which the proxy belongs."""
+"""Mode of the socket file: access for padwatch's user and group; the proxy is in the group."""
 
 
 @contextmanager
 def socket_file(path: Path) -> Iterator[socket.socket]:
-    """Listen on a socket file, removed at the end; its mode decides who may connect.
+    """Listen on a Unix socket file; its mode limits access, and the file is removed on exit.
 
     Raises
     ------
     PortInUseError
-        If it cannot be created, is no socket, or is in use.
+        If the file cannot be created, is not a socket, or is in use.
     """
     _remove_stale(path)
     with closing(socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)) as listener:
@@ -70,7 +70,7 @@ def socket_file(path: Path) -> Iterator[socket.socket]:
 
 
 def _remove_stale(path: Path) -> None:
-    """Remove the socket file of a service that was killed."""
+    """Remove the socket file that a killed service left behind."""
     try:
         mode = path.lstat().st_mode
     except OSError:
@@ -89,11 +89,11 @@ def _remove_stale(path: Path) -> None:
 
 
 class CertificateError(Exception):
-    """An unusable certificate or key; the message gives the reason."""
+    """Raised if a certificate or key is unusable; the message gives the reason."""
 
 
 def server_tls(certificate: Path, key: Path) -> ssl.SSLContext:
-    """Return a TLS context for a certificate and its key, TLS 1.2 or newer.
+    """Return a server TLS context (TLS 1.2 or newer) for a certificate and its key.
 
     Raises
     ------

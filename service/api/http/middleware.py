@@ -1,4 +1,4 @@
-"""Middleware between the HTTP server and the application."""
+"""ASGI middleware between the HTTP server and the application."""
 
 import asyncio
 import re
@@ -44,7 +44,7 @@ class HeadRequests:
 
 
 HOST = re.compile(r"(\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+)(?::[0-9]{1,5})?")
-"""Name, IPv4 address or bracketed IPv6 address, with an optional port."""
+"""Pattern of a Host header: name, IPv4 address or bracketed IPv6 address, and optional port."""
 
 LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
@@ -52,13 +52,13 @@ LOOPBACK = ("localhost", "127.0.0.1", "::1")
 class KnownHosts:
     """ASGI middleware that refuses requests for unknown hosts.
 
-    A page of another site can let its own name point to 127.0.0.1 (DNS rebinding); the Host header
-    still has that name.
+    A page of another site can resolve its own host name to 127.0.0.1 (DNS rebinding); the Host
+    header then still contains that name.
 
     Parameters
     ----------
     hosts
-        Names and addresses without port, besides loopback and the address of the server.
+        Accepted names and addresses without port, besides loopback and the server's address.
     """
 
     def __init__(self, app: ASGIApp, hosts: Iterable[str]) -> None:
@@ -66,7 +66,7 @@ class KnownHosts:
         self._known = {host.lower().strip("[]").rstrip(".") for host in (*LOOPBACK, *hosts)}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request for this service."""
+        """Forward a request if its Host header names this service; otherwise refuse it."""
         asked = [value for name, value in scope["headers"] if name == b"host"]
         if len(asked) != 1 or not asked[0]:
             await NO_HOST.send(scope, send)
@@ -81,7 +81,7 @@ class KnownHosts:
 
 
 def _name(host: str) -> str:
-    """Return a Host header without its port; empty if it is malformed."""
+    """Return the host name of a Host header, without port; empty if the header is malformed."""
     found = HOST.fullmatch(host)
     return found[1].strip("[]").rstrip(".").lower() if found else ""
 
@@ -95,7 +95,7 @@ SECURITY_HEADERS = (
     ("content-security-policy", "default-src 'none'; base-uri 'none'; frame-ancestors 'none'"),
     ("cache-control", "no-store"),
 )
-"""Headers of every answer; dashboard and evidence report have their own values of some."""
+"""Security headers of all answers; dashboard and evidence report override some of them."""
 
 
 class AddedHeaders:
@@ -121,7 +121,7 @@ FOR, PROTO = b"x-forwarded-for", b"x-forwarded-proto"
 
 
 class TrustedProxy:
-    """ASGI middleware for a unix socket behind a trusted proxy: client address and scheme."""
+    """ASGI middleware for a Unix socket: client address and scheme as sent by a trusted proxy."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -135,7 +135,7 @@ class TrustedProxy:
 
 
 def _last(scope: Scope, name: bytes) -> str:
-    """Return the last value of a list header, which the proxy added; others may be forged."""
+    """Return the last value of a list header; the proxy adds it, earlier values may be forged."""
     values = [value for found, value in scope["headers"] if found == name]
     return values[-1].decode("latin-1").rpartition(",")[2].strip() if values else ""
 
@@ -148,13 +148,13 @@ def _client(address: str) -> tuple[str, int] | None:
 
 
 TOKEN = re.compile(rb'"(?:[^"\\]++|\\.)*+"?|[\[{]|[\]}]', re.DOTALL)
-"""A string, closed or not, or a bracket; without backtracking."""
+"""Regular expression for a JSON string, terminated or not, or a bracket; it never backtracks."""
 
 
 def is_deeper_than(limit: int, text: bytes) -> bool:
-    """Whether lists and objects of a text, valid JSON or not, are nested too deeply."""
+    """Whether arrays and objects of a text, valid JSON or not, are nested deeper than a limit."""
     if text.count(b"[") + text.count(b"{") <= limit:
-        return False  # true of all usual requests, and cheaper than scanning strings
+        return False  # true for all usual requests, and faster than scanning strings
     depth = 0
     for match in TOKEN.finditer(text):
         first = text[match.start()]
@@ -168,20 +168,20 @@ def is_deeper_than(limit: int, text: bytes) -> bool:
 
 
 class TooLargeError(Exception):
-    """A body above the limit."""
+    """Raised if a body exceeds the size limit."""
 
 
 class WholeBodies:
     """ASGI middleware that reads the whole body before it calls the application.
 
-    The connection limits the time for it.
+    The deadlines of the connection limit the duration of reading.
     """
 
     def __init__(self, app: ASGIApp, limits: HttpLimitSettings) -> None:
         self._app, self._limits = app, limits
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request with its whole body."""
+        """Read and check the body, then forward the request."""
         try:
             body = await self._body(scope, receive)
         except TooLargeError:
@@ -224,12 +224,12 @@ class WholeBodies:
 
 def _declares_more(length: bytes, limit: int) -> bool:
     digits = length.strip().lstrip(b"0")
-    # int() of very long numbers is slow, and fails from 4300 digits
+    # int() is slow for very long numbers, and fails for more than 4300 digits
     return len(digits) > 18 or int(digits or b"0") > limit
 
 
 def _replayed(body: bytes, receive: Receive) -> Receive:
-    """Return a receiver of the body, then of the messages of the connection."""
+    """Return a `receive` function for the body, then for further messages of the connection."""
     whole: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def given() -> Message:
@@ -239,9 +239,9 @@ def _replayed(body: bytes, receive: Receive) -> Receive:
 
 
 class BoundedAnswers:
-    """ASGI middleware that limits the number of concurrent requests and the time of each.
+    """ASGI middleware that limits the number of concurrent requests and their duration.
 
-    Both limits end when an answer starts; then the connection limits the time.
+    Both limits apply until the answer starts; then the deadlines of the connection apply.
     """
 
     def __init__(self, app: ASGIApp, limits: HttpLimitSettings) -> None:
@@ -250,7 +250,7 @@ class BoundedAnswers:
         self._deadlines: set[asyncio.Timeout] = set()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Forward a request, or refuse it above the limit."""
+        """Forward a request; refuse it above the limit or if its answer does not start in time."""
         if self._n_running >= self._limits.max_requests:
             await BUSY.send(scope, send)
             return
@@ -259,13 +259,13 @@ class BoundedAnswers:
         try:
             is_answered = await self._answered(scope, receive, send)
         finally:
-            asker.has_gone = True  # a thread may still be working
+            asker.has_gone = True  # cancels store reads that still run in a thread
             ASKER.reset(before)
         if not is_answered:
             await NO_ANSWER.send(scope, send)
 
     def give_up(self) -> None:
-        """Stop requests whose answers have not started."""
+        """Cancel all requests whose answers have not started."""
         for deadline in self._deadlines:
             deadline.reschedule(0.0)
 
@@ -300,9 +300,9 @@ class BoundedAnswers:
 
 
 def guarded(answers: BoundedAnswers, limits: HttpLimitSettings, hosts: Iterable[str]) -> ASGIApp:
-    """Add the other middleware to an application with bounded answers.
+    """Return `answers` wrapped by the middleware for bodies, hosts, headers and HEAD requests.
 
-    Bodies are read before requests are counted, so that slow senders take no place.
+    Bodies are read before requests are counted, so that slow clients do not exhaust the limit.
     """
     bodies = WholeBodies(answers, limits)
     return HeadRequests(AddedHeaders(KnownHosts(bodies, hosts), SECURITY_HEADERS))

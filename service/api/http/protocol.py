@@ -25,19 +25,19 @@ from service.api.http.refusals import (
 from service.settings.processes import HttpLimitSettings
 
 MAX_UNSENT_BYTES = 64 * 1024 * 1024
-"""Maximum total of unsent bytes; above it the largest answers are aborted."""
+"""Maximum total of unsent bytes; above it, the connections with most of them are aborted."""
 
 MAX_PAUSE_S = 1.0
-"""Longest pause between sweeps that counts towards deadlines, s."""
+"""Maximum time between sweeps that counts towards deadlines, s."""
 
 
 class Connections:
-    """The open connections of a server.
+    """Open connections of a server, with limits on their number.
 
     Parameters
     ----------
     now_s
-        Monotonic time, s.
+        Function that returns the monotonic time, s.
     """
 
     def __init__(self, limits: HttpLimitSettings, now_s: Callable[[], float]) -> None:
@@ -50,7 +50,7 @@ class Connections:
         return self._n_open
 
     def admit(self, connection: "GuardedProtocol") -> bool:
-        """Add a connection; return False if there is no room for it."""
+        """Add a connection; return False if a limit is reached and no connection is idle."""
         neighbours = self._of_peer[connection.peer]
         if len(neighbours) >= self.limits.max_connections_per_peer:
             has_room = _make_room(neighbours)
@@ -73,7 +73,7 @@ class Connections:
             del self._of_peer[connection.peer]
 
     def sweep(self) -> None:
-        """Close connections past a deadline; called periodically."""
+        """Close all connections that exceeded a deadline; called periodically."""
         now_s = self.now_s()
         stalled_s = max(0.0, now_s - self._swept_s - MAX_PAUSE_S)
         self._swept_s = now_s
@@ -102,7 +102,10 @@ class Connections:
 
 
 def _make_room(connections: set["GuardedProtocol"]) -> bool:
-    """Close the connection that waits longest, preferring those without a request."""
+    """Close the longest idle connection; return whether any connection was idle.
+
+    Connections that never sent a request are closed first.
+    """
     waiting = [(since, each) for each in connections if (since := each.waiting_since())]
     if not waiting:
         return False
@@ -112,7 +115,7 @@ def _make_room(connections: set["GuardedProtocol"]) -> bool:
 
 
 STOP_S = 2
-"""Time after which uvicorn cancels remaining requests, with tracebacks, s."""
+"""Time after which uvicorn cancels the remaining requests and logs tracebacks, s."""
 
 
 class GuardedConfig(uvicorn.Config):
@@ -121,9 +124,9 @@ class GuardedConfig(uvicorn.Config):
     Parameters
     ----------
     hosts
-        Names of the service besides loopback.
+        Host names of the service besides loopback.
     now_s
-        Monotonic time for the deadlines, s.
+        Function that returns the monotonic time for deadlines, s.
     """
 
     def __init__(
@@ -154,17 +157,17 @@ class GuardedConfig(uvicorn.Config):
 
 
 MAX_PIPELINED = 8
-"""Maximum number of pipelined requests; browsers send none."""
+"""Maximum number of pipelined requests; browsers do not use pipelining."""
 
 FRAMING_BYTES = 256 * 1024
-"""Allowed framing of a chunked body, besides 8 bytes per byte of data."""
+"""Maximum overhead of a chunked body, in addition to 8 bytes per byte of data."""
 
 PROGRESS_BYTES = 48 * 1024
 """Minimum number of bytes that a client must read within ``unsent_s``."""
 
 
 class Phase(Enum):
-    """Part of a request that the client sends next."""
+    """Part of a request that the client is expected to send next."""
 
     HEAD = auto()
     BODY = auto()
@@ -172,7 +175,7 @@ class Phase(Enum):
 
 
 class GuardedProtocol(HttpToolsProtocol):
-    """A connection with deadlines and size limits."""
+    """HTTP/1.1 connection with deadlines and size limits."""
 
     def __init__(
         self,
@@ -194,21 +197,21 @@ class GuardedProtocol(HttpToolsProtocol):
     # callbacks of the transport
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Add the connection, or refuse it."""
+        """Add the connection to the open connections, or refuse it."""
         super().connection_made(transport)
         self.peer = self.client[0] if self.client else ""
         if not self._all.admit(self):
             self._end(FULL)
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Remove the connection."""
+        """Remove the connection from the open connections."""
         super().connection_lost(exc)
         self._ignores_input = True
         self._drop_answers()
         self._all.leave(self)
 
     def data_received(self, data: bytes) -> None:
-        """Parse bytes; malformed or oversized requests end the connection."""
+        """Parse received bytes; malformed or oversized requests end the connection."""
         self._unset_keepalive_if_required()
         if self._ignores_input:
             return
@@ -219,7 +222,7 @@ class GuardedProtocol(HttpToolsProtocol):
         except httptools.HttpParserError:
             self._refuse()
         else:
-            self._n_wire += len(data)  # of this request, and possibly the previous one
+            self._n_wire += len(data)  # may include the end of the previous request
             self._check_sizes()
 
     def resume_writing(self) -> None:
@@ -230,7 +233,7 @@ class GuardedProtocol(HttpToolsProtocol):
     # callbacks of the parser; feed_data raises HttpParserError for their exceptions
 
     def on_message_begin(self) -> None:
-        """Start a request."""
+        """Reset the state for a new request."""
         super().on_message_begin()
         if self._phase is not Phase.HEAD:
             self._enter(Phase.HEAD)
@@ -238,13 +241,13 @@ class GuardedProtocol(HttpToolsProtocol):
         self._refusal = NOT_HTTP
 
     def on_url(self, url: bytes) -> None:
-        """Take a part of path and query."""
+        """Append a part of the request target; limit its length."""
         super().on_url(url)
         if len(self.url) > 1024 * self._limits.max_target_kb:
             self._stop(TARGET_TOO_LONG)
 
     def on_header(self, name: bytes, value: bytes) -> None:
-        """Take a header."""
+        """Append a header; limit the total size of headers."""
         if self._phase is Phase.BODY:
             self._stop(NOT_HTTP)  # trailers are not supported
         super().on_header(name, value)
@@ -253,27 +256,27 @@ class GuardedProtocol(HttpToolsProtocol):
             self._stop(HEAD_TOO_LARGE)
 
     def on_headers_complete(self) -> None:
-        """Call the application, or queue the request."""
+        """Call the application with the request, or queue a pipelined request."""
         if len(self.pipeline) >= MAX_PIPELINED:
             self._stop(NOT_HTTP)
         if not self.url.startswith(b"/"):
-            self._stop(NOT_HTTP)  # an absolute target has a host besides the header
+            self._stop(NOT_HTTP)  # an absolute target contains a second host name
         super().on_headers_complete()
         self._enter(Phase.BODY)
 
     def on_body(self, body: bytes) -> None:
-        """Take a part of a body; its reader limits the size."""
+        """Append a part of the body; `WholeBodies` limits its size."""
         self._n_body += len(body)
         super().on_body(body)
 
     def on_message_complete(self) -> None:
-        """Finish a request."""
+        """Record that the request has been received completely."""
         super().on_message_complete()
         self._has_sent_request = True
         self._enter(Phase.NOTHING)
 
     def on_response_complete(self) -> None:
-        """Finish an answer, which the client may not have read yet."""
+        """Restart the keep-alive time after an answer, which the client may not have read yet."""
         super().on_response_complete()
         self._unsent_since_s = None
         if self._phase is Phase.NOTHING:
@@ -292,39 +295,39 @@ class GuardedProtocol(HttpToolsProtocol):
         elif self.transport.is_closing():
             pass  # already closing
         elif self.flow.read_paused and self._phase is not Phase.NOTHING:
-            self._since_s = now_s  # reading is paused
+            self._since_s = now_s  # the server has paused reading
         elif now_s - self._since_s > self._time_limit_s():
             self._end(TOO_SLOW if self._phase is not Phase.NOTHING and self._n_wire else None)
 
     def extend_deadlines(self, seconds: float) -> None:
-        """Exclude a time in which the server was paused from the deadlines."""
+        """Extend the deadlines by a time in which the server was stalled."""
         self._since_s += seconds
         if self._unsent_since_s is not None:
             self._unsent_since_s += seconds
 
     def waiting_since(self) -> tuple[bool, float] | None:
-        """Return whether it ever sent a request, and the start of its wait; None if busy."""
+        """Return whether a request was ever received, and the start of the wait; None if busy."""
         is_answered = self._phase is Phase.NOTHING and self._is_answering()
         if is_answered or self.transport.is_closing():
             return None
         return self._has_sent_request, self._since_s
 
     def n_unsent(self) -> int:
-        """Return the number of unsent bytes."""
+        """Return the number of bytes in the write buffer."""
         return self.transport.get_write_buffer_size()
 
     def close_idle(self) -> None:
-        """Close the connection in favour of another."""
+        """Close the idle connection to make room for a new connection."""
         self._end(None)
 
     def abort(self) -> None:
-        """Abort the connection."""
+        """Abort the connection without sending the remaining bytes."""
         self._ignores_input = True
         self._drop_answers()
         self.transport.abort()
 
     def shutdown(self) -> None:
-        """Stop; incomplete requests are not answered."""
+        """Shut the connection down; incomplete requests are not answered."""
         if self._phase is Phase.BODY:
             self._end(None)
         else:
@@ -359,7 +362,7 @@ class GuardedProtocol(HttpToolsProtocol):
         raise ValueError(refusal.title)
 
     def _check_sizes(self) -> None:
-        """Limit what the parser buffers: an endless header, or framing without data."""
+        """Limit the bytes in the parser: an endless header, or chunk framing without data."""
         if self._phase is Phase.HEAD and self._n_wire > 1024 * (
             self._limits.max_head_kb + self._limits.max_target_kb
         ):
@@ -368,7 +371,7 @@ class GuardedProtocol(HttpToolsProtocol):
             self._end(NOT_HTTP)
 
     def _refuse(self) -> None:
-        """Refuse a request after the answers to previous requests."""
+        """Refuse a malformed request, or close the connection after pending answers."""
         if self._phase is Phase.HEAD and self._is_answering():
             self._answer_and_close()
         else:
@@ -382,7 +385,7 @@ class GuardedProtocol(HttpToolsProtocol):
             self.transport.close()
 
     def _end(self, refusal: Refusal | None) -> None:
-        """Close the connection, with a problem document if possible."""
+        """Close the connection; send the problem document first, if possible."""
         self._ignores_input = True
         if refusal is not None and self._may_answer():
             self.transport.write(refusal.as_http(SECURITY_HEADERS))
@@ -390,7 +393,7 @@ class GuardedProtocol(HttpToolsProtocol):
         self.transport.close()
 
     def _drop_answers(self) -> None:
-        """Mark all requests as disconnected; uvicorn marks the newest only."""
+        """Mark all unfinished requests as disconnected; uvicorn marks the newest only."""
         waiting = [cycle for cycle, _ in self.pipeline]
         self.pipeline.clear()
         for cycle in (self._running, self.cycle, *waiting):

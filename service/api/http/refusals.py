@@ -1,4 +1,4 @@
-"""Requests refused before the application: a problem document (RFC 9457) for each."""
+"""Problem documents (RFC 9457) for requests refused before they reach the application."""
 
 import json
 from collections.abc import Sequence
@@ -10,12 +10,12 @@ from starlette.types import Scope, Send
 MEDIA_TYPE = b"application/problem+json"
 
 MAX_INSTANCE = 256
-"""Maximum number of characters of a path in an answer."""
+"""Maximum length of the request path in an answer, characters."""
 
 
 @dataclass(frozen=True)
 class Refusal:
-    """A fixed problem; only the path of the request is repeated."""
+    """Problem with a fixed text; an answer adds only the path of the request."""
 
     status: int
     title: str
@@ -23,7 +23,7 @@ class Refusal:
     retry_after_s: int | None = None
 
     def body(self, instance: str = "") -> bytes:
-        """Return the problem document."""
+        """Return the problem document as JSON."""
         problem = {
             "type": "about:blank",
             "title": self.title,
@@ -35,14 +35,14 @@ class Refusal:
         return json.dumps(problem).encode()
 
     def headers(self, n_bytes: int) -> list[tuple[bytes, bytes]]:
-        """Return the headers of a document of this length."""
+        """Return the headers for a document of `n_bytes` bytes."""
         headers = [(b"content-type", MEDIA_TYPE), (b"content-length", b"%d" % n_bytes)]
         if self.retry_after_s is not None:
             headers.append((b"retry-after", b"%d" % self.retry_after_s))
         return headers
 
     def as_http(self, more: Sequence[tuple[str, str]]) -> bytes:
-        """Return the whole answer; the connection is closed after it."""
+        """Return the complete HTTP/1.1 answer, with the header ``Connection: close``."""
         body = self.body()
         line = b"HTTP/1.1 %d %s\r\n" % (self.status, HTTPStatus(self.status).phrase.encode())
         added = [(name.encode(), value.encode()) for name, value in more]
@@ -50,7 +50,7 @@ class Refusal:
         return line + b"".join(b"%s: %s\r\n" % header for header in headers) + b"\r\n" + body
 
     async def send(self, scope: Scope, send: Send) -> None:
-        """Send the answer to a request."""
+        """Send the problem document as answer to a request."""
         # JSON escapes characters of the path beyond ASCII
         body = self.body(scope["path"])
         headers = self.headers(len(body))

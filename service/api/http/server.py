@@ -1,4 +1,4 @@
-"""The HTTP server."""
+"""HTTP server: uvicorn with deadlines, heartbeats and a bounded shutdown."""
 
 import asyncio
 import socket
@@ -11,10 +11,10 @@ from service.api.http.protocol import STOP_S, Connections, GuardedConfig, Guarde
 from service.runtime.heartbeats import UNHEARD, Pulse
 
 SHUTDOWN_S = 1.0
-"""Time for open requests when the server stops, s."""
+"""Time that open requests have to finish when the server stops, s."""
 
 SWEEP_TICKS = 5
-"""Period of sweeps in ticks of uvicorn, 0.1 s each."""
+"""Period of connection sweeps, in uvicorn ticks of 0.1 s."""
 
 
 class GuardedServer(uvicorn.Server):
@@ -26,13 +26,13 @@ class GuardedServer(uvicorn.Server):
         self._pulse: Pulse = UNHEARD
 
     async def run_on(self, listener: socket.socket, pulse: Pulse) -> None:
-        """Serve until stopped."""
+        """Serve requests on a listening socket until the server is stopped."""
         self._pulse = pulse
         await self.serve([listener])
 
     @property
     def open(self) -> Connections:
-        """The open connections."""
+        """Open connections of the server."""
         return self._guarded.connections
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -60,7 +60,7 @@ class GuardedServer(uvicorn.Server):
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """Install no signal handlers; the program stops all its parts together."""
+        """Install no signal handlers; the program handles signals and stops all its parts."""
         yield
 
     async def on_tick(self, counter: int) -> bool:
@@ -71,8 +71,8 @@ class GuardedServer(uvicorn.Server):
         return await super().on_tick(counter)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Stop in time; clients that do not read their answers are disconnected."""
-        # before uvicorn cancels tasks, which logs a traceback for each
+        """Stop within a bounded time; clients that do not read their answers are disconnected."""
+        # give up before uvicorn cancels the tasks, which logs a traceback for each
         patience = asyncio.get_running_loop().call_later(SHUTDOWN_S, self._give_up)
         try:
             await super().shutdown(sockets)

@@ -1,1 +1,1 @@
-"""Routes of the API: a file for each subject, with its models and its routes."""
+"""Routes of the API; each module contains the models and routes of one subject."""

@@ -1,4 +1,4 @@
-"""Models of alarms and of their events."""
+"""API models of alarms and alarm events."""
 
 from typing import Annotated, Literal
 
@@ -65,19 +65,19 @@ AlarmIdText = Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
 
 
 class HoldModel(ApiModel):
-    """A shelving or an outage of an alarm."""
+    """Shelving or outage of an alarm."""
 
     actor: str
-    """Person who did it."""
+    """Person who shelved the alarm or took it out of service."""
 
     reason: str
-    """Reason."""
+    """Reason given by the person."""
 
     since: Time
-    """Start."""
+    """Start of the shelving or outage."""
 
     until: Time | None
-    """End; null if it has none."""
+    """End of the shelving or outage; null without a planned end."""
 
 
 class RaisedAtModel(ApiModel):
@@ -87,7 +87,7 @@ class RaisedAtModel(ApiModel):
     """Operating state of the unit."""
 
     eccentricity_ratio: Annotated[float | None, Field(examples=[0.37])]
-    """Eccentricity over clearance; null if unknown, and for alarms about no bearing."""
+    """Eccentricity ratio; null if unknown, and for alarms that concern no bearing."""
 
     attitude_deg: Annotated[float | None, Field(examples=[47.0])]
     """Attitude angle, degrees; null if unknown."""
@@ -96,11 +96,11 @@ class RaisedAtModel(ApiModel):
     """Oil temperature, °C; null if unknown."""
 
     cell: CellModel | None
-    """Condition cell of these values; null if one of them is unknown."""
+    """Condition cell of these values; null if one of the values is unknown."""
 
 
 class AlarmModel(ApiModel):
-    """One alarm now."""
+    """Alarm with its current state."""
 
     id: AlarmIdText
     """Stable identifier: unit, subject and kind."""
@@ -119,129 +119,129 @@ class AlarmModel(ApiModel):
     """State in the life cycle of ISA-18.2."""
 
     level: Annotated[AlarmLevelName, ByName] | None
-    """Priority; null if the alarm is not active."""
+    """Level of the alarm, which is its priority; null if the alarm is not active."""
 
     is_active: bool
-    """Whether it is active, also while hidden."""
+    """Whether the alarm is active, also while it is hidden."""
 
     is_acknowledged: bool
     """Whether the newest occurrence is acknowledged."""
 
     is_latched: bool
-    """Whether only the latch keeps it active: the condition has cleared and a reset is due."""
+    """Whether only the latch keeps the alarm active: the condition has cleared, a reset is due."""
 
     is_chattering: bool
-    """Whether it was raised too often in a short time, within the last ten minutes."""
+    """Whether the alarm was raised too often in a short time, within the last ten minutes."""
 
     occurrence: int
-    """Number of times it was raised or rose in level; acknowledgements refer to it."""
+    """Number of times the alarm was raised or rose in level; acknowledgements refer to it."""
 
     raised: Time | None
     """Start of the newest occurrence."""
 
     raised_at: RaisedAtModel | None
-    """Operating condition at that time; null if unknown, or if the alarm was never raised."""
+    """Operating condition when the alarm was last raised; null if unknown or never raised."""
 
     condition: ConditionName
-    """Present condition; "unknown" without good data, which is never a return to normal: an
-    active alarm stays active."""
+    """Current condition; "unknown" without good data. An unknown condition is never a return to
+    normal: an active alarm stays active."""
 
     condition_reason: str
-    """Reason; "ok" if all is well."""
+    """Reason of the condition; "ok" without a fault."""
 
     value: Annotated[float | None, Field(examples=[163.2])]
     """Value compared with the limit; while the condition is unknown, the last known value."""
 
     limit: Annotated[float | None, Field(examples=[150.0])]
-    """Limit; null if there is none."""
+    """Limit; null for an alarm without a limit."""
 
     value_unit: Annotated[str | None, Field(examples=["µm 0-pk"])]
     """Unit of value and limit."""
 
     film: FilmConditionModel | None
-    """For kinds of film stiffness, the condition of the newest reading: operating state and cell;
-    null for all others, and before the first reading."""
+    """Condition of the newest film reading, for alarms of film stiffness: operating state and cell;
+    null for other alarms, and before the first reading."""
 
     suppressed_by: str | None
-    """Why it is suppressed by design; null if it is not."""
+    """Reason why the alarm is suppressed by design; null if it is not suppressed."""
 
     shelf: HoldModel | None
-    """Shelving; null if it is not shelved."""
+    """Shelving; null if the alarm is not shelved."""
 
     outage: HoldModel | None
-    """Outage; null if it is in service."""
+    """Outage; null if the alarm is in service."""
 
 
 class AlarmCountModel(ApiModel):
-    """Numbers of alarms."""
+    """Counts of alarms by state."""
 
     n_active: int
-    """Active and not hidden."""
+    """Number of alarms that are active and not hidden."""
 
     n_danger: int
-    """Active alarms at level danger."""
+    """Number of active alarms at level danger."""
 
     n_unacknowledged: int
-    """Not hidden, newest occurrence not acknowledged."""
+    """Number of alarms that are not hidden and whose newest occurrence is unacknowledged."""
 
     n_hidden: int
-    """Shelved, suppressed or out of service."""
+    """Number of alarms that are shelved, suppressed or out of service."""
 
     n_unjudged: int
-    """Not active, condition unknown."""
+    """Number of alarms that are not active and whose condition is unknown."""
 
 
 class AlarmListModel(DatedAnswer):
     """Alarms that are not normal, and alarms whose condition is unknown."""
 
     origin: OriginName
-    """Whether this is live or a replay."""
+    """Origin of the data: live, or replay of a recording."""
 
     count: AlarmCountModel
-    """Numbers of alarms."""
+    """Counts of alarms by state."""
 
     alarms: list[AlarmModel]
-    """Not normal; unacknowledged first, danger before alert, the newest first."""
+    """Alarms that are not normal: unacknowledged first, danger before alert, newest first."""
 
     unjudged: list[AlarmModel]
-    """Normal when last judged, condition unknown now."""
+    """Alarms that were normal when last judged, and whose condition is unknown now."""
 
 
 class AlarmEventModel(ApiModel):
-    """An event of an alarm."""
+    """Event of an alarm."""
 
     id: int
-    """Number in the store; later events have higher numbers."""
+    """Number of the event in the store; later events have higher numbers."""
 
     alarm: AlarmIdText
-    """Alarm."""
+    """Identifier of the alarm."""
 
     unit: str
-    """Unit."""
+    """Identifier of the unit."""
 
     subject: str
-    """Channel or bearing."""
+    """Subject of the alarm, such as a channel or bearing."""
 
     kind: AlarmKindName
     """Kind of alarm."""
 
     number: int
-    """Number among the alarm's events, from 1 without gaps."""
+    """Number of the event in the history of the alarm, from 1 without gaps."""
 
     change: AlarmChangeName
-    """Kind of change."""
+    """Kind of change of the alarm by the event."""
 
     level: Annotated[AlarmLevelName, ByName] | None
     """Level after the event; for a return to normal, the level before it."""
 
     state_before: AlarmStateName
-    """State before it."""
+    """State of the alarm before the event."""
 
     state_after: AlarmStateName
-    """State after it."""
+    """State of the alarm after the event."""
 
     time: Time
-    """Time, by the samples where they decided; else by the host's clock."""
+    """Time of the event: by the samples if they caused it, otherwise by the host clock."""
 
     occurrence: int
     """Occurrence that the event belongs to."""
@@ -250,29 +250,29 @@ class AlarmEventModel(ApiModel):
     """Value compared with the limit."""
 
     limit: float | None
-    """Limit; null if there is none."""
+    """Limit; null for an alarm without a limit."""
 
     value_unit: str | None
     """Unit of value and limit."""
 
     actor: str
-    """Person who did it; empty if the change was automatic."""
+    """Person who caused the event; empty if the change was automatic."""
 
     reason: str
-    """Reason."""
+    """Reason of the event."""
 
     raised_at: RaisedAtModel | None
     """Operating condition when the occurrence was raised; null if unknown."""
 
 
 class AlarmEventsModel(ApiModel):
-    """A page of alarm events."""
+    """Page of alarm events."""
 
     origin: OriginName
-    """Whether this is live or a replay."""
+    """Origin of the data: live, or replay of a recording."""
 
     events: list[AlarmEventModel]
-    """Newest first."""
+    """Alarm events, newest first."""
 
     next_before: int | None
     """Value of ``before`` for the next page; null on the last page."""
@@ -281,7 +281,7 @@ class AlarmEventsModel(ApiModel):
 def alarm_list_model(
     engine: AlarmList, films: FilmState, origin: Origin, now_ns: int
 ) -> AlarmListModel:
-    """Return the alarm list."""
+    """Return the API model of the alarm list."""
     alarms = engine.alarms
     listed = [alarm for alarm in alarms if alarm.state is not AlarmState.NORMAL]
     unjudged = [a for a in alarms if a.state is AlarmState.NORMAL and not engine.is_judged(a)]
@@ -295,7 +295,7 @@ def alarm_list_model(
 
 
 def alarm_model(engine: AlarmList, films: FilmState, alarm: Alarm) -> AlarmModel:
-    """Return the model of an alarm."""
+    """Return the API model of an alarm."""
     identity, condition = alarm.identity, alarm.condition
     is_judged = engine.is_judged(alarm)
     unseen = "not_connected" if condition.is_known else str(condition.reason)
@@ -325,12 +325,12 @@ def _film(films: FilmState, identity: AlarmIdentity) -> FilmConditionModel | Non
 
 
 def grid_of(films: FilmState) -> CellGrid:
-    """Return the grid of condition cells, the same for all units."""
+    """Return the grid of condition cells, which all units share."""
     return films.settings.baseline.settings().grid
 
 
 def event_model(stored: StoredEvent, grid: CellGrid) -> AlarmEventModel:
-    """Return the model of an alarm event."""
+    """Return the API model of an alarm event."""
     event, identity = stored.event, stored.event.identity
     return AlarmEventModel.of(
         stored,
@@ -349,7 +349,7 @@ def _raised_at(point: OperatingPoint | None, grid: CellGrid) -> RaisedAtModel | 
 
 
 def _urgency(alarm: Alarm) -> tuple[bool, bool, int, int]:
-    """Sort key: hidden alarms last; unacknowledged, dangerous and newest alarms first."""
+    """Return the sort key: hidden alarms last; unacknowledged, danger and newest alarms first."""
     shown = alarm.shelf is None and alarm.outage is None and alarm.suppressed_by is None
     return (not shown, alarm.is_acknowledged, -(alarm.level or 0), -(alarm.raised_ns or 0))
 

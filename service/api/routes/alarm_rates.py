@@ -1,4 +1,4 @@
-"""Alarm rates."""
+"""Route for alarm rates."""
 
 import asyncio
 from collections.abc import Iterable, Sequence
@@ -31,23 +31,23 @@ UnitKey = Annotated[str, Field(examples=["U1"])]
 
 
 class FrequentModel(ApiModel):
-    """A frequent alarm."""
+    """Frequent alarm, with its number of announcements."""
 
     alarm: AlarmIdText
-    """Alarm."""
+    """Identifier of the alarm."""
 
     n_alarms: int
-    """Number of announcements."""
+    """Number of announcements of the alarm."""
 
     share: float
-    """Share of all announcements."""
+    """Fraction of all announcements, 0 to 1."""
 
 
 class AlarmFiguresModel(ApiModel):
-    """Figures of an alarm list after ISA-18.2."""
+    """Performance figures of an alarm list according to ISA-18.2."""
 
     n_alarms: int
-    """Number of announcements: raised, risen to danger, or shown again after being hidden."""
+    """Number of announcements: alarm raised, risen to danger, or no longer hidden."""
 
     per_day: Annotated[float, Field(examples=[3.4])]
     """Mean number of alarms per day."""
@@ -59,29 +59,29 @@ class AlarmFiguresModel(ApiModel):
     """Largest number of alarms in ten minutes."""
 
     share_in_flood: float
-    """Share of the ten-minute periods with more than ten alarms."""
+    """Fraction of the ten-minute periods with more than ten alarms."""
 
     n_by_level: dict[AlarmLevelName, int]
     """Number of alarms by priority."""
 
     share_by_level: dict[AlarmLevelName, float]
-    """Share of alarms by priority; 0 without alarms."""
+    """Fraction of the alarms by priority; 0 without alarms."""
 
     most_frequent: list[FrequentModel]
-    """At most ten, the most frequent first."""
+    """Most frequent alarms, at most ten, in descending order."""
 
     chattering: dict[AlarmIdText, int]
     """Number of times each alarm was raised in bursts that the plant file defines as chattering."""
 
     n_fleeting: int
-    """Alarms that returned within chattering_window_s."""
+    """Number of alarms that returned to normal within chattering_window_s."""
 
 
 class AlarmRatesModel(ApiModel):
     """Rates of alarms in a time range, and alarms active for more than a day."""
 
     start: Time
-    """Start of the range; later than requested if there were too many events to read."""
+    """Start of the range; later than requested if the requested range has too many events."""
 
     end: Time
     """End of the range."""
@@ -90,7 +90,7 @@ class AlarmRatesModel(ApiModel):
     """Whether all events of the requested range were counted."""
 
     all: AlarmFiguresModel
-    """Figures of all requested units."""
+    """Figures of all requested units together."""
 
     units: dict[UnitKey, AlarmFiguresModel]
     """Figures of each unit, and of "plant" for alarms about the service itself."""
@@ -100,20 +100,20 @@ class AlarmRatesModel(ApiModel):
 
 
 MAX_RATED = 100_000
-"""Maximum number of events counted in one request."""
+"""Maximum number of events that one request counts."""
 
 
 def counted(
     store: Store, wanted: AlarmQuery, units: Sequence[str], rule: ChatterRule
 ) -> dict[str, object]:
-    """Count stored events; return fields of the answer.
+    """Count alarms in the stored events; return fields of `AlarmRatesModel`.
 
-    A hundred thousand events take seconds: call it in a thread.
+    Counting 100,000 events takes seconds: call the function in a thread.
 
     Parameters
     ----------
     wanted
-        Unit, start and end.
+        Query with unit, start and end.
     units
         Units to report, also those without events.
 
@@ -157,7 +157,7 @@ END = "End of the range; default: now.", "2026-11-21T09:00:00Z"
 
 
 def alarm_rate_router(context: Context) -> APIRouter:
-    """Return the route of alarm rates."""
+    """Return the router for alarm rates."""
     router = subject_router("/alarms", "alarms", reach=Reach.ASKED)
     engine, films = context.alarms, context.films
 
@@ -169,9 +169,9 @@ def alarm_rate_router(context: Context) -> APIRouter:
         start: Annotated[Moment | None, time_query(*START)] = None,
         end: Annotated[Moment | None, time_query(*END)] = None,
     ) -> AlarmRatesModel:
-        """Count alarms per ten minutes and per day; name frequent, chattering and stale alarms.
+        """Count alarms per ten minutes and per day; list frequent, chattering and stale alarms.
 
-        The counts are of stored events, by unit and for the whole plant, over at most 400 days.
+        Stored events are counted by unit and for the whole plant, over at most 400 days.
         """
         now_ns = context.clock.now_ns()
         end_ns = ns_from_datetime(end, "end") if end else now_ns

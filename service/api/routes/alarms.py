@@ -1,4 +1,4 @@
-"""Alarm list, alarm events, and operations on alarms."""
+"""Routes for the alarm list, alarm events, and operations on alarms."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -55,34 +55,34 @@ from service.store.port import AlarmQuery, StoredEvent
 
 
 class AcknowledgeModel(ActorModel):
-    """Acknowledgement of an occurrence of an alarm."""
+    """Request to acknowledge an occurrence of an alarm."""
 
     occurrence: Annotated[int, Field(ge=1, le=10**15, examples=[3])]
-    """Occurrence that is acknowledged; a later one is not."""
+    """Occurrence to acknowledge; a later occurrence is not acknowledged."""
 
     comment: NoteText = ""
-    """Note, at most 500 printable characters."""
+    """Comment, at most 500 printable characters."""
 
 
 class CommentModel(ActorModel):
-    """Comment on an alarm."""
+    """Request to add a comment to an alarm."""
 
     text: ReasonText
     """Comment, 1 to 500 printable characters."""
 
 
 class ShelveModel(ActorModel):
-    """Shelving of an alarm for a limited time."""
+    """Request to shelve an alarm for a limited time."""
 
     reason: ReasonText
     """Reason, 1 to 500 printable characters."""
 
     duration_s: Annotated[float, Field(ge=1.0, le=31_536_000.0, examples=[3600.0])]
-    """Duration, s; the plant file sets the maximum."""
+    """Duration of the shelving, s; the plant file sets the maximum."""
 
 
 class OutageModel(ActorModel):
-    """Removal of an alarm from service."""
+    """Request to take an alarm out of service."""
 
     reason: ReasonText
     """Reason, 1 to 500 printable characters."""
@@ -94,11 +94,11 @@ RAISED_AT = {
     "attitude_deg": "deg",
     "oil_temperature_c": "°C",
 }
-"""Units of the columns of the operating condition when an occurrence was raised."""
+"""Units of the columns with the operating condition in which an occurrence was raised."""
 
 
 def event_table(events: Sequence[StoredEvent], grid: CellGrid) -> list[Column]:
-    """Return the fields of the JSON answer as columns; times are in the column ``time_utc``."""
+    """Return alarm events as columns, named like the JSON fields except ``time_utc``."""
     rows = [event_model(stored, grid) for stored in events]
     times = Column("time_utc", "time", [stored.event.time_ns for stored in events])
     flat = [name for name in AlarmEventModel.model_fields if name not in ("time", "raised_at")]
@@ -121,9 +121,9 @@ MAX_EVENTS = 1000
 
 N_COMMENTS = 30
 S_PER_COMMENT = 10.0
-"""Comments that one person or key may send at once, and the pause before each further one.
+"""Rate limit of comments per person or key: burst size, and time for each further comment, s.
 
-Comments are never deleted."""
+Comments are limited because they are never deleted."""
 
 AlarmId = Annotated[
     str,
@@ -135,7 +135,7 @@ AlarmId = Annotated[
 ]
 
 OUTAGE = [needs(Permission.CHANGE_MEASURING)]
-"""An alarm out of service sends no messages."""
+"""Permission to take alarms out of service, which send no messages then."""
 
 UNKNOWN = {404: "Unknown alarm"}
 ACTION_PROBLEMS = problem_responses(403, 409, 422, 503, own=UNKNOWN)
@@ -145,7 +145,7 @@ COMMENT_PROBLEMS = ACTION_PROBLEMS | problem_responses(
 
 
 def alarm_router(context: Context) -> APIRouter:
-    """Return the routes that show alarms; include them after other routes below their path."""
+    """Return the router that reads alarms; include it after other routes below ``/alarms``."""
     router = subject_router("/alarms", "alarms")
     engine, films, origin, clock = context.alarms, context.films, context.origin, context.clock
     listed = SharedAnswer(
@@ -156,7 +156,7 @@ def alarm_router(context: Context) -> APIRouter:
 
     @router.get("", summary="All alarms that are not normal", response_model=AlarmListModel)
     async def alarms() -> Response:
-        """List alarms, most urgent first, and alarms whose condition is unknown."""
+        """List alarms that are not normal, most urgent first, and alarms with unknown condition."""
         return await listed.answer()
 
     @router.get(
@@ -195,7 +195,7 @@ def alarm_router(context: Context) -> APIRouter:
 
     @router.get("/{alarm}", summary="One alarm", responses=problem_responses(own=UNKNOWN))
     async def one(alarm: AlarmId) -> AlarmModel:
-        """Show one alarm, also a normal one, with the value compared with its limit."""
+        """Return one alarm, also in the normal state, with the value compared with its limit."""
         try:
             return alarm_model(engine, films, engine.alarm(alarm))
         except LookupError as error:
@@ -205,7 +205,7 @@ def alarm_router(context: Context) -> APIRouter:
 
 
 def operation_router(context: Context) -> APIRouter:
-    """Return the routes that change alarms; each answers with the stored alarm."""
+    """Return the router that changes alarms; each operation returns the stored alarm."""
     router = subject_router("/alarms/{alarm}", "alarms", Permission.ACT_ON_ALARMS)
     allowances: dict[str, TokenBucket] = {}
 
@@ -247,7 +247,7 @@ def operation_router(context: Context) -> APIRouter:
         dependencies=OUTAGE,
     )
     async def return_to_service(alarm: AlarmId, asked: ActorModel) -> AlarmModel:
-        """End an outage; if the alarm is active, it is announced again."""
+        """Return an alarm to service; if it is active, it is announced again."""
         return await _done(context, alarm, ReturnToService(actor_or(asked.actor)))
 
     @router.post("/reset", summary="Reset a latched alarm", responses=ACTION_PROBLEMS)
@@ -283,7 +283,7 @@ async def event_query(
     ] = 100,
     state: States = None,
 ) -> AlarmQuery:
-    """Return the checked query for events."""
+    """Return the query for alarm events from the checked query parameters."""
     start_ns, end_ns = times
     return AlarmQuery(
         before=AlarmQuery.before if before is None else before,
@@ -301,7 +301,7 @@ async def event_query(
 
 
 async def _done(context: Context, id_: str, action: Action) -> AlarmModel:
-    """Carry out an operation; answer when it is stored."""
+    """Execute an operation; return the alarm after it is stored."""
     try:
         alarm = await context.operators.operate(id_, action)
     except LookupError as error:

@@ -1,4 +1,4 @@
-"""The audit trail."""
+"""Route for the audit trail."""
 
 import json
 from collections.abc import Sequence
@@ -22,34 +22,34 @@ SourceName = Literal["api", "command_line", "padwatch"]
 
 
 class AuditEntryModel(ApiModel):
-    """One entry of the audit trail."""
+    """Entry of the audit trail."""
 
     number: Annotated[int, Field(examples=[117])]
-    """Number, from 1 without gaps."""
+    """Number of the entry, from 1 without gaps."""
 
     time: Time
-    """Time."""
+    """Time of the action."""
 
     actor: Annotated[str, Field(examples=["A. Name"])]
-    """Person or key; empty if unknown."""
+    """Person or key that acted; empty if unknown."""
 
     source: SourceName
-    """Interface that was used."""
+    """Source of the action: API, command line, or padwatch itself."""
 
     peer: Annotated[str | None, Field(examples=["127.0.0.1"])]
-    """Address of the client, or user of the operating system; null if there is none."""
+    """Address of the client, or user of the operating system; null if unknown."""
 
     action: Annotated[str, Field(examples=["alarm.shelved"])]
-    """Action."""
+    """Name of the action."""
 
     object: Annotated[str, Field(examples=["U1:ujb_shaft_x:channel_not_ok"])]
     """Object of the action."""
 
     before: Annotated[dict[str, Any] | None, Field(examples=[{"state": "unacknowledged"}])]
-    """State of the object before; null if there is none."""
+    """State of the object before the action; null without a state."""
 
     after: Annotated[dict[str, Any] | None, Field(examples=[{"state": "shelved"}])]
-    """State of the object after."""
+    """State of the object after the action; null without a state."""
 
     reason: str
     """Reason given by the actor."""
@@ -62,17 +62,17 @@ class AuditEntryModel(ApiModel):
 
 
 class AuditModel(ApiModel):
-    """A page of the audit trail."""
+    """Page of the audit trail."""
 
     entries: list[AuditEntryModel]
-    """Newest first."""
+    """Entries of the audit trail, newest first."""
 
     next_before: int | None
     """Value of ``before`` for the next page; null on the last page."""
 
     head_error: str | None
-    """Why the file with the newest hash could not be written; null if it was. Entries are stored
-    all the same."""
+    """Reason why the file with the newest hash could not be written; null if it was written.
+    Entries are stored in both cases."""
 
 
 TEXTS = (
@@ -82,7 +82,7 @@ TEXTS = (
 
 
 def audit_table(entries: Sequence[AuditEntry]) -> list[Column]:
-    """Return entries as columns; states before and after are JSON."""
+    """Return audit entries as columns; states before and after the action are JSON texts."""
     return [
         Column("number", "count", [entry.number for entry in entries]),
         Column("time_utc", "time", [entry.time_ns for entry in entries]),
@@ -94,7 +94,7 @@ MAX_ENTRIES = 1000
 
 
 def audit_router(context: Context) -> APIRouter:
-    """Return the route of the audit trail."""
+    """Return the router for the audit trail."""
     router = subject_router("/audit", "audit", Permission.READ_AUDIT)
 
     @router.get(
@@ -104,9 +104,9 @@ def audit_router(context: Context) -> APIRouter:
         responses={**problem_responses(422, 503), **table_content("Audit trail")},
     )
     async def audit(query: Annotated[AuditQuery, Depends(audit_query)], wanted: Format) -> Response:
-        """List entries with actor, action, object and state, newest first, in pages.
+        """List audit entries with actor, action, object and state, newest first, in pages.
 
-        As CSV or Parquet: one row per entry, states before and after as JSON.
+        As CSV or Parquet: one row per entry; states before and after the action are JSON texts.
         """
         one_more = AuditQuery(**{**vars(query), "limit": query.limit + 1})
         found = await in_thread(lambda: context.store.audit.entries(one_more))
@@ -138,7 +138,7 @@ async def audit_query(
         int, Query(ge=1, le=MAX_ENTRIES, description="Most entries in the answer.")
     ] = 100,
 ) -> AuditQuery:
-    """Return the checked query for entries."""
+    """Return the query for audit entries from the checked query parameters."""
     start_ns, end_ns = times
     return AuditQuery(
         before=AuditQuery.before if before is None else before,
@@ -157,7 +157,7 @@ def _model(entry: AuditEntry) -> AuditEntryModel:
 
 
 def _document(text: str | None) -> dict[str, Any] | None:
-    """Return a stored document; invalid JSON is returned as text."""
+    """Return a stored JSON object; any other text is returned as member ``text``."""
     if text is None:
         return None
     try:

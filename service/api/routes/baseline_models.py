@@ -1,4 +1,4 @@
-"""Models of baselines, and of requests that change them."""
+"""API models of baselines, and of requests that change baselines."""
 
 from datetime import datetime
 from typing import Annotated, Literal
@@ -25,7 +25,7 @@ SupportName = Literal["own", "borrowed", "none"]
 
 
 class BaselineVersionModel(ApiModel):
-    """A learned baseline without its cells."""
+    """Version of a learned baseline, without its cells."""
 
     version: Annotated[int, Field(examples=[3])]
     """Version of the baseline, from 1."""
@@ -34,14 +34,14 @@ class BaselineVersionModel(ApiModel):
     """Estimator of the learned stiffness."""
 
     status: BaselineStatusName
-    """In force; rejected by an engineer; superseded by another, or by a machine event; or learned
-    and waiting for an engineer to accept it."""
+    """Status: in force; rejected by an engineer; superseded by another version or by a machine
+    event; or learned and not yet accepted by an engineer."""
 
     author: str
     """Person or program that started the learning."""
 
     created: Time
-    """Time of learning, by the host's clock."""
+    """Time of learning, by the host clock."""
 
     learned_from: Time
     """Time of the first reading of the learning period."""
@@ -50,23 +50,23 @@ class BaselineVersionModel(ApiModel):
     """Time of the last reading of the learning period."""
 
     event: str
-    """Machine event that made it necessary; empty if there was none."""
+    """Machine event that made this version necessary; empty without an event."""
 
     remark: Annotated[str, Field(examples=["-5.1 % from version 1 under like conditions"])]
-    """Why it was not put in force automatically, or a remark on its readings; may be empty."""
+    """Reason why it was not accepted automatically, or a remark on its readings; may be empty."""
 
     is_frozen: bool
-    """Whether it is in force and learning is frozen by an engineer."""
+    """Whether this version is in force and an engineer has frozen learning."""
 
 
 class BaselineStepModel(ApiModel):
-    """A step taken with the baselines of a bearing."""
+    """Step in the history of the baselines of a bearing."""
 
     step: BaselineStepName
     """Kind of step."""
 
     version: int | None
-    """Version concerned; null for "renewed"."""
+    """Version of the baseline; null for "renewed"."""
 
     time: Time
     """Time of the step."""
@@ -75,34 +75,34 @@ class BaselineStepModel(ApiModel):
     """Person or program that took the step."""
 
     reason: str
-    """Reason."""
+    """Reason for the step."""
 
     event_time: Time | None
-    """For "renewed", time of the machine event; older readings are not used."""
+    """For "renewed", time of the machine event; earlier readings are not used."""
 
 
 class ReadingCountsModel(ApiModel):
-    """Counts of recent readings, which show why a film is not learned or judged."""
+    """Counts of recent readings; they show why a film is not learned or judged."""
 
     days: Annotated[float, Field(examples=[7.0])]
     """Length of the period, days."""
 
     n_at_speed: Annotated[int, Field(examples=[180])]
-    """Readings at rated speed."""
+    """Number of readings at rated speed."""
 
     n_settled: Annotated[int, Field(examples=[0])]
-    """Of these, readings after the warm-up; 0 if every run ends before the film is warm."""
+    """Number of these readings after the warm-up; 0 if every run ends before the film is warm."""
 
     n_complete: int
-    """Of these, readings with stiffness, eccentricity and oil temperature, in the direction that
-    has fewer."""
+    """Number of settled readings with stiffness, eccentricity and oil temperature, in the direction
+    with fewer such readings."""
 
     n_judged: int
-    """Of these, readings with a verdict on the film, likewise."""
+    """Number of complete readings with a verdict on the film, in the direction with fewer."""
 
 
 class LearningModel(ApiModel):
-    """Progress of learning."""
+    """Progress of learning a baseline."""
 
     since: Time | None
     """Start of the learning period: first reading or last machine event; null without readings."""
@@ -111,85 +111,85 @@ class LearningModel(ApiModel):
     """End of the learning period; afterwards the baseline does not change until it is renewed."""
 
     is_over: bool
-    """Whether it has ended."""
+    """Whether the learning period has ended."""
 
     n_readings: int | None
-    """Settled readings so far; null once this period has a baseline."""
+    """Number of settled readings so far; null after a baseline was learned in this period."""
 
     n_days: Annotated[int | None, Field(examples=[12])]
-    """Days with such readings, likewise."""
+    """Number of days with settled readings; null once this period has a baseline."""
 
     n_days_wanted: Annotated[int, Field(examples=[20])]
-    """Days with readings that the first baseline needs."""
+    """Number of days with readings that the first baseline needs."""
 
     recent: ReadingCountsModel
-    """Counts of the last days."""
+    """Counts of the readings of the last days."""
 
 
 class BaselinesModel(BearingAnswer):
-    """All baselines of a bearing, and the steps taken with them."""
+    """All baseline versions of a bearing, and the steps of their history."""
 
     estimator: EstimatorName | None
-    """Estimator whose stiffness is watched; null if the bearing is not watched."""
+    """Estimator of the watched stiffness; null if the bearing is not watched."""
 
     in_force: int | None
-    """Version in force; null if there is none."""
+    """Version in force; null without a version in force."""
 
     is_frozen: bool
-    """Whether learning is frozen by an engineer."""
+    """Whether an engineer has frozen learning."""
 
     renewed: Time | None
-    """Last machine event; only later readings are used; null if there was none."""
+    """Time of the newest machine event; only later readings are used; null without an event."""
 
     acceptance: Literal["automatic", "by_engineer"]
-    """Whether padwatch puts a learned baseline in force if it agrees with the previous one, or only
-    an engineer does."""
+    """Acceptance of learned baselines: automatic if a baseline agrees with the previous one, or
+    only by an engineer."""
 
     learning: LearningModel | None
     """Progress of learning; null if the bearing is not watched."""
 
     versions: list[BaselineVersionModel]
-    """Versions, newest first."""
+    """Versions of the baseline, newest first."""
 
     steps: list[BaselineStepModel]
-    """Steps, newest first."""
+    """Steps of the history, newest first."""
 
 
 class BaselineCellsModel(ApiModel):
-    """Cells by column; each column has one value per cell."""
+    """Cells of a baseline by column; each column has one value per cell."""
 
     eccentricity_low: list[float]
     """Lower bound of the eccentricity ratio."""
 
     eccentricity_high: list[float]
-    """Upper bound."""
+    """Upper bound of the eccentricity ratio."""
 
     oil_temperature_low_c: list[float]
     """Lower bound of the oil temperature, °C."""
 
     oil_temperature_high_c: list[float]
-    """Upper bound."""
+    """Upper bound of the oil temperature, °C."""
 
     attitude_low_deg: list[float] | None
-    """Lower bound of the attitude angle; null where cells do not depend on it."""
+    """Lower bound of the attitude angle; null if cells do not depend on the attitude angle."""
 
     attitude_high_deg: list[float] | None
-    """Upper bound, likewise."""
+    """Upper bound of the attitude angle; null if cells do not depend on the attitude angle."""
 
     eccentricity_ratio: list[float]
-    """Middle of the readings in the cell."""
+    """Median eccentricity ratio of the readings in the cell."""
 
     oil_temperature_c: list[float]
-    """Middle of the readings in the cell, °C."""
+    """Median oil temperature of the readings in the cell, °C."""
 
     n_readings: list[int]
-    """Readings used; 0 in a cell between others that has no readings."""
+    """Number of readings used; 0 in a cell without readings between other cells."""
 
     n_days: list[int]
-    """Days with such readings."""
+    """Number of days with readings in the cell."""
 
     stiffness_n_per_m: list[float]
-    """Median of the readings; in a cell without readings, value of the surface."""
+    """Median stiffness of the readings; in a cell without readings, value of the surface."""
 
     scatter_percent: list[float]
     """Robust standard deviation of single readings about the surface, %."""
@@ -198,22 +198,22 @@ class BaselineCellsModel(ApiModel):
     """Standard uncertainty of the surface in the middle of the cell, %."""
 
     support: list[SupportName]
-    """Whether readings in the cell are judged: by its own readings ("own"), by those of
-    neighbouring cells ("borrowed"), or not ("none")."""
+    """Basis on which new readings in the cell are judged: learned readings of the cell ("own"), of
+    neighbouring cells ("borrowed"), or no basis ("none")."""
 
 
 class TimeScatterModel(ApiModel):
-    """Scatter of means of a healthy film."""
+    """Scatter of mean values of a healthy film for one averaging time."""
 
     time_scale_h: float
-    """Running hours of the average."""
+    """Averaging time, running hours."""
 
     share: float
-    """Standard deviation of the means over that of single readings."""
+    """Standard deviation of the means divided by that of single readings."""
 
 
 class BaselineDirectionModel(ApiModel):
-    """Learned stiffness in one direction."""
+    """Learned stiffness of a film in one direction."""
 
     cells: BaselineCellsModel
     """Cells with readings, and cells between them."""
@@ -222,54 +222,54 @@ class BaselineDirectionModel(ApiModel):
     """Typical scatter of single readings, %."""
 
     u_random_percent: float
-    """Typical random uncertainty of single readings, %; part of their scatter."""
+    """Typical random uncertainty of single readings, %; it is a part of their scatter."""
 
     rejected_share: float
-    """Share of the learning period rejected as outliers."""
+    """Fraction of the readings of the learning period that were rejected as outliers."""
 
     time_scatter: list[TimeScatterModel]
-    """Scatter by time scale, shortest first."""
+    """Scatter of mean values by averaging time, shortest first."""
 
 
 class BaselineModel(BearingAnswer):
-    """One baseline with its cells."""
+    """Baseline of a bearing with its cells."""
 
     about: BaselineVersionModel
-    """Origin and status."""
+    """Origin and status of the baseline."""
 
     eccentricity_width: float | None
     """Width of a cell in eccentricity ratio; null if nothing was learned."""
 
     oil_temperature_width_c: float | None
-    """Width of a cell in oil temperature, K; likewise."""
+    """Width of a cell in oil temperature, K; null if nothing was learned."""
 
     x: BaselineDirectionModel | None
     """Baseline in x; null if there were too few readings."""
 
     y: BaselineDirectionModel | None
-    """Baseline in y, likewise."""
+    """Baseline in y; null if there were too few readings."""
 
 
 class BaselineActionModel(ActorModel):
-    """Change of baselines, with a reason."""
+    """Request to change baselines, with a reason."""
 
     reason: ReasonText
     """Reason, 1 to 500 printable characters."""
 
 
 def _only_text(value: object) -> object:
-    """Reject numbers, whose epoch and unit are unknown."""
+    """Return the text of a time; reject numbers, whose epoch and unit are unknown."""
     if not isinstance(value, str):
         raise ValueError("a time is written like 2026-11-21T08:00:00Z")
     return written_as_date(value)
 
 
 class RenewModel(BaselineActionModel):
-    """Renewal of the baseline after a machine event."""
+    """Request to renew the baseline after a machine event."""
 
     event_time: Annotated[
         datetime,
         BeforeValidator(_only_text),
         Field(strict=False, examples=["2026-11-21T08:00:00Z"]),
     ]
-    """End of the event, RFC 3339 with offset; only later readings are used."""
+    """End of the machine event, RFC 3339 with offset; only later readings are used."""

@@ -1,4 +1,4 @@
-"""Baselines of a bearing, and the requests by which engineers change them."""
+"""Routes for the baselines of a bearing, and for their changes by engineers."""
 
 import asyncio
 from typing import Annotated, Any
@@ -55,7 +55,7 @@ from service.store.documents import BASELINE, FORMAT_VERSION, to_json
 def version_model(
     entry: BaselineEntry, versions: Versions, steps: list[StoredStep]
 ) -> BaselineVersionModel:
-    """Return the model of a baseline after all steps."""
+    """Return the API model of a baseline version, with its status after all steps."""
     own = [step for step in steps if step.version == entry.version]
     return BaselineVersionModel.of(
         entry,
@@ -76,13 +76,13 @@ def _status(entry: BaselineEntry, versions: Versions, own: list[StoredStep]) -> 
 
 
 def _remark(entry: BaselineEntry, own: list[StoredStep]) -> str:
-    """Return the reason of the learning step if it differs from the event."""
+    """Return the reason of the learning step if it is not the machine event; otherwise empty."""
     reasons = [step.reason for step in own if step.step is BaselineStep.LEARNED]
     return next((words for words in reasons if words != entry.event), "")
 
 
 def baseline_model(baseline: BearingBaseline, about: BaselineVersionModel) -> BaselineModel:
-    """Return the model of a baseline with its cells."""
+    """Return the API model of a baseline with its cells."""
     x, y = (baseline.of(direction) for direction in ("x", "y"))
     grid = next((found.grid for found in (x, y) if found), None)
     return BaselineModel.of(
@@ -164,7 +164,7 @@ EXPORTED: dict[int | str, dict[str, Any]] = {
 
 
 def baseline_router(context: Context) -> APIRouter:
-    """Return the routes that show baselines."""
+    """Return the router that reads baselines."""
     router = subject_router(PATH, "baselines")
 
     @router.get(
@@ -174,7 +174,7 @@ def baseline_router(context: Context) -> APIRouter:
         responses=problem_responses(404, 503),
     )
     async def baselines(unit: UnitId, bearing: BearingId) -> Response:
-        """List versions, the version in force, steps, and the progress of learning."""
+        """Return versions, the version in force, steps, and the progress of learning."""
         context.bearing(unit, bearing)
         return await rendered(lambda: _baselines(context, unit, bearing))
 
@@ -185,7 +185,7 @@ def baseline_router(context: Context) -> APIRouter:
         responses=READING_PROBLEMS,
     )
     async def one_baseline(unit: UnitId, bearing: BearingId, version: Version) -> Response:
-        """Show the cells by column: bounds, stiffness, scatter, and whether readings are judged."""
+        """Return the cells by column: bounds, stiffness, scatter, and support for judgements."""
         context.bearing(unit, bearing)
         return await rendered(lambda: _baseline(context, unit, bearing, version))
 
@@ -196,7 +196,7 @@ def baseline_router(context: Context) -> APIRouter:
         response_class=Response,
     )
     async def export(unit: UnitId, bearing: BearingId, version: Version) -> Response:
-        """Export the whole baseline with its surface as a file that padwatch reads back exactly."""
+        """Export the baseline with its surface as a document that padwatch reads back exactly."""
         context.bearing(unit, bearing)
         found = await in_thread(lambda: to_json(_stored(context, unit, bearing, version)))
         name = f"{unit}-{bearing}-baseline-{version}.json"
@@ -207,7 +207,7 @@ def baseline_router(context: Context) -> APIRouter:
 
 
 def baseline_action_router(context: Context) -> APIRouter:
-    """Return the routes that change baselines; each answers with the stored baselines."""
+    """Return the router that changes baselines; each action returns the stored baselines."""
     router = subject_router(PATH, "baselines", Permission.CHANGE_MEASURING)
 
     @router.post("/{version}/accept", summary="Accept a baseline", responses=ACTION_PROBLEMS)
@@ -222,7 +222,7 @@ def baseline_action_router(context: Context) -> APIRouter:
     async def reject(
         unit: UnitId, bearing: BearingId, version: Version, asked: BaselineActionModel
     ) -> BaselinesModel:
-        """Reject this version; if it is in force, none is until another is accepted."""
+        """Reject this version; if in force, no baseline is in force until another is accepted."""
         await asyncio.to_thread(_require_version, context, unit, bearing, version)
         return await _done(context, unit, bearing, Reject(version), asked)
 
@@ -230,12 +230,12 @@ def baseline_action_router(context: Context) -> APIRouter:
     async def freeze(
         unit: UnitId, bearing: BearingId, asked: BaselineActionModel
     ) -> BaselinesModel:
-        """Keep the version in force; learning stops until it is thawed."""
+        """Freeze learning until it is thawed; the version in force does not change."""
         return await _done(context, unit, bearing, Freeze(), asked)
 
     @router.post("/thaw", summary="Learn again", responses=ACTION_PROBLEMS)
     async def thaw(unit: UnitId, bearing: BearingId, asked: BaselineActionModel) -> BaselinesModel:
-        """End a freeze; learning continues in its learning period."""
+        """Thaw learning after a freeze; it continues within the learning period."""
         return await _done(context, unit, bearing, Thaw(), asked)
 
     @router.post("/renew", summary="Begin again", responses=ACTION_PROBLEMS)
@@ -256,7 +256,7 @@ def baseline_action_router(context: Context) -> APIRouter:
 async def _done(
     context: Context, unit: str, bearing: str, action: BaselineAction, asked: BaselineActionModel
 ) -> BaselinesModel:
-    """Carry out an action; answer when it is stored."""
+    """Execute an action; return the baselines after it is stored."""
     place = watched_place(context, unit, bearing)
     try:
         await context.operators.act(place, action, actor_or(asked.actor), asked.reason)

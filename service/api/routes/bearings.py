@@ -1,4 +1,4 @@
-"""One bearing: its configuration, its newest result, its uncertainty budgets."""
+"""Routes for bearings: configuration, newest result, uncertainty budgets."""
 
 from typing import Annotated, Literal
 
@@ -39,27 +39,27 @@ Note = Annotated[str, Field(description="Note of the author.", examples=["after 
 
 
 class ReferenceModel(ApiModel):
-    """Origin of the reference in force."""
+    """Origin of the gap reference in force."""
 
     source: Literal["plant_file", "given", "measured"]
-    """Plant file, values given by hand, or mean gaps measured when it was set."""
+    """Plant file, values entered by hand, or mean gaps measured when the reference was set."""
 
     set: SetTime | None
-    """Time when it was set; null for the plant file."""
+    """Time when the reference was set; null for the plant file."""
 
     author: Author | None
-    """Person who set it; null for the plant file."""
+    """Person who set the reference; null for the plant file."""
 
     note: Note | None
-    """Note of the author, if any."""
+    """Note of the author; null without a note."""
 
 
 PLANT_FILE = ReferenceModel(source="plant_file", set=None, author=None, note=None)
-"""Origin of gaps from the plant file."""
+"""Origin of a gap reference from the plant file."""
 
 
 class BearingModel(ApiModel):
-    """A bearing as configured, with the reference in force."""
+    """Configuration of a bearing, with the gap reference in force."""
 
     unit: str
     """Identifier of the unit."""
@@ -68,35 +68,35 @@ class BearingModel(ApiModel):
     """Identifier of the bearing."""
 
     bracket_stiffness_n_per_m: float
-    """Radial stiffness of the bracket."""
+    """Radial stiffness of the bracket, N/m."""
 
     clearance_um: float
-    """Radial clearance in operation."""
+    """Radial clearance in operation, µm."""
 
     gap_reference_um: MicrometrePair
-    """Probe gaps [x, y] with the shaft centred, as in force."""
+    """Gap reference in force: probe gaps [x, y] with the shaft centred, µm."""
 
     opposite_reference_um: MicrometrePair | None
-    """Gaps of the probes across the shaft; null without such probes."""
+    """Gap reference of the probes across the shaft, µm; null without such probes."""
 
     reference: ReferenceModel
-    """Origin of these gaps."""
+    """Origin of the gap reference."""
 
     channels: dict[str, str]
-    """Channel ids of shaft_x, shaft_y, bearing_x and bearing_y."""
+    """Identifiers of the channels shaft_x, shaft_y, bearing_x and bearing_y."""
 
 
 class LatestModel(BearingAnswer):
-    """A bearing now. Readings that are not current are null with the reason."""
+    """Newest result of a bearing. Readings that are not current are null with a reason."""
 
     time: Time | None
-    """End of the samples of the newest result, also if it is not current."""
+    """End of the samples of the newest result, also if the result is not current."""
 
     age_s: float | None
-    """Age of that result, s."""
+    """Age of the newest result, s."""
 
     quality: QualityModel
-    """Worst quality of the 1× amplitudes and the preferred stiffness."""
+    """Worst quality of the 1× amplitudes and of the preferred stiffness."""
 
     speed_source: SpeedSourceName | None
     """Source of the running speed."""
@@ -105,39 +105,39 @@ class LatestModel(BearingAnswer):
         dict[str, RunoutName | None],
         Field(examples=[{"shaft_x": "applied", "shaft_y": "no_vector"}]),
     ]
-    """Runout compensation of 1× of the newest segment, by "shaft_x" and "shaft_y": "applied", or
-    why not: "no_vector" (none in the plant file), "other_probe" (measured with another probe than
-    the present one), "not_slow_roll" (read above a quarter of the rated speed),
-    "no_phase_reference" (no key-phase, or its pulses are missing, doubled, irregular or
-    contradicted). Null if nothing is current."""
+    """Runout compensation of 1× in the newest segment, by "shaft_x" and "shaft_y": "applied", or
+    the reason why it is not applied: "no_vector" (no runout vector in the plant file),
+    "other_probe" (vector measured with a probe other than the present one), "not_slow_roll" (vector
+    measured above a quarter of the rated speed), "no_phase_reference" (no key-phase, or its pulses
+    are missing, doubled, irregular or contradicted). Null without a current result."""
 
     clipped_share: Annotated[
         dict[str, float], Field(examples=[{"shaft_x": 0.0, "bearing_x": 0.0002}])
     ]
-    """Share of samples of the newest segment at an end of the converter's range, by
-    "shaft_x" to "bearing_y"; empty without waveforms, or if nothing is current."""
+    """Fraction of the samples of the newest segment at a limit of the converter's range, by
+    "shaft_x" to "bearing_y"; empty without waveforms or without a current result."""
 
     window: WindowModel | None
-    """Samples of the newest result."""
+    """Averaging window of the newest result."""
 
     estimators: dict[str, EstimatorName | None]
-    """Estimator of `stiffness` by axes "xx" and "yy"; null if there is none."""
+    """Estimator of the preferred stiffness, by axes "xx" and "yy"; null without a stiffness."""
 
     readings: dict[str, ReadingModel]
     """All quantities of the catalogue, by name."""
 
 
 class BudgetLineModel(ApiModel):
-    """One contribution to the uncertainty of a result."""
+    """Contribution of one source to the uncertainty of a result."""
 
     name: Annotated[str, Field(examples=["bracket stiffness"])]
     """Source of uncertainty."""
 
     kind: Literal["random", "systematic"]
-    """Random if it differs from result to result, systematic if it stays the same."""
+    """Random if the error differs between results, systematic if it is constant."""
 
     distribution: Literal["normal", "uniform"]
-    """Assumed distribution."""
+    """Assumed distribution of the error."""
 
     width: float
     """Standard uncertainty if normal, half-width if uniform, in the unit of the source."""
@@ -153,33 +153,33 @@ class BudgetModel(ApiModel):
     """Uncertainty budget of one result (JCGM 100:2008, "GUM")."""
 
     quantity: Annotated[str, Field(examples=["dynamic_k_xx_n_per_m"])]
-    """Name from the catalogue."""
+    """Name of the quantity in the catalogue."""
 
     unit: Annotated[str, Field(examples=["N/m"])]
     """Unit of the value and of the uncertainties."""
 
     time: Time
-    """End of the samples."""
+    """End of the samples of the result."""
 
     value: float
-    """Result."""
+    """Value of the result."""
 
     uncertainty: UncertaintyModel
-    """Combined uncertainty."""
+    """Combined uncertainty of the result."""
 
     lines: list[BudgetLineModel]
-    """Contributions, largest first."""
+    """Contributions to the uncertainty, largest first."""
 
 
 def reference_model(reference: GapReference | None) -> ReferenceModel:
-    """Return the origin of a reference; None stands for the plant file."""
+    """Return the API model of the origin of a gap reference; None stands for the plant file."""
     if reference is None:
         return PLANT_FILE
     return ReferenceModel.of(reference, note=reference.note or None)
 
 
 def latest_model(live: LiveState, unit: str, bearing: str) -> LatestModel:
-    """Return the newest result of a bearing; values that are not current are null."""
+    """Return the API model of the newest result; values that are not current are null."""
     current = live.current(unit, bearing)
     newest = current.assessment
     shown = newest if current.is_current else None
@@ -198,29 +198,29 @@ def latest_model(live: LiveState, unit: str, bearing: str) -> LatestModel:
 
 
 def estimator_names(assessment: Assessment) -> dict[str, EstimatorName | None]:
-    """Return the estimator of the preferred stiffness by axes."""
+    """Return the name of the estimator of the preferred stiffness, by axes."""
     chosen = assessment.estimators
     return {axes: estimator.value if estimator else None for axes, estimator in chosen.items()}
 
 
 def runout_names(assessment: Assessment) -> dict[str, RunoutName | None]:
-    """Return the runout compensation by shaft channel."""
+    """Return the state of the runout compensation, by shaft channel."""
     return {place: verdict.value for place, verdict in assessment.runout.items()}
 
 
 def bearing_router(context: Context) -> APIRouter:
-    """Return the routes of one bearing."""
+    """Return the router for bearings."""
     router = subject_router("/units/{unit}/bearings", "bearing")
     unknown, no_result = problem_responses(404), problem_responses(404, 409)
 
     @router.get("", summary="All bearings of a unit", responses=unknown)
     async def bearings(unit: UnitId) -> list[BearingModel]:
-        """List the guide bearings of a unit as configured, with their references in force."""
+        """List the guide bearings of a unit with configuration and gap reference in force."""
         return [_bearing(context, unit, bearing.id) for bearing in context.unit(unit).bearing]
 
     @router.get("/{bearing}", summary="One bearing as configured", responses=unknown)
     async def one_bearing(unit: UnitId, bearing: BearingId) -> BearingModel:
-        """Show bracket, clearance, channels, and the reference in force with its origin."""
+        """Return bracket, clearance, channels, and the gap reference in force with its origin."""
         return _bearing(context, unit, bearing)
 
     @router.get(
@@ -230,13 +230,13 @@ def bearing_router(context: Context) -> APIRouter:
         responses=unknown,
     )
     async def latest(unit: UnitId, bearing: BearingId) -> Response:
-        """Show the newest result; values that are not current are null."""
+        """Return the newest result; values that are not current are null."""
         context.bearing(unit, bearing)
         return await rendered(lambda: latest_model(context.live, unit, bearing))
 
     @router.get("/{bearing}/budgets/{quantity}", summary="Uncertainty budget", responses=no_result)
     async def budget(unit: UnitId, bearing: BearingId, quantity: QuantityName) -> BudgetModel:
-        """Show the uncertainty budget of the newest result of a quantity."""
+        """Return the uncertainty budget of the newest result of a quantity."""
         context.bearing(unit, bearing)
         if quantity not in BY_NAME or not BY_NAME[quantity].has_uncertainty:
             detail = f"quantity {quantity!r} has no uncertainty budget; see /api/v1/quantities"
@@ -262,7 +262,7 @@ def _bearing(context: Context, unit: str, bearing: str) -> BearingModel:
 
 
 def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
-    """Return the budget of a current reading; preferred stiffness uses that of its estimator."""
+    """Return the budget of a current reading; for the preferred stiffness, of its estimator."""
     assessment = current.assessment
     if assessment is None or not current.is_current:
         return None
@@ -287,6 +287,6 @@ def _budget(current: CurrentBearing, quantity: str) -> BudgetModel | None:
 
 
 def no_result(unit: str, bearing: str) -> ProblemError:
-    """Return the problem of a bearing without a result."""
+    """Return the error for a bearing without a result, status 409."""
     detail = f"unit {unit!r} bearing {bearing!r} has no result yet; the first takes one segment"
     return ProblemError(409, "No result yet", detail)

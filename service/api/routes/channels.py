@@ -1,4 +1,4 @@
-"""Channels of a unit and their newest samples."""
+"""Routes for the channels of a unit and their newest samples."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal
@@ -34,46 +34,46 @@ ChannelUnit = Annotated[
 
 
 class WaveformChannelModel(ApiModel):
-    """A waveform channel: settings and present state."""
+    """Waveform channel: settings and current state."""
 
     id: Annotated[str, Field(examples=["ujb_shaft_x"])]
-    """Identifier within the unit."""
+    """Identifier of the channel within the unit."""
 
     transducer: TransducerName
     """Kind of transducer."""
 
     unit: ChannelUnit
-    """Engineering unit of its samples."""
+    """Engineering unit of the samples."""
 
     sensitivity: float | None
-    """Sensitivity; null for a key-phase, and where counts are scaled."""
+    """Sensitivity of the transducer; null for a key-phase, and if counts are scaled directly."""
 
     sensitivity_unit: str | None
     """Unit of the sensitivity."""
 
     full_scale_v: float | None
-    """Converter input in volts that reads full scale; null where counts are scaled."""
+    """Converter input at full scale, V; null if counts are scaled directly."""
 
     ok_min_v: float | None
-    """Lowest mean voltage of a healthy transducer."""
+    """Lowest mean voltage of a healthy transducer, V."""
 
     ok_max_v: float | None
-    """Highest mean voltage of a healthy transducer."""
+    """Highest mean voltage of a healthy transducer, V."""
 
     unit_per_count: float | None
-    """Engineering units per count, where counts are scaled; else null."""
+    """Engineering units per count; null if counts are not scaled directly."""
 
     ok_min: float | None
-    """Lowest mean of a healthy transducer whose counts are scaled, in engineering units."""
+    """Lowest mean of a healthy transducer in engineering units, if counts are scaled directly."""
 
     ok_max: float | None
-    """Highest mean of such a transducer, in engineering units."""
+    """Highest mean of a healthy transducer in engineering units, if counts are scaled directly."""
 
     gain_uncertainty: float
     """Half-width of the relative error of the sensitivity."""
 
     direction: Literal[1, -1]
-    """+1 if an increasing reading is motion along the positive bearing axis, else -1."""
+    """+1 if an increasing reading means motion along the positive bearing axis, else -1."""
 
     probe: str | None
     """Serial number or mark of the probe; null if unknown."""
@@ -82,26 +82,26 @@ class WaveformChannelModel(ApiModel):
     """Uses of the channel: bearing and place, or "key_phase"."""
 
     quality: QualityModel
-    """Quality of its newest block of samples."""
+    """Quality of the newest block of samples."""
 
     minimum: float | None
-    """Lowest sample of that block; null if the channel is bad, and for racks without samples."""
+    """Lowest sample of the newest block; null for a bad channel, and for racks without samples."""
 
     maximum: float | None
-    """Highest sample, likewise."""
+    """Highest sample of the newest block; null like `minimum`."""
 
     mean: float | None
-    """Mean of the samples, likewise; for a proximity probe, the gap."""
+    """Mean of the newest block, for a proximity probe the gap; null like `minimum`."""
 
 
 class SlowChannelModel(ApiModel):
-    """A slow channel: settings and newest reading."""
+    """Slow channel: settings and newest reading."""
 
     id: Annotated[str, Field(examples=["ujb_oil_temperature"])]
-    """Identifier within the unit."""
+    """Identifier of the channel within the unit."""
 
     unit: Literal["r/min", "MW", "degC", "mm"]
-    """Unit of its readings."""
+    """Unit of the readings."""
 
     minimum: float
     """Lowest valid reading."""
@@ -110,29 +110,29 @@ class SlowChannelModel(ApiModel):
     """Highest valid reading."""
 
     used_by: Annotated[list[str], Field(examples=[["UJB oil_temperature"]])]
-    """Uses of the channel."""
+    """Uses of the channel: bearing and key, or key of the unit."""
 
     value: float | None
     """Newest reading; null if and only if the level is bad."""
 
     quality: QualityModel
-    """Quality of that reading."""
+    """Quality of the newest reading."""
 
 
 class ChannelsModel(ApiModel):
-    """All channels of a unit."""
+    """All channels of a unit with their current state."""
 
     unit: str
     """Identifier of the unit."""
 
     rate_hz: float
-    """Samples per second and channel."""
+    """Sampling rate, Hz."""
 
     time: Time | None
-    """End of the newest block, also if it is not current; null without a block."""
+    """End of the newest block, also if the block is not current; null without a block."""
 
     age_s: float | None
-    """Age of that block, s."""
+    """Age of the newest block, s."""
 
     waveform: list[WaveformChannelModel]
     """Waveform channels in the order of the source."""
@@ -145,17 +145,17 @@ class ChannelSamplesModel(ApiModel):
     """Samples of one channel."""
 
     unit: ChannelUnit
-    """Engineering unit."""
+    """Engineering unit of the samples."""
 
     quality: QualityModel
-    """Worst quality of the blocks of these samples."""
+    """Worst quality of the blocks that contain the samples."""
 
     sample: list[float | None]
-    """One sample per index; null where it is missing or the channel was bad."""
+    """Samples, one per sample index; null if the sample is missing or the channel was bad."""
 
 
 class WaveformModel(SampleRange):
-    """Newest samples of some channels of a unit."""
+    """Newest samples of the requested channels of a unit."""
 
     unit: str
     """Identifier of the unit."""
@@ -167,10 +167,10 @@ class WaveformModel(SampleRange):
     """Age of the newest sample, s; it grows while the link is lost."""
 
     n_samples: int
-    """Samples of each channel."""
+    """Number of samples per channel."""
 
     channels: dict[str, ChannelSamplesModel]
-    """Requested channels."""
+    """Samples of the requested channels."""
 
 
 UNITS: dict[Measurand, ChannelUnit] = {
@@ -183,14 +183,14 @@ UNITS: dict[Measurand, ChannelUnit] = {
 """Units of waveform channels, written as in exported recordings."""
 
 USES = (*CHANNEL_KEYS, *OPTIONAL_CHANNEL_KEYS, *GAP_KEYS, "oil_temperature")
-"""Keys of a bearing that name channels."""
+"""Keys of a bearing in the plant file that contain channel identifiers."""
 
 UNIT_USES = ("speed_channel", "power_channel", "key_phase")
-"""Keys of a unit that name channels."""
+"""Keys of a unit in the plant file that contain channel identifiers."""
 
 
 def channels_model(live: LiveState, settings: UnitSettings) -> ChannelsModel:
-    """Return all channels of a unit with the state of its newest block."""
+    """Return the API model of all channels of a unit, with the state of the newest block."""
     newest, why_not = live.newest_block(settings.id), live.why_no_samples(settings.id)
     shown = newest if why_not is None else None
     why = why_not or Reason.WAITING_FOR_DATA
@@ -212,7 +212,7 @@ def channels_model(live: LiveState, settings: UnitSettings) -> ChannelsModel:
 
 
 def rows_of(settings: UnitSettings, channel: str) -> list[int]:
-    """Return the rows of a block that belong to a channel; a rack has several."""
+    """Return the row numbers of a channel in a block; a rack has several rows per channel."""
     if isinstance(settings.source, ModbusVectorSettings):
         return [n for n, row in enumerate(settings.source.rows) if row.channel == channel]
     return [n for n, each in enumerate(settings.channel) if each.id == channel]
@@ -240,7 +240,7 @@ def _waveform(
 def _extent(
     settings: UnitSettings, block: SampleBlock | None, rows: list[int], quality: Quality
 ) -> dict[str, Any]:
-    """Return extremes and mean of a block; rows of a rack have no samples."""
+    """Return minimum, maximum and mean of a channel in a block; racks have no samples."""
     has_samples = not isinstance(settings.source, ModbusVectorSettings)
     if block is None or quality.level is Level.BAD or not has_samples:
         return {"minimum": None, "maximum": None, "mean": None}
@@ -258,7 +258,7 @@ def _slow(
 
 
 def _uses(settings: UnitSettings) -> dict[str, list[str]]:
-    """Return the uses of each channel."""
+    """Return the uses of each channel, by channel identifier."""
     found: dict[str, list[str]] = {}
     for key in UNIT_USES:
         found.setdefault(getattr(settings, key), []).append(key)
@@ -271,7 +271,7 @@ def _uses(settings: UnitSettings) -> dict[str, list[str]]:
 def waveform_model(
     settings: UnitSettings, channels: Sequence[str], window: SampleWindow, age_s: float
 ) -> WaveformModel:
-    """Return the model of samples."""
+    """Return the API model of the samples in a window."""
     units = {each.id: UNITS[each.measurand] for each in settings.channel}
     return WaveformModel.of(
         window,
@@ -296,14 +296,14 @@ MAX_NUMBERS = 200_000
 
 
 def channel_router(context: Context) -> APIRouter:
-    """Return the routes of channels."""
+    """Return the router for channels."""
     router = subject_router("/units/{unit}", "plant")
 
     @router.get("/channels", summary="Channels", responses=problem_responses(404))
     async def channels(unit: UnitId) -> ChannelsModel:
         """List settings and state of every waveform channel and slow channel of a unit.
 
-        The state is that of the newest block; a bad channel has null values.
+        The state refers to the newest block; the values of a bad channel are null.
         """
         return channels_model(context.live, context.unit(unit))
 
@@ -327,7 +327,7 @@ def channel_router(context: Context) -> APIRouter:
     ) -> Response:
         """Return the newest samples of a unit from memory, in engineering units.
 
-        Missing samples, and those of a bad channel, are null.
+        Missing samples and samples of a bad channel are null.
         """
         settings = context.unit(unit)
         chosen = _chosen(settings, channel)
@@ -346,14 +346,14 @@ def channel_router(context: Context) -> APIRouter:
 
 
 def require_samples(settings: UnitSettings) -> None:
-    """Raise a problem of status 409 for a unit whose source gives no samples."""
+    """Raise a problem of status 409 if the source of a unit delivers no samples."""
     if isinstance(settings.source, ModbusVectorSettings):
         detail = f"unit {settings.id!r} is read from a rack that gives amplitudes, not samples"
         raise ProblemError(409, "No samples", detail)
 
 
 def held_blocks(live: LiveState, unit: str) -> tuple[Sequence[SampleBlock], float]:
-    """Return the blocks of a unit in memory and their age; raise a problem without samples."""
+    """Return the buffered blocks of a unit and their age; raise a problem without samples."""
     blocks, age_s = live.blocks(unit), live.data_age_s(unit)
     if not blocks or age_s is None:
         raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")

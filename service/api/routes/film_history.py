@@ -1,4 +1,4 @@
-"""Readings of a film over time, with the condition of each."""
+"""Route for the readings of a film over time, with their operating conditions."""
 
 from collections.abc import Iterable, Iterator
 from typing import Annotated, Any, Literal, cast
@@ -43,13 +43,13 @@ ProvenanceName = Literal["measured", "simulated"]
 
 
 class FilmSeriesModel(ApiModel):
-    """Readings of a film in one direction; one value per time, null without a number."""
+    """Columns of film readings in one direction, with one value per time; null if unknown."""
 
     stiffness_n_per_m: list[float | None]
-    """Stiffness by the watched estimator."""
+    """Stiffness by the watched estimator, N/m."""
 
     u_random_n_per_m: list[float | None]
-    """Random standard uncertainty."""
+    """Random standard uncertainty of the stiffness, N/m."""
 
     shaft_um_pk: list[float | None]
     """Shaft motion relative to the bearing at 1×, zero to peak."""
@@ -58,19 +58,19 @@ class FilmSeriesModel(ApiModel):
     """Bearing motion at 1×, zero to peak."""
 
     evidence: list[EvidenceName]
-    """"measured", or why there is no number."""
+    """"measured", or the reason why the stiffness is unknown."""
 
     verdict: list[VerdictName]
-    """Verdict when the reading was made."""
+    """Verdict on the film when the reading was made."""
 
     level: list[LevelHeldName | None]
-    """Level in force at that time."""
+    """Alarm level in force when the reading was made; null without a level."""
 
     change_percent: list[float | None]
-    """Most significant mean change of stiffness at that time, %."""
+    """Most significant mean change of stiffness when the reading was made, %."""
 
     deviation_percent: list[float | None]
-    """Deviation of the reading alone, %; null if it was not compared."""
+    """Deviation of the single reading, %; null if the reading was not compared."""
 
 
 class FilmReadingsModel(BearingHistory):
@@ -80,13 +80,13 @@ class FilmReadingsModel(BearingHistory):
     """Estimator of the stiffness."""
 
     n_found: int
-    """Readings in this range that match; more than given here if they were thinned."""
+    """Number of matching readings in this range, including readings that the answer omits."""
 
     next_end: Time | None
-    """Without thinning, value of ``end`` for the page of older readings; null if there are none."""
+    """Without thinning, ``end`` of the page with older readings; null without older readings."""
 
     time: list[float]
-    """Seconds since 1970 UTC."""
+    """Times of the readings, seconds since 1970 UTC."""
 
     provenance: list[ProvenanceName]
     """"measured" on the machine, or "simulated" without samples."""
@@ -95,16 +95,16 @@ class FilmReadingsModel(BearingHistory):
     """Operating state of the unit."""
 
     is_settled: list[bool]
-    """Whether the state had lasted long enough for films to be compared."""
+    """Whether the operating state had lasted long enough for a comparison of films."""
 
     speed_rpm: list[float | None]
-    """Speed, r/min."""
+    """Running speed, r/min."""
 
     power_mw: list[float | None]
     """Active power, MW."""
 
     eccentricity_ratio: list[float | None]
-    """Eccentricity over clearance."""
+    """Eccentricity ratio: eccentricity divided by clearance."""
 
     attitude_deg: list[float | None]
     """Attitude angle, degrees."""
@@ -113,7 +113,7 @@ class FilmReadingsModel(BearingHistory):
     """Oil temperature, °C."""
 
     baseline_version: list[int | None]
-    """Version of the baseline; null where none was in force."""
+    """Version of the baseline in force; null without a baseline in force."""
 
     x: FilmSeriesModel
     """Readings in x."""
@@ -128,7 +128,7 @@ EVIDENCE_NAMES = {code: cast("EvidenceName", code.name.lower()) for code in Read
 
 
 def rows_shown(n_found: int, max_points: int, is_thinned: bool) -> Rows:
-    """Return the rows to show: evenly thinned including the newest, or the newest rows."""
+    """Return the row numbers to show: thinned evenly with the newest row, or the newest rows."""
     if n_found <= max_points:
         return np.arange(n_found)
     if not is_thinned:
@@ -137,12 +137,12 @@ def rows_shown(n_found: int, max_points: int, is_thinned: bool) -> Rows:
 
 
 def film_readings_model(query: FilmQuery, found: FilmHistory, rows: Rows) -> FilmReadingsModel:
-    """Return the model of some readings of a film.
+    """Return the API model of selected readings of a film.
 
     Parameters
     ----------
     rows
-        Rows of the history to show.
+        Numbers of the selected rows of the history.
     """
     history, first = found.history, int(rows[0]) if rows.size else 0
     x, y = (_series(found, direction, rows) for direction in range(2))
@@ -195,22 +195,22 @@ UNITS = {
     "_deg": "deg",
     "_c": "°C",
 }
-"""Units by the suffix of a name."""
+"""Units of columns by the suffix of the column name."""
 
 CONDITION = (
     *("provenance", "operating_state", "is_settled", "speed_rpm", "power_mw"),
     *("eccentricity_ratio", "attitude_deg", "oil_temperature_c", "baseline_version"),
 )
-"""Columns that both directions share."""
+"""Names of the columns that are common to both directions."""
 
 
 def film_table(model: FilmReadingsModel, found: FilmHistory, rows: list[int]) -> list[Column]:
-    """Return readings as columns.
+    """Return the readings of a model as table columns.
 
     Parameters
     ----------
     rows
-        Rows of the history that the model shows.
+        Numbers of the rows of the history that the model contains.
     """
     times = found.history.time_ns[rows].tolist()
     return [
@@ -231,14 +231,14 @@ def _columns(model: ApiModel, names: Iterable[str], prefix: str = "") -> Iterato
 MAX_POINTS = 20_000
 
 MAX_READ = 120_000
-"""Maximum number of readings read by one request: over two years of one every ten minutes."""
+"""Maximum number of readings read by one request: over two years at one per ten minutes."""
 
 
 READING_PROBLEMS = problem_responses(404, 422, 503, own={409: "The film is not watched"})
 
 
 def film_history_router(context: Context) -> APIRouter:
-    """Return the route of the readings of a film."""
+    """Return the router for the readings of a film."""
     router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 
     @router.get(
@@ -267,7 +267,7 @@ def film_history_router(context: Context) -> APIRouter:
             ),
         ] = True,
     ) -> Response:
-        """List stiffness with the operating condition of each reading, by column, oldest first.
+        """List stiffness and operating condition of the readings of a film, oldest first.
 
         As CSV or Parquet: one row per reading.
         """

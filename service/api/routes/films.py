@@ -1,4 +1,4 @@
-"""The film of a bearing now: verdict, change with its uncertainty, cause, condition."""
+"""Route for the current film of a bearing: verdict, change, cause, condition."""
 
 import math
 from dataclasses import dataclass
@@ -48,35 +48,35 @@ LevelHeldName = Literal["alert", "danger"]
 
 
 class FilmChangeModel(ApiModel):
-    """The most significant mean deviation of stiffness from the baseline."""
+    """Most significant mean deviation of the stiffness from the baseline."""
 
     percent: Annotated[float, Field(examples=[-19.2])]
-    """Change of stiffness, %; negative is softer."""
+    """Change of stiffness, %; negative if the film is softer."""
 
     low_95: Annotated[float, Field(examples=[-21.9])]
-    """Lower end of its 95 % interval, %."""
+    """Lower end of the 95 % interval of the change, %."""
 
     high_95: Annotated[float, Field(examples=[-16.4])]
-    """Upper end of that interval, %."""
+    """Upper end of the 95 % interval of the change, %."""
 
     ln: Annotated[float, Field(examples=[-0.213])]
-    """The same change as ln of stiffness over baseline; the limits apply to this value."""
+    """Change as natural logarithm of stiffness over baseline; the limits apply to it."""
 
     ln_std: float
-    """Standard uncertainty."""
+    """Standard uncertainty of `ln`."""
 
     time_scale_h: Annotated[float, Field(examples=[4.0])]
-    """Running hours of the average."""
+    """Averaging time, running hours."""
 
     significance: Annotated[float, Field(examples=[12.4])]
-    """Change over its standard uncertainty."""
+    """Absolute change divided by its standard uncertainty."""
 
     significance_wanted: Annotated[float, Field(examples=[6.5])]
-    """Significance that a change over that time must reach."""
+    """Significance that a change with this averaging time must reach."""
 
     as_of: Time | None
-    """Newest reading in the average; null if it is older than the start of the service or than
-    the baseline in force."""
+    """Time of the newest reading in the average; null if it is older than the start of the service
+    or than the baseline in force."""
 
 
 class FilmDeviationModel(ApiModel):
@@ -86,57 +86,57 @@ class FilmDeviationModel(ApiModel):
     """Deviation of stiffness, %."""
 
     low_95: float
-    """Lower end of its 95 % interval, %."""
+    """Lower end of the 95 % interval of the deviation, %."""
 
     high_95: float
-    """Upper end of that interval, %."""
+    """Upper end of the 95 % interval of the deviation, %."""
 
 
 class FilmCauseModel(ApiModel):
     """Cause of a change, inferred from the motion of the shaft."""
 
     cause: CauseName
-    """Film of this bearing, oil of all bearings, bracket or transducer, or unknown."""
+    """Cause: film of this bearing, oil of all bearings, bracket or transducer, or unknown."""
 
     reason: str
-    """Reason in words."""
+    """Reason for this cause in words."""
 
     film_share: float | None
     """Share of the change due to the film if an accelerometer causes the rest, 0 to 1 within its
     uncertainty; null if unknown, or if no such mixture explains the motion."""
 
     film_share_std: float | None
-    """Standard uncertainty."""
+    """Standard uncertainty of `film_share`."""
 
 
 class FilmDirectionModel(ApiModel):
     """State of a film in one direction."""
 
     verdict: Annotated[VerdictName, ByName]
-    """Verdict on the newest reading. Only "normal", "alert" and "danger" judge the film; the others
-    give the reason why not: too little evidence yet ("gathering_evidence"), no baseline for this
-    condition ("no_baseline"), too little motion ("insufficient_excitation"), a doubtful value
-    ("bad_quality"), a unit that has not settled ("transient"), or no current reading
+    """Verdict on the newest reading. Only "normal", "alert" and "danger" judge the film. The other
+    verdicts state why it is not judged: too little evidence yet ("gathering_evidence"), no baseline
+    for this condition ("no_baseline"), too little motion ("insufficient_excitation"), a doubtful
+    value ("bad_quality"), a unit that has not settled ("transient"), or no current reading
     ("no_reading")."""
 
     reason: Annotated[str, Field(examples=["condition_not_learned"])]
-    """Why the film is not judged; "ok" if it is."""
+    """Reason why the film is not judged; "ok" if it is judged."""
 
     level: LevelHeldName | None
-    """Level in force, also while the newest reading cannot be judged."""
+    """Alarm level in force, also while the newest reading cannot be judged."""
 
     change: FilmChangeModel | None
-    """Change; null without a baseline, before the shortest time scale is full, and without a
-    current reading."""
+    """Change of stiffness; null without a baseline, before the shortest averaging time is over, and
+    without a current reading."""
 
     deviation: FilmDeviationModel | None
     """Deviation of the newest reading alone; null if it was not compared."""
 
     stiffness_n_per_m: float | None
-    """Stiffness of the newest reading; null if there is none."""
+    """Stiffness of the newest reading; null if it could not be determined."""
 
     cause: FilmCauseModel | None
-    """Cause, while a level is in force."""
+    """Cause of the change while a level is in force; otherwise null."""
 
 
 class FilmLimitsModel(ApiModel):
@@ -150,31 +150,31 @@ class FilmLimitsModel(ApiModel):
 
 
 class FilmModel(BearingAnswer):
-    """Film of a bearing now."""
+    """Current state of the film of a bearing."""
 
     is_watched: bool
     """Whether stiffness is compared with a baseline."""
 
     why_not: str | None
-    """Why it is not compared; null if it is."""
+    """Reason why stiffness is not compared; null if it is compared."""
 
     estimator: EstimatorName | None
-    """Estimator whose stiffness is compared; always the same one for comparable readings."""
+    """Estimator of the compared stiffness; it does not change, so that readings are comparable."""
 
     time: Time | None
-    """Time of the newest reading; null if there is none since the service started."""
+    """Time of the newest reading; null without a reading since the service started."""
 
     is_current: bool
-    """Whether that reading is current."""
+    """Whether the newest reading is current."""
 
     next_reading: Time | None
     """Time of the next reading; null without current data."""
 
     condition: FilmConditionModel | None
-    """Condition of the newest result; null without current data."""
+    """Operating condition of the newest result; null without current data."""
 
     baseline_version: int | None
-    """Version in force; null if there is none."""
+    """Version of the baseline in force; null without such a baseline."""
 
     limits: FilmLimitsModel | None
     """Limits of change; null if the film is not watched."""
@@ -183,17 +183,17 @@ class FilmModel(BearingAnswer):
     """State in x; null if the film is not watched."""
 
     y: FilmDirectionModel | None
-    """State in y, likewise."""
+    """State in y; null if the film is not watched."""
 
 
 class FilmWordModel(ApiModel):
     """Verdict on a film in one direction."""
 
     verdict: VerdictName
-    """Verdict on the newest reading; "no_reading" if that is not current."""
+    """Verdict on the newest reading; "no_reading" if this reading is not current."""
 
     level: LevelHeldName | None
-    """Level in force."""
+    """Alarm level in force; null without a level."""
 
     change_percent: float | None
     """Most significant mean change of stiffness, %."""
@@ -206,17 +206,17 @@ class FilmBriefModel(ApiModel):
     """Identifier of the bearing."""
 
     why_not: str | None
-    """Why the film is not watched; null if it is."""
+    """Reason why the film is not watched; null if it is watched."""
 
     x: FilmWordModel | None
     """State in x; null if the film is not watched."""
 
     y: FilmWordModel | None
-    """State in y, likewise."""
+    """State in y; null if the film is not watched."""
 
 
 CURRENT_PERIODS = 2.5
-"""Age of a reading at the newest result, in reading periods, above which it is not current."""
+"""Maximum age of a current reading, relative to the newest result, in reading periods."""
 
 NORMAL_95 = 1.96
 """Half-width of the 95 % interval of a normal distribution, in standard deviations."""
@@ -226,12 +226,12 @@ NOT_LEARNED, ATTITUDE_NOT_LEARNED = "condition_not_learned", "attitude_not_learn
 
 @dataclass(frozen=True)
 class WatchedFilm:
-    """A watched film with the findings of its newest reading.
+    """Watched film with the findings of its newest reading.
 
     Parameters
     ----------
     why_not_current
-        Why the reading is not current; None if it is.
+        Reason why the newest reading is not current; None if it is current.
     """
 
     rules: FilmRules
@@ -242,7 +242,7 @@ class WatchedFilm:
 
 
 def why_unwatched(context: Context, unit: str, bearing: str) -> str | None:
-    """Return why a film is not watched; None if it is."""
+    """Return the reason why a film is not watched; None if it is watched."""
     if unit in context.films.unwatched:
         return context.films.unwatched[unit]
     is_watched = context.films.place(unit, bearing) is not None
@@ -250,7 +250,7 @@ def why_unwatched(context: Context, unit: str, bearing: str) -> str | None:
 
 
 def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
-    """Return the film of a bearing now."""
+    """Return the API model of the current film of a bearing."""
     seen, place = _seen(context, unit, bearing), context.films.place(unit, bearing)
     x, y = _directions(seen) if seen else (None, None)
     limits = seen.rules.change if seen else None
@@ -272,7 +272,7 @@ def film_model(context: Context, unit: str, bearing: str) -> FilmModel:
 
 
 def film_brief(context: Context, unit: str, bearing: str) -> FilmBriefModel:
-    """Return the summary of the film of a bearing."""
+    """Return the API model of the film summary of a bearing."""
     seen = _seen(context, unit, bearing)
     x, y = (_word(found) for found in _directions(seen)) if seen else (None, None)
     return FilmBriefModel(bearing=bearing, why_not=why_unwatched(context, unit, bearing), x=x, y=y)
@@ -334,7 +334,7 @@ def _directions(seen: WatchedFilm) -> tuple[FilmDirectionModel, FilmDirectionMod
 
 
 def _unread(reason: str, level: LevelHeldName | None) -> FilmDirectionModel:
-    """Return the state without a current reading: only the level in force."""
+    """Return the state of a direction without a current reading: only the level in force."""
     unknown = dict.fromkeys(("change", "deviation", "stiffness_n_per_m", "cause"))
     return FilmDirectionModel.of(verdict="no_reading", reason=reason, level=level, **unknown)
 
@@ -364,7 +364,7 @@ def _reason(seen: WatchedFilm, reading: FilmReading, finding: FilmFinding, row: 
 
 
 def _unseen(learned: QuantityBaseline, reading: FilmReading) -> str:
-    """Return the reason: the cell was not learned, or only its attitude angle."""
+    """Return the reason that a reading has no baseline: unknown cell or unknown attitude angle."""
     is_seen = learned.table.find(learned.grid.cells(reading.conditions))[0] >= 0
     return ATTITUDE_NOT_LEARNED if is_seen else NOT_LEARNED
 
@@ -396,12 +396,12 @@ def _deviation(finding: FilmFinding) -> FilmDeviationModel | None:
 
 
 def percent_of(ln: float) -> float:
-    """Return the relative change, %, for a change in ln."""
+    """Convert a change of the natural logarithm to a relative change, %."""
     return 100.0 * math.expm1(ln)
 
 
 def interval_percent(ln: float, std: float) -> tuple[float, float]:
-    """Return the 95 % interval of a change in ln, %."""
+    """Return the 95 % interval, %, of a change of the natural logarithm."""
     return percent_of(ln - NORMAL_95 * std), percent_of(ln + NORMAL_95 * std)
 
 
@@ -411,12 +411,12 @@ def verdict_name(verdict: Verdict) -> VerdictName:
 
 
 def level_name(level: int | None) -> LevelHeldName | None:
-    """Return the name of a level."""
+    """Return the name of an alarm level; None without a level."""
     return None if level is None else cast("LevelHeldName", Verdict(int(level)).name.lower())
 
 
 def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
-    """Return a watched bearing; raise a problem of status 404 or 409 otherwise."""
+    """Return a watched film; raise a problem of status 404 or 409 if it is not watched."""
     context.bearing(unit, bearing)
     place = context.films.place(unit, bearing)
     if place is None:
@@ -426,16 +426,16 @@ def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
 
 
 def film_router(context: Context) -> APIRouter:
-    """Return the route of the film now."""
+    """Return the router for the current film."""
     router = subject_router("/units/{unit}/bearings/{bearing}/film", "film")
 
     @router.get(
         "", summary="A film now", response_model=FilmModel, responses=problem_responses(404)
     )
     async def film(unit: UnitId, bearing: BearingId) -> Response:
-        """Show verdict, change with its uncertainty, cause and condition, by direction.
+        """Return verdict, change with its uncertainty, cause and condition, for x and y.
 
-        A film that cannot be judged is never reported as normal: the verdict gives the reason.
+        A film that cannot be judged is never reported as normal; its verdict states the reason.
         """
         context.bearing(unit, bearing)
         return await rendered(lambda: film_model(context, unit, bearing))

@@ -1,4 +1,4 @@
-"""Motion of a shaft in its bearing, sample by sample."""
+"""Routes for the motion of a shaft in its bearing at the full sampling rate."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -43,35 +43,35 @@ from service.settings.units import UnitSettings
 
 
 class EllipseModel(ApiModel):
-    """Orbit at running speed, in the middle of the samples."""
+    """Ellipse of the 1× orbit in the middle of the samples."""
 
     major_um_pk: float
-    """Semi-major axis."""
+    """Semi-major axis, µm."""
 
     minor_um_pk: float
-    """Semi-minor axis."""
+    """Semi-minor axis, µm."""
 
     angle_deg: float
-    """Angle of the major axis from x towards y, -90 to 90."""
+    """Angle of the major axis from x towards y, -90 to 90 degrees."""
 
     sense: Literal["x_to_y", "y_to_x", "straight"]
-    """Sense of rotation on the orbit."""
+    """Direction of motion along the orbit."""
 
 
 class MotionOrder1Model(ApiModel):
-    """Motion at running speed, from a taper of eight turns around each sample."""
+    """Motion at running speed (1×), from a tapered window of eight turns around each sample."""
 
     frequency_hz: float
-    """Running speed."""
+    """Running speed, Hz."""
 
     shaft_x_um: list[float | None]
-    """Displacement in x; null with too few samples around it."""
+    """Displacement of 1× in x, µm; null with too few neighbouring samples."""
 
     shaft_y_um: list[float | None]
-    """Displacement in y, likewise."""
+    """Displacement of 1× in y, µm; null with too few neighbouring samples."""
 
     ellipse: EllipseModel
-    """Orbit."""
+    """Ellipse of the 1× orbit."""
 
 
 class MotionModel(SampleRange, BearingAnswer):
@@ -84,29 +84,29 @@ class MotionModel(SampleRange, BearingAnswer):
     """Time of the first sample."""
 
     offset_s: float | None
-    """From the first sample of the recording to the first of these; null for the newest samples."""
+    """Offset of the first sample from the recording's start, s; null for the newest samples."""
 
     total_s: float | None
-    """Length of the recording with its gaps, s; null for the newest samples."""
+    """Duration of the recording including gaps, s; null for the newest samples."""
 
     age_s: float | None
     """Age of the newest samples, s; null for a recording."""
 
     n_samples: int
-    """Samples in each direction."""
+    """Number of samples in each direction."""
 
     shaft_x_um: list[float | None]
-    """Displacement in x, mean removed; null where a sample is missing or bad."""
+    """Displacement in x without its mean, µm; null if the sample is missing or bad."""
 
     shaft_y_um: list[float | None]
-    """Displacement in y, likewise."""
+    """Displacement in y without its mean, µm; null if the sample is missing or bad."""
 
     centre_um: Annotated[list[float] | None, Field(examples=[[-12.5, -61.0]])]
-    """Mean position [x, y] in the clearance circle, by the reference now in force; null if the gaps
-    do not determine it."""
+    """Mean position [x, y] in the clearance circle, µm, by the gap reference in force; null if the
+    gaps do not determine it."""
 
     clearance_um: float
-    """Radius of the clearance circle."""
+    """Radius of the clearance circle, µm."""
 
     speed_rpm: float | None
     """Running speed, r/min, from the key-phase, else from the slow channel."""
@@ -115,31 +115,31 @@ class MotionModel(SampleRange, BearingAnswer):
     """Motion at running speed; null without a speed, or with too few samples."""
 
     mark: list[float] | None
-    """Passages of the key-phase mark, in samples from the first, interpolated; null for a unit
-    without a key-phase."""
+    """Passages of the key-phase mark, as interpolated distances from the first sample in samples;
+    null for a unit without a key-phase."""
 
 
 class OrbitModel(ApiModel):
-    """The newest turns of the shaft relative to its bearing, means removed."""
+    """Orbit of the newest turns of the shaft relative to its bearing, without the means."""
 
     time: Time
     """Time of the first sample."""
 
     rate_hz: float
-    """Samples per second."""
+    """Sampling rate, Hz."""
 
     duration_s: float
-    """Length."""
+    """Duration of the samples, s."""
 
     shaft_x_um: list[float]
-    """Displacement in x."""
+    """Displacement in x, µm."""
 
     shaft_y_um: list[float]
-    """Displacement in y."""
+    """Displacement in y, µm."""
 
 
 DECIMALS = 3
-"""Decimals of samples in µm; finer than a tenth of a count."""
+"""Number of decimals of displacements in µm; finer than a tenth of a count."""
 
 SENSES: dict[int, Literal["x_to_y", "y_to_x", "straight"]] = {
     1: "x_to_y",
@@ -156,14 +156,14 @@ def motion_model(
     recording: str | None = None,
     recorded: RecordedMotion | None = None,
 ) -> MotionModel:
-    """Return the model of a motion.
+    """Return the API model of the motion of a shaft.
 
     Parameters
     ----------
     age_s
-        Age of samples from memory.
+        Age of the newest samples, s; None for a recording.
     recording, recorded
-        Recording of the samples and their place in it.
+        Name of the recording, and position of the samples in it; None for the newest samples.
     """
     marks = motion.marks
     return MotionModel.of(
@@ -198,7 +198,7 @@ def _rounded(values_um: FloatArray) -> list[float | None]:
 
 
 def orbit_model(orbit: OrbitTrace) -> OrbitModel:
-    """Return the model of an orbit."""
+    """Return the API model of an orbit."""
     return OrbitModel.of(
         orbit,
         time=orbit.start_ns,
@@ -224,7 +224,7 @@ RECORDING_PROBLEMS = problem_responses(
 
 
 def motion_router(context: Context) -> APIRouter:
-    """Return the routes of the newest motion."""
+    """Return the router for the newest motion."""
     router = subject_router("/units/{unit}/bearings", "bearing")
     orbits = Renderings()
 
@@ -253,7 +253,7 @@ def motion_router(context: Context) -> APIRouter:
         bearing: BearingId,
         seconds: Annotated[float, duration(HELD_S, NEWEST, examples=[5.0])] = 5.0,
     ) -> Response:
-        """Return the newest motion of a shaft in its bearing: all of it, and 1× alone."""
+        """Return the newest motion of a shaft in its bearing: unfiltered, and 1× only."""
         context.bearing(unit, bearing)
         settings, watched = context.unit(unit), context.references.bearing(unit, bearing)
         require_samples(settings)
@@ -265,7 +265,7 @@ def motion_router(context: Context) -> APIRouter:
 
 
 def recorded_motion_router(context: Context) -> APIRouter:
-    """Return the route of the motion in recordings."""
+    """Return the router for the motion in recordings."""
     router = subject_router("/recordings", "recordings")
 
     @router.get(
@@ -291,9 +291,9 @@ def recorded_motion_router(context: Context) -> APIRouter:
         ] = 0.0,
         seconds: Annotated[float, duration(MAX_SECONDS, "Duration.")] = 10.0,
     ) -> Response:
-        """Return the motion of a shaft in its bearing at a time of a recording.
+        """Return the motion of a shaft in its bearing from a part of a recording.
 
-        The calibration of the recording applies. The answer ends before a restart of the device.
+        The calibration in the recording applies. The samples end before a restart of the device.
         """
         kept = await entry_of(context, recording)
         unit = _unit_of(context, kept)

@@ -1,4 +1,4 @@
-"""Receivers of alarm messages, and the messages that wait for them."""
+"""Route for the receivers of alarm messages, with their backlogs."""
 
 from typing import Annotated, Literal
 
@@ -20,29 +20,29 @@ SenderStateName = Literal[
 
 
 class DeadLetterModel(ApiModel):
-    """A message that will not be delivered."""
+    """Alarm message that will never be delivered."""
 
     event_id: Annotated[str, Field(examples=["0b9a6f0e-6a55-4a1e-9a53-0c4b8b3c7b1e"])]
     """Identifier of the message for the receiver."""
 
     outcome: Literal["refused", "expired"]
-    """Permanently rejected by the receiver, or too old."""
+    """Outcome: permanently rejected by the receiver ("refused"), or too old ("expired")."""
 
     reason: Annotated[str, Field(examples=["410 Gone"])]
-    """Answer of the receiver, or why it was not reached."""
+    """Answer of the receiver, or reason why the receiver was not reached."""
 
     time: Time
-    """Time when delivery ended."""
+    """Time when the delivery was abandoned."""
 
 
 class ReceiverModel(ApiModel):
-    """A receiver of alarm messages, and its backlog."""
+    """Receiver of alarm messages, with its backlog."""
 
     id: Annotated[str, Field(examples=["control-room"])]
-    """Name in the plant file; for mail, with the recipient."""
+    """Name of the receiver in the plant file; for mail, with the recipient."""
 
     kind: ChannelKind | None
-    """Channel; null if the receiver is no longer in the plant file."""
+    """Kind of receiver; null if the receiver is no longer in the plant file."""
 
     address: Annotated[str | None, Field(examples=["https://alarms.example"])]
     """Server of a webhook, or mail address."""
@@ -54,54 +54,54 @@ class ReceiverModel(ApiModel):
     """Whether the newest attempt failed."""
 
     n_failures: int
-    """Failed attempts since the last success."""
+    """Number of failed attempts since the last success."""
 
     failing_since: Time | None
-    """Time of the first of them."""
+    """Time of the first failed attempt since the last success; null without failures."""
 
     reason: Annotated[str | None, Field(examples=["Connection refused"])]
-    """Reason of the newest of them."""
+    """Reason of the newest failure."""
 
     next_attempt: Time | None
-    """Time of the next attempt."""
+    """Time of the next attempt; null unless the sender waits for it."""
 
     n_waiting: int
-    """Waiting messages."""
+    """Number of waiting messages."""
 
     waiting_since: Time | None
-    """Start of the wait of the oldest message."""
+    """Time since which the oldest message waits; null without waiting messages."""
 
     n_dead: int
-    """Messages never delivered: rejected or too old."""
+    """Number of messages that will never be delivered: rejected or too old."""
 
     last_dead: DeadLetterModel | None
-    """Newest of these."""
+    """Newest message that will never be delivered; null without such a message."""
 
     last_delivered: Time | None
-    """Time of the last delivery."""
+    """Time of the newest delivery; null without a delivery."""
 
 
 class DeliveryModel(DatedAnswer):
-    """All receivers."""
+    """State of all receivers of alarm messages."""
 
     origin: Literal["live", "replay"]
-    """A replay sends no messages."""
+    """Origin of the data; a replay sends no messages."""
 
     n_waiting: int
-    """Waiting messages of all receivers."""
+    """Number of waiting messages of all receivers."""
 
     n_failing: int
-    """Receivers whose newest attempt failed."""
+    """Number of receivers whose newest attempt failed."""
 
     receivers: list[ReceiverModel]
-    """Receivers in the order of the plant file, then those no longer in it."""
+    """Receivers in the order of the plant file, then receivers that are no longer in it."""
 
 
 NO_BACKLOG = Backlog("", 0, None, 0, None, None)
 
 
 def delivery_router(context: Context) -> APIRouter:
-    """Return the route of deliveries."""
+    """Return the router for the delivery of alarm messages."""
     router = subject_router("", "alarms", reach=Reach.NO_UNIT)
 
     @router.get(
@@ -111,7 +111,7 @@ def delivery_router(context: Context) -> APIRouter:
         responses=problem_responses(503),
     )
     async def delivery() -> Response:
-        """List all receivers of webhooks and mail: backlog, failures, undelivered messages."""
+        """List receivers of webhooks and mail with backlog, failures and undelivered messages."""
         receivers = [_receiver(view) for view in await context.receivers()]
         return await rendered_now(lambda: _delivery(context, receivers))
 

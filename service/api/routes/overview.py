@@ -1,4 +1,4 @@
-"""The overview of the plant, rendered once for all clients."""
+"""Route for the overview of the plant, which is rendered once for all clients."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,23 +22,23 @@ class EvidenceStatusModel(ApiModel):
     """State of the evidence of alarms."""
 
     error: str | None
-    """Why the newest attempt to write evidence failed."""
+    """Reason why the newest attempt to write evidence failed."""
 
     n_waiting: int
-    """Occurrences whose evidence is not written yet."""
+    """Number of occurrences whose evidence is not written yet."""
 
     n_written: int
-    """Written since the service started."""
+    """Number of occurrences whose evidence was written since the service started."""
 
     n_lost: int
-    """Dropped since then because too many were waiting."""
+    """Number of occurrences dropped since the service started because too many were waiting."""
 
 
 class PlantModel(ApiModel):
-    """Name and origin."""
+    """Name of the plant and origin of the data."""
 
     name: str
-    """Display name."""
+    """Display name of the plant."""
 
     origin: Literal["live", "replay"]
     """Live data or replay of a recording; also in the header Padwatch-Origin of every answer."""
@@ -48,41 +48,41 @@ class StoreModel(ApiModel):
     """State of the database."""
 
     error: str | None
-    """Why results are not stored; null if they are."""
+    """Reason why results are not stored; null if they are stored."""
 
     n_unstored: int
-    """Results missing in the database: dropped because it did not answer for too long, or rejected
-    by it and parked."""
+    """Number of results missing in the database: dropped because the database did not answer for
+    too long, or rejected by the database and parked."""
 
 
 class CapturesModel(ApiModel):
     """State of the recordings around alarms."""
 
     error: str | None
-    """Why the newest recording failed; null if it did not."""
+    """Reason why the newest recording failed; null if it succeeded."""
 
     n_running: int
-    """Recordings in progress."""
+    """Number of recordings in progress."""
 
     n_written: int
-    """Recordings finished since the service started."""
+    """Number of recordings finished since the service started."""
 
 
 class UnitOverviewModel(BasicUnitModel):
-    """A unit with all its bearings."""
+    """Unit with the newest results and films of all its bearings."""
 
     bearings: list[LatestModel]
-    """Its guide bearings now."""
+    """Newest results of the guide bearings."""
 
     films: list[FilmBriefModel]
-    """Summaries of their films, in the same order."""
+    """Film summaries of the guide bearings, in the same order."""
 
 
 class OverviewModel(DatedAnswer):
     """Overview of the plant for a control room."""
 
     plant: PlantModel
-    """Name and origin."""
+    """Name of the plant and origin of the data."""
 
     refresh_s: float
     """Period of results, s."""
@@ -91,16 +91,16 @@ class OverviewModel(DatedAnswer):
     """State of the database."""
 
     alarms: AlarmCountModel
-    """Numbers of alarms."""
+    """Counts of alarms."""
 
     captures: CapturesModel
     """State of the recordings around alarms."""
 
     evidence: EvidenceStatusModel | None
-    """State of the evidence of alarms; null where none is kept."""
+    """State of the evidence of alarms; null if no evidence is kept."""
 
     units: list[UnitOverviewModel]
-    """All units."""
+    """All units of the plant."""
 
 
 DATA_AGE, AGE, NONE = b'"data_age_s":', b'"age_s":', b"null"
@@ -108,7 +108,7 @@ DATA_AGE, AGE, NONE = b'"data_age_s":', b'"age_s":', b"null"
 NO_UNITS = b'"units":[]}'
 
 COUNTERS_S = 1.0
-"""Maximum age of sample counts, s; they change many times a second."""
+"""Maximum age of the sample counts in an answer, s; they change many times a second."""
 
 SHARED_S = 0.2
 """Time for which one answer serves all clients if no link, result or alarm changes, s."""
@@ -116,7 +116,7 @@ SHARED_S = 0.2
 
 @dataclass(frozen=True)
 class Answer:
-    """A rendered overview."""
+    """Rendered overview with its revision, time of rendering and entity tag."""
 
     revision: tuple[object, ...]
     made_s: float
@@ -126,18 +126,18 @@ class Answer:
 
 @dataclass(frozen=True)
 class UnitState:
-    """State that the part of a unit is rendered from.
+    """State of a unit from which its part of the overview is rendered.
 
     Parameters
     ----------
     values
-        Objects that are replaced when they change.
+        State as objects that are replaced, not modified, by a change.
     status
-        Object that is replaced when samples arrive.
+        Status of the unit, an object that is replaced when samples arrive.
     ages_s
         Ages of the newest sample and of the newest result of each bearing.
     now_s
-        Monotonic time.
+        Monotonic time of the state, s.
     """
 
     values: Sequence[object]
@@ -148,30 +148,30 @@ class UnitState:
 
 @dataclass(frozen=True)
 class UnitPart:
-    """JSON of a unit, split where ages are inserted."""
+    """JSON of a unit, split at the positions of its ages."""
 
     state: UnitState
     pieces: Sequence[bytes]
     digest: bytes
 
     def is_of(self, state: UnitState) -> bool:
-        """Whether the state is unchanged; objects are compared by identity."""
+        """Whether the part is up to date with a state; objects are compared by identity."""
         mine = self.state
         if any(old is not new for old, new in zip(mine.values, state.values, strict=True)):
             return False
         return mine.status is state.status or state.now_s - mine.now_s < COUNTERS_S
 
     def filled(self, ages_s: Sequence[float | None]) -> bytes:
-        """Return the JSON with these ages."""
+        """Return the JSON with the given ages inserted."""
         first, *others = self.pieces
         ages = (NONE if age_s is None else repr(age_s).encode() for age_s in ages_s)
         return b"".join([first, *(x for pair in zip(ages, others, strict=True) for x in pair)])
 
 
 class Overview:
-    """Renders the overview; the part of a unit is kept until the unit changes.
+    """Renderer of the overview; the part of a unit is cached until the unit changes.
 
-    State is read on the event loop, which also writes it; threads render.
+    The state is read on the event loop, which also writes it; rendering runs in threads.
     """
 
     def __init__(self, context: Context) -> None:
@@ -182,7 +182,7 @@ class Overview:
         self._answer: Answer | None = None
 
     async def answer(self) -> Response:
-        """Return the overview."""
+        """Return a response with the overview; render the overview first if it is outdated."""
         revision, now_s = self._revision(), self._context.clock.monotonic_s()
         kept = self._answer
         if kept is None or kept.revision != revision or now_s - kept.made_s >= SHARED_S:
@@ -190,7 +190,7 @@ class Overview:
         return Response(kept.body, media_type="application/json", headers={"ETag": kept.tag})
 
     def _revision(self) -> tuple[object, ...]:
-        """Return values whose change must be shown without delay."""
+        """Return all values whose changes must be shown without delay."""
         live, alarms, captures = self._context.live, self._context.alarms, self._context.captures
         stored = (live.store_error, live.n_unstored)
         return (live.revision, alarms.revision, *stored, captures.error, captures.n_running)
@@ -224,7 +224,7 @@ class Overview:
         return part is None or not part.is_of(state)
 
     def _renew(self, states: Mapping[str, UnitState]) -> None:
-        with self._rendering:  # a concurrent request finds the parts rendered
+        with self._rendering:  # concurrent requests do not render a part twice
             for unit, state in states.items():
                 if self._is_old(unit, state):
                     self._parts[unit] = self._part(unit, state)
@@ -242,7 +242,7 @@ class Overview:
         return UnitPart(state, _around_ages(content), digest_of(content))
 
     def _ageless(self, unit: str, bearing: str) -> LatestModel:
-        """Return a bearing without its age; it is rendered again after a new result."""
+        """Return the model of a bearing without its age; it is cached until the next result."""
         current = self._context.live.current(unit, bearing)
         values = (current.assessment, current.quality.reason)
         kept = self._latest.get((unit, bearing))
@@ -253,7 +253,7 @@ class Overview:
         return kept[1]
 
     def _head(self) -> OverviewModel:
-        """Return the overview without units."""
+        """Return the model of the overview without units."""
         context = self._context
         return OverviewModel.of(
             context,
@@ -267,20 +267,20 @@ class Overview:
 
 
 def _around_ages(content: bytes) -> list[bytes]:
-    """Split the JSON of a unit at its ages, which are all null; the age of its source is first."""
+    """Split the JSON of a unit at its ages, which are all null; the source's age is the first."""
     source, bearings = content.split(DATA_AGE + NONE, 1)
     *before, last = bearings.split(AGE + NONE)
     return [source + DATA_AGE, *(piece + AGE for piece in before), last]
 
 
 def overview_router(context: Context) -> APIRouter:
-    """Return the route of the overview."""
+    """Return the router for the overview."""
     router = subject_router("", "plant")
     shown = Overview(context)
 
     @router.get("/overview", summary="Everything at a glance", response_model=OverviewModel)
     async def overview() -> Response:
-        """Show all units with all bearings; values that are not current are null."""
+        """Return all units with all bearings; values that are not current are null."""
         return await shown.answer()
 
     return router

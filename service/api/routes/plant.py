@@ -1,4 +1,4 @@
-"""Units, their sources and gaps, the configuration, the catalogue of quantities."""
+"""Routes for units, sources, gaps, the configuration, and the catalogue of quantities."""
 
 import asyncio
 import json
@@ -22,66 +22,66 @@ from service.store.access.identities import Permission
 
 
 class DeviceClockModel(ApiModel):
-    """Clock of the device compared with the host's."""
+    """Device clock compared with the host clock."""
 
     offset_s: float | None
-    """Lead of the device's time stamps over the host's clock, s; null if it sends none."""
+    """Lead of the device's time stamps over the host clock, s; null without time stamps."""
 
     drift_ppm: float | None
-    """Deviation of the sampling rate from nominal by the host's clock, in parts per million; null
+    """Deviation of the sampling rate, timed by the host clock, from its nominal value, ppm; null
     during the first minute, and for a device that samples on request."""
 
     drift_uncertainty_ppm: float | None
-    """Standard uncertainty of the drift."""
+    """Standard uncertainty of the drift, ppm."""
 
     n_stamp_faults: int
-    """Blocks whose own time stamp did not fit the sample index and was not used."""
+    """Number of blocks whose time stamp was discarded because it contradicts the sample index."""
 
     stamp_fault: Literal["stamp_regressed", "stamp_repeated", "stamp_jumped"] | None
-    """Fault of the newest time stamp."""
+    """Fault of the newest time stamp; null without a fault."""
 
 
 class SourceModel(ApiModel):
-    """State of the source of a unit, and account of its samples."""
+    """State of the source of a unit, and counts of its samples."""
 
     state: Literal["connecting", "connected", "not_connected", "ended"]
-    """State of the link; only a recording ends."""
+    """State of the link; only the replay of a recording can be "ended"."""
 
     reason: str | None
-    """Reason, if samples do not arrive."""
+    """Reason why samples do not arrive; null if they arrive."""
 
     since: Time | None
-    """Start of this state."""
+    """Time since which the link is in this state."""
 
     data_age_s: float | None
     """Age of the newest sample, s."""
 
     last_sample_time: Time | None
-    """Time of that sample by the device's clock."""
+    """Time of the newest sample by the device clock."""
 
     n_offered: int
-    """Samples per channel counted by the device: stored + flagged + gap + rejected."""
+    """Number of samples per channel counted by the device: stored + flagged + gap + rejected."""
 
     n_stored: int
-    """Accepted, all channels good."""
+    """Number of accepted samples with all channels good."""
 
     n_flagged: int
-    """Accepted, some channel not good."""
+    """Number of accepted samples with at least one channel not good."""
 
     n_gap: int
-    """Never arrived."""
+    """Number of samples that never arrived."""
 
     n_repeated: int
-    """Repeated and dropped."""
+    """Number of repeated samples, which were dropped."""
 
     n_restarts: int
-    """Restarts of the count of the device."""
+    """Number of restarts of the sample index by the device."""
 
     rejected: dict[str, int]
-    """Rejected, by reason."""
+    """Number of rejected samples, by reason."""
 
     clock: DeviceClockModel | None
-    """Clock of the device; null if it cannot be compared with the host's."""
+    """Device clock; null if it cannot be compared with the host clock."""
 
 
 SourceKind = Literal[
@@ -90,7 +90,7 @@ SourceKind = Literal[
 
 
 class PollsModel(ApiModel):
-    """Duration of polls, including decoding."""
+    """Statistics of the duration of polls, including decoding."""
 
     n: int
     """Number of answered polls since the service started."""
@@ -99,11 +99,11 @@ class PollsModel(ApiModel):
     """Duration of the newest poll, s."""
 
     mean_s: Annotated[float, Field(examples=[0.011])]
-    """Mean duration, s."""
+    """Mean duration of polls, s."""
 
 
 class SourceHealthModel(SourceModel):
-    """Source of a unit: kind, state, and account of its samples."""
+    """Source of a unit: kind, state, and counts of its samples."""
 
     unit: Annotated[str, Field(examples=["U1"])]
     """Identifier of the unit."""
@@ -112,23 +112,23 @@ class SourceHealthModel(SourceModel):
     """Kind of source."""
 
     n_failed: int
-    """Failed connections and lost links since the service started."""
+    """Number of failed connections and lost links since the service started."""
 
     rate_hz: float
-    """Samples per second and channel."""
+    """Sampling rate, Hz."""
 
     poll_period_s: float | None
-    """Poll period, s; null for a device that sends by itself."""
+    """Poll period, s; null for a device that is not polled."""
 
     polls: PollsModel | None
-    """Duration of polls; null for a device that sends by itself, and before the second poll."""
+    """Duration of polls; null before the second poll, and for a device that is not polled."""
 
     refused_frames: Annotated[dict[str, int], Field(examples=[{"duplicate": 2}])]
-    """CAN frames rejected since the service started, by reason."""
+    """Number of CAN frames rejected since the service started, by reason."""
 
 
 def source_model(live: LiveState, unit: str) -> SourceModel:
-    """Return the state of the source of a unit."""
+    """Return the API model of the source of a unit."""
     status = live.status(unit)
     clock = status.clock and DeviceClockModel.of(
         status.clock,
@@ -146,10 +146,10 @@ def source_model(live: LiveState, unit: str) -> SourceModel:
 
 
 class GapModel(ApiModel):
-    """Samples that were not delivered, or not received while the service was stopped."""
+    """Gap: samples that were not delivered, or not received while the service was stopped."""
 
     epoch: int
-    """Epoch of the count of the device."""
+    """Epoch of the sample index."""
 
     first_index: int
     """Index of the first missing sample."""
@@ -164,48 +164,48 @@ class GapModel(ApiModel):
     """Time of the first sample after the gap."""
 
     is_estimated: bool
-    """Whether the device restarted its count in the gap: `n_samples` is then estimated from the
-    times, and otherwise exact."""
+    """Whether the device restarted its sample index in the gap; `n_samples` is then estimated from
+    the times. Otherwise it is exact."""
 
 
 class BasicUnitModel(ApiModel):
-    """A unit and the state of its source."""
+    """Unit with the state of its source."""
 
     id: str
-    """Stable identifier."""
+    """Stable identifier of the unit."""
 
     name: str
-    """Display name."""
+    """Display name of the unit."""
 
     rated_speed_rpm: float
-    """Rated running speed."""
+    """Rated speed, r/min."""
 
     source: SourceModel
-    """State of its source."""
+    """State of the source of the unit."""
 
 
 class UnitModel(BasicUnitModel):
-    """A unit and the state of its source."""
+    """Unit with the state of its source and its bearings."""
 
     bearing_ids: list[str]
-    """Identifiers of its guide bearings."""
+    """Identifiers of the guide bearings of the unit."""
 
 
 class QuantityModel(ApiModel):
-    """A quantity of results and trends."""
+    """Quantity of results and trends, from the catalogue."""
 
     name: str
-    """Name in readings and trends."""
+    """Name of the quantity in readings and trends."""
 
     unit: str
-    """Unit and detector."""
+    """Unit and detector of the values."""
 
     label: str
-    """Description in words."""
+    """Description of the quantity in words."""
 
 
 class ConfigurationModel(ApiModel):
-    """Plant file as read, with defaults, without secrets."""
+    """Configuration: plant file as read, with defaults, without secrets."""
 
     version: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$", examples=["9f86d081" * 8])]
     """SHA-256 of the configuration; evidence of alarms refers to it."""
@@ -214,10 +214,10 @@ class ConfigurationModel(ApiModel):
     """Version of the program."""
 
     commit: str | None
-    """Commit that it was built from; null if unknown."""
+    """Source commit of the program; null if unknown."""
 
     json_schema: Annotated[str, Field(examples=["/api/v1/configuration/schema"])]
-    """Path of the JSON schema with meaning, limits and default of every key."""
+    """Path of the JSON schema, with meaning, limits and default of every key."""
 
     settings: dict[str, Any]
     """All settings, by the keys of the plant file."""
@@ -229,7 +229,7 @@ SCHEMA_TYPE = "application/schema+json"
 
 
 def plant_router(context: Context) -> APIRouter:
-    """Return the routes of units, their sources and gaps, quantities, and the configuration."""
+    """Return the router for units, sources, gaps, quantities and the configuration."""
     router = subject_router("", "plant")
 
     @router.get("/units", summary="All units")
@@ -239,7 +239,7 @@ def plant_router(context: Context) -> APIRouter:
 
     @router.get("/units/{unit}", summary="One unit", responses=problem_responses(404))
     async def one_unit(unit: UnitId) -> UnitModel:
-        """Show a unit and the state of its source."""
+        """Return a unit and the state of its source."""
         return _unit(context, context.unit(unit).id)
 
     @router.get(
@@ -253,12 +253,12 @@ def plant_router(context: Context) -> APIRouter:
 
     @router.get("/sources", summary="Health of each source")
     async def sources() -> list[SourceHealthModel]:
-        """List state and reason, failed attempts, account of samples, and device clock."""
+        """List sources with link state, failed connections, counts of samples, and device clock."""
         return [_health(context, unit) for unit in context.units.values()]
 
     @router.get("/units/{unit}/gaps", summary="Gaps", responses=problem_responses(404, 422, 503))
     async def gaps(unit: UnitId, times: TimeRange) -> list[GapModel]:
-        """List gaps in the samples of a unit, including stops of the service, by their end."""
+        """List gaps that end in the time range, oldest first, including stops of the service."""
         found = await asyncio.to_thread(context.store.gaps, context.unit(unit).id, *times)
         rate_hz = context.unit(unit).sampling_hz
         return [_gap_model(gap, rate_hz) for gap in found]
@@ -269,9 +269,9 @@ def plant_router(context: Context) -> APIRouter:
         responses=problem_responses(own={404: "The service keeps no configuration"}),
     )
     async def configuration() -> ConfigurationModel:
-        """Show the plant file as read when the service started, without secrets.
+        """Return the plant file as read when the service started, without secrets.
 
-        Evidence of alarms refers to its version.
+        The evidence of alarms refers to the version of the configuration.
         """
         if context.configuration is None:
             raise ProblemError(404, "No configuration", "no configuration is kept here")

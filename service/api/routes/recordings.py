@@ -1,4 +1,4 @@
-"""Recordings of samples: list, description, download."""
+"""Routes for recordings of samples: list, description, download."""
 
 from collections.abc import Callable, Generator
 from typing import Annotated, Any, Literal
@@ -22,7 +22,7 @@ from service.store.waveforms import WaveformKind
 
 
 class RunningRecordingModel(ApiModel):
-    """An occurrence of an alarm whose samples are still being written."""
+    """Recording in progress: occurrence of an alarm whose samples are being written."""
 
     alarm: Annotated[str, Field(examples=["U1:UJB:shaft_x"])]
     """Identifier of the alarm."""
@@ -32,20 +32,20 @@ class RunningRecordingModel(ApiModel):
 
 
 class RecordingAlarmModel(RunningRecordingModel):
-    """Event of an alarm that a recording was made for."""
+    """Alarm event that caused a recording."""
 
     change: Annotated[str, Field(examples=["raised"])]
     """Kind of event."""
 
     level: str | None
-    """Level of the alarm at that time."""
+    """Level of the alarm at the time of the event."""
 
     time: Time
     """Time of the event."""
 
 
 class RecordingModel(ApiModel):
-    """A finished recording."""
+    """Finished recording."""
 
     id: Annotated[str, Field(examples=["U1-20261121T090312.400Z-shaft_x"])]
     """Name of the recording."""
@@ -54,31 +54,31 @@ class RecordingModel(ApiModel):
     """Samples around an alarm, or part of a continuous recording."""
 
     state: Literal["complete", "damaged"]
-    """State by its manifest and the newest check."""
+    """State according to the manifest and the newest check."""
 
     reason: str | None
-    """Why it is damaged; null if it is complete."""
+    """Reason why the recording is damaged; null if it is complete."""
 
     unit: str | None
-    """Unit; null, like the other fields from the manifest, if that cannot be read."""
+    """Unit; null, like all fields from the manifest, if the manifest cannot be read."""
 
     start: Time | None
     """Time of the first sample."""
 
     duration_s: float | None
-    """Length without gaps, s."""
+    """Duration without gaps, s."""
 
     rate_hz: float | None
-    """Samples per second and channel."""
+    """Sampling rate, Hz."""
 
     n_samples: int | None
-    """Samples of each channel."""
+    """Number of samples per channel."""
 
     n_bytes: int
-    """Size of all its files, bytes."""
+    """Size of all files of the recording, bytes."""
 
     alarms: list[RecordingAlarmModel]
-    """Events it was made for, the first started it; empty for a continuous recording."""
+    """Alarm events that caused the recording; the first event started it. Empty if continuous."""
 
 
 class RecordingsModel(ApiModel):
@@ -91,87 +91,87 @@ class RecordingsModel(ApiModel):
     """Recordings in progress."""
 
     error: str | None
-    """Why samples around alarms are not recorded now; null if they are."""
+    """Reason why samples around alarms cannot be recorded now; null if they can."""
 
     continuous: list[str]
-    """Units recorded continuously."""
+    """Identifiers of the units that are recorded continuously."""
 
     continuous_error: str | None
-    """Why continuous recording fails now; null if it does not."""
+    """Reason why continuous recording fails now; null if it does not fail."""
 
 
 class RecordedChannelModel(ApiModel):
-    """A recorded waveform channel."""
+    """Waveform channel of a recording."""
 
     id: str
-    """Identifier within the unit."""
+    """Identifier of the channel within the unit."""
 
     unit: ChannelUnit
-    """Engineering unit."""
+    """Engineering unit of the samples."""
 
     n_not_ok: int
-    """Samples in blocks that the device flagged as not OK."""
+    """Number of samples in blocks that the device flagged as not OK."""
 
 
 class RecordedSlowModel(ApiModel):
-    """A recorded slow channel."""
+    """Slow channel of a recording."""
 
     id: str
-    """Identifier within the unit."""
+    """Identifier of the channel within the unit."""
 
     unit: str
-    """Unit of its readings."""
+    """Unit of the readings."""
 
 
 class RecordedFileModel(ApiModel):
-    """A file of a recording."""
+    """File of a recording: size and checksum."""
 
     size: int
-    """Size, bytes."""
+    """Size of the file, bytes."""
 
     sha256: str
-    """SHA-256 checksum."""
+    """SHA-256 checksum of the file."""
 
 
 class RecordingInfoModel(ApiModel):
     """Description of a recording after a full check."""
 
     recording: RecordingModel
-    """Entry of the list."""
+    """Entry of the recording in the list."""
 
     made_by: str
-    """Program and purpose."""
+    """Program that made the recording, and its purpose."""
 
     sample_type: Literal["int16", "float32"]
-    """Counts of the converter, or engineering units."""
+    """Type of the stored samples: counts of the converter, or engineering units."""
 
     end: Time
-    """Time of the first sample after the last."""
+    """End of the last sample: time at which the next sample would follow."""
 
     n_gaps: int
-    """Gaps in the samples."""
+    """Number of gaps in the samples."""
 
     n_gap_samples: int
-    """Missing samples per channel."""
+    """Number of missing samples per channel."""
 
     rejected: dict[str, int]
-    """Rejected samples, by reason."""
+    """Number of rejected samples, by reason."""
 
     epochs: list[int]
-    """Epochs; more than one if the device restarted its count."""
+    """Epochs of the sample index; more than one if the device restarted its count."""
 
     channels: list[RecordedChannelModel]
-    """Waveform channels in the order of the columns."""
+    """Waveform channels, in the order of the columns."""
 
     slow_channels: list[RecordedSlowModel]
-    """Slow channels, likewise."""
+    """Slow channels, in the order of the columns."""
 
     files: dict[str, RecordedFileModel]
-    """Files, except the manifest and the alarms."""
+    """Files of the recording by name, except the manifest and the list of alarms."""
 
 
 def recording_model(kept: RecordingEntry) -> RecordingModel:
-    """Return the entry of a recording in the list."""
+    """Return the API model of a recording as an entry of the list."""
     manifest = kept.manifest
     described = ("unit", "start", "rate_hz", "n_samples")
     return RecordingModel.of(
@@ -185,7 +185,7 @@ def recording_model(kept: RecordingEntry) -> RecordingModel:
 
 
 def recording_info(shelf: RecordingLibrary, kept: RecordingEntry) -> RecordingInfoModel:
-    """Return the description of a recording.
+    """Return the API model of the description of a recording.
 
     Raises
     ------
@@ -231,7 +231,7 @@ log = structlog.get_logger()
 
 
 def recording_router(context: Context) -> APIRouter:
-    """Return the routes of recordings."""
+    """Return the router for recordings."""
     router = subject_router("/recordings", "recordings")
 
     @router.get("", summary="Recordings", responses=LIST_PROBLEMS)
@@ -242,7 +242,7 @@ def recording_router(context: Context) -> APIRouter:
             int, Query(ge=1, le=500, description="Maximum number of recordings.")
         ] = 100,
     ) -> RecordingsModel:
-        """List the newest recordings, and recordings around alarms in progress."""
+        """List the newest recordings, and the recordings around alarms in progress."""
         if unit is not None:
             context.unit(unit)
         found = await in_thread(lambda: library_of(context).newest(limit, unit, kind))
@@ -262,7 +262,7 @@ def recording_router(context: Context) -> APIRouter:
         response_model=RecordingInfoModel,
     )
     async def one_recording(recording: RecordingId) -> Response:
-        """Check a recording and describe its channels, gaps, rejected samples and files."""
+        """Check a recording; return its channels, gaps, rejected samples and files."""
         kept = await entry_of(context, recording)
         try:
             return await rendered(lambda: recording_info(library_of(context), kept))
@@ -276,9 +276,10 @@ def recording_router(context: Context) -> APIRouter:
         responses={**PROBLEMS, 200: _content("application/zip", "A ZIP file")},
     )
     async def files(recording: RecordingId) -> StreamingResponse:
-        """Return the files of a recording, which `padwatch recording` and `padwatch replay` read.
+        """Return the files of a recording as a ZIP file.
 
-        The manifest has their checksums.
+        `padwatch recording` and `padwatch replay` read these files. The manifest contains their
+        checksums.
         """
         make = library_of(context).zip_pieces
         return await _download(context, recording, make, "application/zip", "zip")
@@ -290,9 +291,9 @@ def recording_router(context: Context) -> APIRouter:
         responses={**PROBLEMS, 200: _content("text/csv", "A CSV file")},
     )
     async def samples(recording: RecordingId) -> StreamingResponse:
-        """Return one row per sample, in the engineering units of the headings.
+        """Return the samples as CSV, one row per sample, in the engineering units of the headings.
 
-        The format is that of `padwatch recording export`: missing samples have no rows, and cells
+        `padwatch recording export` writes the same format: missing samples have no rows, and cells
         of a bad channel are nan.
         """
         make = library_of(context).csv_pieces
@@ -319,7 +320,7 @@ async def _download(
 
 
 def library_of(context: Context) -> RecordingLibrary:
-    """Return the library of recordings; raise a problem of status 404 without one."""
+    """Return the library of recordings; raise a problem of status 404 without a library."""
     if context.recordings is None:
         words = "no recordings are kept here; see the process that analyses the unit"
         raise ProblemError(404, "No recordings", words)
@@ -327,7 +328,7 @@ def library_of(context: Context) -> RecordingLibrary:
 
 
 async def entry_of(context: Context, recording: str) -> RecordingEntry:
-    """Return a recording of the library; raise a problem of status 404 without it."""
+    """Return the entry of a recording; raise a problem of status 404 for an unknown name."""
     library = library_of(context)
     found = await in_thread(lambda: library.one(recording))
     if found is None:
@@ -336,7 +337,7 @@ async def entry_of(context: Context, recording: str) -> RecordingEntry:
 
 
 def damaged_recording(recording: str, error: Exception) -> ProblemError:
-    """Log a damaged recording and return its problem."""
+    """Log a damaged recording; return the error for it, status 410."""
     log.error("a recording cannot be read", recording=recording, reason=str(error))
     words = f"recording {recording} is damaged on the disk and cannot be read"
     return ProblemError(410, "Damaged", words)

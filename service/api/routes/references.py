@@ -1,4 +1,4 @@
-"""References of a shaft centre, and reference vectors of 1×."""
+"""Routes for gap references of the shaft centre, and for reference vectors of 1×."""
 
 import asyncio
 from typing import Annotated, Literal
@@ -27,66 +27,66 @@ from service.store.references import GapReference, SetVectorReference
 
 
 class SetReferenceModel(ApiModel):
-    """A stored reference."""
+    """Stored gap reference of a bearing."""
 
     gap_reference_um: MicrometrePair
-    """Probe gaps [x, y] with the shaft centred."""
+    """Probe gaps [x, y] with the shaft centred, µm."""
 
     opposite_reference_um: MicrometrePair | None
-    """Gaps of the probes across the shaft; null without such probes."""
+    """Gaps of the probes across the shaft, µm; null without such probes."""
 
     source: Literal["given", "measured"]
-    """Numbers given by hand, or the measured mean gaps when it was set."""
+    """Values entered by hand, or mean gaps measured when the reference was set."""
 
     set: Time
-    """Time when it was set."""
+    """Time when the reference was set."""
 
     author: Author
-    """Person who set it."""
+    """Person who set the reference."""
 
     note: Note | None
-    """Note of the author, if any."""
+    """Note of the author; null without a note."""
 
 
 class VectorModel(ApiModel):
-    """A 1× vector."""
+    """Vector of 1×: amplitude and phase."""
 
     amplitude_um_pk: Annotated[float, Field(examples=[61.2])]
     """Amplitude, µm zero-to-peak."""
 
     phase_deg: Annotated[float | None, Field(examples=[134.8])]
-    """Phase lead over the key-phase, degrees; null without a key-phase: then only the amplitude is
+    """Phase lead over the key-phase, degrees; null without a key-phase, so that only amplitudes are
     compared."""
 
 
 class Order1ReferenceModel(BearingAnswer):
-    """1× vectors of a healthy bearing."""
+    """Stored reference of 1×: vectors of a healthy bearing."""
 
     state: Annotated[OperatingStateName, ByName]
-    """Operating state that it applies to."""
+    """Operating state to which the reference applies."""
 
     vectors: dict[PlaceName, VectorModel]
-    """Vectors by place."""
+    """Reference vectors by channel."""
 
     set: Time
-    """Time when it was set."""
+    """Time when the reference was set."""
 
     author: str
-    """Person who set it."""
+    """Person who set the reference."""
 
     note: str | None
-    """Note of the author."""
+    """Note of the author; null without a note."""
 
 
 class TakeReferenceModel(ActorModel):
-    """Request to take the present 1× vectors as reference."""
+    """Request to store the current 1× vectors as reference."""
 
     note: NoteText = ""
     """Note, at most 500 printable characters."""
 
 
 def set_reference_model(reference: GapReference) -> SetReferenceModel:
-    """Return the model of a stored reference."""
+    """Return the API model of a stored gap reference."""
     return SetReferenceModel.of(reference, note=reference.note or None)
 
 
@@ -96,15 +96,16 @@ TAKE_PROBLEMS = problem_responses(
 
 
 def reference_router(context: Context) -> APIRouter:
-    """Return the routes of shaft-centre references and 1× reference vectors."""
+    """Return the router for gap references and 1× reference vectors."""
     router = subject_router("/units/{unit}/bearings/{bearing}", "bearing")
     reading = problem_responses(404, 503)
 
     @router.get("/references", summary="References", responses=reading)
     async def references(unit: UnitId, bearing: BearingId) -> list[SetReferenceModel]:
-        """List the references set for a bearing, newest first, at most a thousand.
+        """List the stored gap references of a bearing, newest first, at most 1000.
 
-        The newest is in force a few seconds after it was set; without any, the plant file applies.
+        The newest reference is in force a few seconds after it was set. Without stored references,
+        the plant file applies.
         """
         context.bearing(unit, bearing)
         history = await asyncio.to_thread(context.store.reference_history, unit, bearing)
@@ -114,9 +115,10 @@ def reference_router(context: Context) -> APIRouter:
         "/order1-references", summary="References of 1×", responses=reading, name="references"
     )
     async def order1_references(unit: UnitId, bearing: BearingId) -> list[Order1ReferenceModel]:
-        """List the 1× references set for a bearing, newest first, at most a thousand.
+        """List the stored 1× references of a bearing, newest first, at most 1000.
 
-        In each operating state the newest applies; without any, that of the plant file.
+        In each operating state the newest reference applies. Without stored references, the
+        reference of the plant file applies.
         """
         context.bearing(unit, bearing)
         history = await asyncio.to_thread(context.store.order1_references.history, unit, bearing)

@@ -1,4 +1,4 @@
-"""Line of the shaft centre in its bearing."""
+"""Route for the shaft centre line of a bearing."""
 
 from fastapi import APIRouter, Response
 
@@ -31,23 +31,23 @@ from service.store.series import U_RANDOM, U_SYSTEMATIC
 
 
 class CentreColumnModel(ApiModel):
-    """One quantity of the shaft centre; one value per time."""
+    """Columns of one quantity of the shaft centre, with one value per time."""
 
     mean: list[float | None]
-    """Mean of the usable readings; null if there are none."""
+    """Mean of the usable readings; null without usable readings."""
 
     u_random: list[float | None]
-    """Mean random standard uncertainty."""
+    """Mean of the random standard uncertainty."""
 
     u_systematic: list[float | None]
-    """Mean systematic standard uncertainty."""
+    """Mean of the systematic standard uncertainty."""
 
     worst_level: list[LevelName | None]
-    """Worst quality; null without readings."""
+    """Worst quality level; null without readings."""
 
 
 class CentreLineModel(BearingHistory):
-    """Line of the shaft centre in its bearing, oldest first, by column."""
+    """Shaft centre line of a bearing, oldest first, by column."""
 
     clearance_um: float
     """Radius of the clearance circle, µm."""
@@ -56,10 +56,10 @@ class CentreLineModel(BearingHistory):
     """Width of the buckets, s; null for single readings."""
 
     simulated_until: Time | None
-    """End of the simulated readings; null if all in this range are measured."""
+    """End of the simulated readings; null if all readings in this range are measured."""
 
     time: list[float]
-    """Seconds since 1970 UTC: of each reading, or of the start of each bucket."""
+    """Time of each reading or start of each bucket, seconds since 1970 UTC."""
 
     x_um: CentreColumnModel
     """Shaft centre in x, µm."""
@@ -68,7 +68,7 @@ class CentreLineModel(BearingHistory):
     """Shaft centre in y, µm."""
 
     eccentricity_ratio: CentreColumnModel
-    """Eccentricity over clearance."""
+    """Eccentricity ratio: eccentricity divided by clearance."""
 
     attitude_angle_deg: CentreColumnModel
     """Attitude angle, degrees."""
@@ -80,11 +80,11 @@ COLUMNS = {
     "eccentricity_ratio": "eccentricity_ratio",
     "attitude_angle_deg": "attitude_angle_deg",
 }
-"""Quantities by name of the column."""
+"""Names of the quantities by name of the column."""
 
 
 def centre_router(context: Context) -> APIRouter:
-    """Return the route of the shaft centre."""
+    """Return the router for the shaft centre line."""
     router = subject_router("/units/{unit}/bearings", "bearing")
 
     @router.get(
@@ -105,7 +105,7 @@ def centre_router(context: Context) -> APIRouter:
         state: States = None,
         max_points: MaxPoints = 1000,
     ) -> Response:
-        """List the line of the shaft centre with its uncertainty, oldest first.
+        """Return the shaft centre line with its uncertainty, oldest first.
 
         As CSV or Parquet: one row per time.
         """

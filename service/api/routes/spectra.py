@@ -1,4 +1,4 @@
-"""Spectra of a bearing: the newest, and spectra over time."""
+"""Routes for spectra of a bearing: newest spectrum, and stored spectra over time."""
 
 from collections.abc import Sequence
 from typing import Annotated, Literal
@@ -36,23 +36,23 @@ class PlaceSpectraModel(ApiModel):
     """Spectra of one channel over time."""
 
     unit: Literal["um_pk"]
-    """Displacement, zero to peak."""
+    """Unit of the amplitudes: µm of displacement, zero to peak."""
 
     amplitude: list[list[float] | None]
-    """One value per frequency for each time; null where the channel was not usable."""
+    """Amplitudes per time and frequency; null for a time at which the channel was not usable."""
 
 
 class SpectraModel(BearingHistory):
     """Averaged amplitude spectra of a bearing over time, oldest first."""
 
     frequency_hz: Annotated[list[float], Field(examples=[[0.073, 0.146, 0.22]])]
-    """Frequencies of the lines of all spectra."""
+    """Frequencies of the spectral lines of all spectra, Hz."""
 
     time: list[float]
-    """Seconds since 1970 UTC: end of the samples of each spectrum."""
+    """End of the samples of each spectrum, seconds since 1970 UTC."""
 
     duration_s: list[float]
-    """Length of the averaged samples, s."""
+    """Duration of the averaged samples, s."""
 
     speed_rpm: list[float | None]
     """Running speed, r/min; null if unknown."""
@@ -64,32 +64,32 @@ class SpectraModel(BearingHistory):
     """Operating state of the unit."""
 
     level: list[LevelName]
-    """Worst quality of the 1× amplitudes."""
+    """Worst quality level of the 1× amplitudes."""
 
     reason: list[str]
-    """Reason of that quality; "ok" if it is good."""
+    """Reason of the quality level; "ok" if it is good."""
 
     order1_hz: list[float | None]
-    """Frequency of 1×."""
+    """Frequency of 1×, Hz; null if unknown."""
 
     vortex_hz: list[float | None]
-    """Frequency of the vortex."""
+    """Frequency of the vortex, Hz; null if unknown."""
 
     channels: dict[PlaceName, PlaceSpectraModel]
-    """Requested channels."""
+    """Spectra of the requested channels."""
 
     n_found: int
-    """Spectra stored in this range; more than `max_spectra` are thinned evenly."""
+    """Number of spectra stored in this range; more than `max_spectra` are thinned evenly."""
 
     n_other_resolution: int
-    """Spectra left out because their frequencies differ from those of the newest one, after a
-    change of the settings."""
+    """Number of spectra left out because their frequencies differ from those of the newest
+    spectrum, after a change of the settings."""
 
     damaged: list[Time]
-    """Spectra left out because they are damaged on the disk."""
+    """Times of spectra left out because they are damaged on the disk."""
 
     first: Time | None
-    """Time of the oldest stored spectrum of this bearing; null if there is none."""
+    """Time of the oldest stored spectrum of this bearing; null without stored spectra."""
 
     simulated_until: Time | None
     """End of the simulated readings of this bearing, which have no spectra; null if all are
@@ -100,36 +100,36 @@ class SpectrumChannelModel(ApiModel):
     """Amplitude spectrum of one channel."""
 
     unit: Literal["um_pk"]
-    """Displacement, zero to peak."""
+    """Unit of the amplitudes: µm of displacement, zero to peak."""
 
     amplitude: list[float] | None
-    """A value for each frequency; null if the channel is not usable."""
+    """Amplitude at each frequency; null if the channel is not usable."""
 
 
 class SpectrumModel(ApiModel):
     """Averaged amplitude spectra of a bearing, as displacement."""
 
     time: Time
-    """End of the samples."""
+    """End of the averaged samples."""
 
     frequency_hz: list[float]
-    """Frequencies of the lines."""
+    """Frequencies of the spectral lines, Hz."""
 
     channels: dict[str, SpectrumChannelModel]
-    """shaft_x, shaft_y, bearing_x and bearing_y."""
+    """Spectra of the channels shaft_x, shaft_y, bearing_x and bearing_y."""
 
     lines: dict[str, float | None]
-    """Frequencies of order1 (1×) and of the vortex."""
+    """Frequencies of order1 (1×) and of the vortex, Hz; null if unknown."""
 
 
 OWN_FIELDS = ("duration_s", "speed_rpm", "power_mw", "order1_hz", "vortex_hz")
-"""Fields with one value of each stored spectrum."""
+"""Fields of the answer with one value for each stored spectrum."""
 
 MAX_NUMBERS = 2_000_000
 """Maximum number of amplitudes in one answer, about 20 MB."""
 
 DECIMALS = 6
-"""Decimals of amplitudes in µm; stored spectra are less precise."""
+"""Number of decimals of amplitudes in µm; stored spectra are less precise."""
 
 
 def _frequencies(shown: Sequence[StoredSpectrum], max_frequency_hz: float | None) -> FloatArray:
@@ -159,7 +159,7 @@ def _place(shown: Sequence[StoredSpectrum], place: PlaceName, n_lines: int) -> P
 
 
 def spectrum_model(assessment: Assessment) -> SpectrumModel:
-    """Return the amplitude spectra of an assessment."""
+    """Return the API model of the amplitude spectra of a result."""
     spectrum, readings = assessment.spectrum, assessment.readings
     return SpectrumModel.of(
         time=assessment.time_ns,
@@ -183,7 +183,7 @@ log = structlog.get_logger()
 
 
 def spectra_router(context: Context) -> APIRouter:
-    """Return the routes of spectra."""
+    """Return the router for spectra."""
     router = subject_router("/units/{unit}/bearings", "bearing")
     newest = Renderings()
 
@@ -194,7 +194,7 @@ def spectra_router(context: Context) -> APIRouter:
         responses=problem_responses(404, 409),
     )
     async def spectrum(unit: UnitId, bearing: BearingId) -> Response:
-        """Show averaged amplitude spectra of the newest result, all channels as displacement."""
+        """Return averaged amplitude spectra of the newest result, all channels as displacement."""
         context.bearing(unit, bearing)
         assessment = context.live.assessment(unit, bearing)
         if assessment is None:
@@ -230,7 +230,7 @@ def spectra_router(context: Context) -> APIRouter:
     ) -> Response:
         """List stored averaged amplitude spectra, all channels as displacement.
 
-        Each is a spectrum of one time, not a mean or maximum until the next.
+        Each spectrum applies to its own time; it is no mean or maximum up to the next spectrum.
         """
         context.bearing(unit, bearing)
         places = list(dict.fromkeys(channel or PLACES))

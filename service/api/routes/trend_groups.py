@@ -1,4 +1,4 @@
-"""Trends grouped by condition: operating state, or cell along one axis."""
+"""Trends grouped by operating state, or by condition cell along one axis."""
 
 import math
 from collections.abc import Iterator
@@ -18,16 +18,16 @@ MAX_GROUPS = 60
 SURVEY_POINTS = 5000
 
 BIN_TOLERANCE = 1e-9
-"""Distance from a bound, in bins, within which a value may lie in either bin."""
+"""Distance from the bound between two bins, in bin widths, within which both bins are read."""
 
 
 class TooManyGroupsError(ValueError):
-    """More than `MAX_GROUPS` groups; the message gives the limit."""
+    """Raised for more than `MAX_GROUPS` groups; the message gives the limit."""
 
 
 @dataclass(frozen=True)
 class TrendGroup:
-    """A trend of the readings in one condition.
+    """Trend of the readings in one operating state or condition cell.
 
     Parameters
     ----------
@@ -48,14 +48,14 @@ class _Axis:
     Parameters
     ----------
     quantity
-        Name of the quantity, and of its range in a query.
+        Name of the quantity, and of the field of `TrendQuery` with its range.
     """
 
     quantity: str
     width: float
 
     def narrowed(self, query: TrendQuery, low: float, high: float) -> TrendQuery:
-        """Return the query for one bin, which includes its lower but not its upper bound."""
+        """Return the query limited to one bin, which includes its lower but not its upper bound."""
         requested, below = getattr(query, self.quantity), math.nextafter(high, -math.inf)
         within = ValueRange(
             low if requested.low is None else max(low, requested.low),
@@ -68,12 +68,12 @@ class _Axis:
 def trend_groups(
     store: Store, query: TrendQuery, by: GroupName, grid: CellGrid
 ) -> list[TrendGroup]:
-    """Read a trend for each condition with readings.
+    """Read the trend of each group that contains readings.
 
     Raises
     ------
     TooManyGroupsError
-        If there are more than `MAX_GROUPS`.
+        If there are more than `MAX_GROUPS` groups.
     """
     if by == "state":
         found = _by_state(store, query)
@@ -98,7 +98,7 @@ def _by_cell(store: Store, query: TrendQuery, axis: _Axis) -> Iterator[TrendGrou
 
 
 def _bins(store: Store, query: TrendQuery, axis: _Axis) -> list[int]:
-    """Return the bins between the extremes of every bucket."""
+    """Return the numbers of the bins between minimum and maximum of any bucket."""
     survey = replace(query, quantities=(axis.quantity,), max_points=SURVEY_POINTS)
     series = store.trend(survey).series[axis.quantity]
     bins: set[int] = set()

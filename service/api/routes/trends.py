@@ -1,4 +1,4 @@
-"""Trends of a bearing."""
+"""Route for trends of a bearing: quantities over time."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
@@ -35,12 +35,12 @@ T = TypeVar("T")
 def trend_table(
     trend: Trend, groups: Sequence[TrendGroup] | None, past_end_ns: int | None
 ) -> list[Column]:
-    """Return a trend as columns; with groups, their rows one after another.
+    """Return a trend as columns; with groups, the rows of all groups in succession.
 
     Parameters
     ----------
     past_end_ns
-        End of the simulated past of the bearing.
+        End of the simulated readings of the bearing; None without simulated readings.
     """
     parts = [trend] if groups is None else [group.trend for group in groups]
     times = [time_ns for part in parts for time_ns in part.time_ns]
@@ -73,75 +73,75 @@ def _joined(parts: Iterable[Sequence[T]]) -> list[T]:
 
 
 class TrendSeriesModel(ApiModel):
-    """One quantity; one value per time."""
+    """Columns of one quantity, with one value per time."""
 
     unit: str
-    """Unit and detector."""
+    """Unit and detector of the values."""
 
     min: list[float | None]
-    """Minimum of the usable readings; null if there are none."""
+    """Minimum of the usable readings; null without usable readings."""
 
     max: list[float | None]
-    """Maximum of the usable readings."""
+    """Maximum of the usable readings; null without usable readings."""
 
     mean: list[float | None]
-    """Mean of the usable readings."""
+    """Mean of the usable readings; null without usable readings."""
 
     count: list[int]
     """Number of usable readings."""
 
     worst_level: list[LevelName | None]
-    """Worst quality in the bucket; null without readings."""
+    """Worst quality level in the bucket; null without readings."""
 
     u_random: list[float | None] | None
-    """Mean random standard uncertainty; null for quantities without."""
+    """Mean of the random standard uncertainty; null for quantities without uncertainty."""
 
     u_systematic: list[float | None] | None
-    """Mean systematic standard uncertainty; null for quantities without."""
+    """Mean of the systematic standard uncertainty; null for quantities without uncertainty."""
 
 
 class TrendColumns(ApiModel):
-    """Trends by column."""
+    """Trends as columns: times, and the series of each quantity."""
 
     bucket_s: float | None
     """Width of the buckets, s; null for single readings."""
 
     time: list[float]
-    """Seconds since 1970 UTC: of each reading, or of the start of each bucket."""
+    """Time of each reading or start of each bucket, seconds since 1970 UTC."""
 
     series: dict[str, TrendSeriesModel]
-    """Requested quantities by name."""
+    """Series of the requested quantities, by name of the quantity."""
 
 
 class TrendGroupModel(TrendColumns):
-    """Trends of the readings in one condition, by column."""
+    """Trends of the readings in one operating state or condition cell, by column."""
 
     name: Annotated[str, Field(examples=["full_load"])]
-    """Operating state or bounds of the cell."""
+    """Name of the group: operating state, or bounds of the cell."""
 
     low: float | None
     """Lower bound of eccentricity ratio or oil temperature in °C; null for operating states."""
 
     high: float | None
-    """Upper bound, likewise."""
+    """Upper bound of eccentricity ratio or oil temperature in °C; null for operating states."""
 
 
 class TrendModel(TrendColumns, BearingHistory):
     """Trends of one bearing, by column."""
 
     simulated_until: Time | None
-    """End of the simulated readings; null if all in this range are measured."""
+    """End of the simulated readings; null if all readings in this range are measured."""
 
     coarse_until: Time | None
-    """End of the time whose single readings are deleted: only buckets cover it, and pages of single
-    readings omit it; null if all in this range are kept."""
+    """End of the time whose single readings are deleted by retention: only buckets cover it, and
+    pages of single readings omit it; null if all single readings in this range are kept."""
 
     next_cursor: Annotated[str | None, Field(examples=["1795248192400000000"])]
-    """With ``cursor``, its value for the next page; null on the last page."""
+    """With ``cursor``, value of ``cursor`` for the next page; null on the last page."""
 
     groups: list[TrendGroupModel] | None
-    """With ``group_by``, trends of each operating state or cell with readings; readings whose
-    condition is unknown are in none."""
+    """With ``group_by``, trends of each operating state or cell with readings; readings with an
+    unknown condition belong to no group."""
 
 
 def trend_model(
@@ -150,12 +150,12 @@ def trend_model(
     groups: list[TrendGroup] | None = None,
     past_end_ns: int | None = None,
 ) -> TrendModel:
-    """Return trends by column, and those of each condition if requested.
+    """Return the API model of trends, and of their groups if requested.
 
     Parameters
     ----------
     past_end_ns
-        End of the simulated past of the bearing.
+        End of the simulated readings of the bearing; None without simulated readings.
     """
     return TrendModel.of(
         query,
@@ -168,7 +168,7 @@ def trend_model(
 
 
 def simulated_until(query: TrendQuery, past_end_ns: int | None) -> str | None:
-    """Return the end of the simulated readings of a range; None if all are measured."""
+    """Return the end of the simulated readings in a range; None if all readings are measured."""
     if past_end_ns is None or past_end_ns < query.start_ns:
         return None
     return rfc3339(past_end_ns)
@@ -184,17 +184,17 @@ def _columns_of(trend: Trend) -> dict[str, object]:
 
 
 def bucket_s(trend: Trend) -> float | None:
-    """Return the width of the buckets, s."""
+    """Return the width of the buckets of a trend, s; None for single readings."""
     return None if trend.bucket_ns is None else trend.bucket_ns / NS_PER_S
 
 
 def times_s(trend: Trend) -> list[float]:
-    """Return the times in seconds since 1970."""
+    """Return the times of a trend in seconds since 1970."""
     return [time_ns / NS_PER_S for time_ns in trend.time_ns]
 
 
 def trend_columns(quantities: Iterable[str]) -> tuple[str, ...]:
-    """Return the columns of the store that a trend of some quantities needs."""
+    """Return the columns of the store for a trend of the given quantities."""
     return columns_of(BY_NAME[name] for name in quantities)
 
 
@@ -218,7 +218,7 @@ MaxPoints = Annotated[
 ]
 MAX_QUANTITIES = 40
 HOLE_HOPS = 2.5
-"""Distance of results, in result periods, above which there is a gap between them."""
+"""Maximum distance of successive results without a gap in the trend, in result periods."""
 
 
 Cursor = Annotated[
@@ -233,7 +233,7 @@ Cursor = Annotated[
 
 
 def trend_router(context: Context) -> APIRouter:
-    """Return the route of trends."""
+    """Return the router for trends."""
     router = subject_router("/units/{unit}/bearings", "bearing")
     reading = problem_responses(404, 422, 503)
 
@@ -271,9 +271,9 @@ def trend_router(context: Context) -> APIRouter:
         max_points: MaxPoints = 1000,
         cursor: Cursor = None,
     ) -> Response:
-        """List quantities over time: single readings, or buckets with extremes, mean and count.
+        """Return trends: single readings, or buckets with minimum, maximum, mean and count.
 
-        As CSV or Parquet: one row per time, with `group_by` per group and time.
+        As CSV or Parquet: one row per time; with `group_by`, one row per group and time.
         """
         context.bearing(unit, bearing)
         start_ns = _page_start_ns(cursor, group_by, times[0])
@@ -305,7 +305,7 @@ def trend_router(context: Context) -> APIRouter:
 def _read(
     context: Context, query: TrendQuery, group_by: GroupName | None, grid: CellGrid
 ) -> tuple[Trend, list[TrendGroup] | None, int | None]:
-    """Return the trend, its groups, and the end of the simulated past."""
+    """Return the trend, its groups, and the end of the simulated readings."""
     past_end_ns = context.store.films.past_end_ns(query.unit, query.bearing)
     whole = context.store.trend(query)
     if group_by is None:
@@ -317,7 +317,7 @@ def _read(
 
 
 def _page_start_ns(cursor: str | None, group_by: GroupName | None, start_ns: int) -> int:
-    """Return the start of the page."""
+    """Return the start of the page of a cursor; raise a problem if `group_by` is also given."""
     if cursor is not None and group_by is not None:
         detail = "pages cannot be grouped: omit cursor or group_by"
         raise ProblemError(422, "Wrong parameter", detail, "cursor")
