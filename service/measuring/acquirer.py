@@ -1,4 +1,4 @@
-"""Acquisition: blocks and link news from sources, and the bounded queue of blocks."""
+"""Acquisition of blocks and link states from sources, and the bounded queue of blocks."""
 
 import asyncio
 import random
@@ -26,7 +26,7 @@ class LinkNews:
     Parameters
     ----------
     reason
-        Why no samples arrive; None while they do.
+        Reason why no samples arrive; None while samples arrive.
     """
 
     unit: str
@@ -48,7 +48,7 @@ class Bus:
     Parameters
     ----------
     capacity
-        Maximum number of blocks.
+        Maximum number of blocks in the queue.
     """
 
     def __init__(self, capacity: int, clock: Clock) -> None:
@@ -60,12 +60,12 @@ class Bus:
 
     @property
     def depth(self) -> int:
-        """Number of waiting blocks."""
+        """Number of blocks in the queue."""
         return self._queue.qsize()
 
     @property
     def oldest_wait_s(self) -> float:
-        """Age of the oldest block whose analysis has not finished."""
+        """Time since publication of the oldest block whose analysis has not finished, s."""
         if not self._published_s:
             return 0.0
         return self._clock.monotonic_s() - self._published_s[0]
@@ -77,12 +77,12 @@ class Bus:
         self.n_published += 1
 
     async def blocks(self) -> AsyncIterator[SampleBlock]:
-        """Yield blocks in the order in which they were published."""
+        """Yield blocks in the order of their publication, without end."""
         while True:
             yield await self._queue.get()
 
     def done(self) -> None:
-        """Report that the analysis of the newest yielded block has finished."""
+        """Report that the analysis of the last yielded block has finished."""
         self._queue.task_done()
         self._published_s.popleft()
 
@@ -92,7 +92,7 @@ class Bus:
 
 
 class ConnectGate:
-    """Limiter of the rate of connection attempts, over all links; ``per_s`` is per second."""
+    """Rate limiter of connection attempts over all links; ``per_s`` is the maximum per second."""
 
     def __init__(self, per_s: float, clock: Clock) -> None:
         self._interval_s = 1.0 / per_s
@@ -111,29 +111,29 @@ class ConnectGate:
 log = structlog.get_logger()
 
 CONNECTS_PER_S = 50.0
-"""Maximum rate over all units, for a hundred devices that come back at the same time."""
+"""Maximum rate of connection attempts, for a hundred devices that return simultaneously."""
 
 CONFIG_RETRY_S = 15.0
-"""Retry period of a device that does not fit the settings: replacing it takes longer."""
+"""Retry period for a device that does not match the settings, s; a replacement takes longer."""
 
 ENDED = "the recording has ended"
 
 Publish = Callable[[SampleBlock], Awaitable[None]]
-"""Receives a block; the source waits for it."""
+"""Function that queues a block; the source waits until it returns."""
 
 
 class Acquirer:
-    """Reads the sources of all units.
+    """Reader of the sources of all units, which reopens lost links.
 
     Parameters
     ----------
     publish
-        Receives blocks.
+        Function that receives the blocks.
     report
-        Receives link news.
+        Function that receives the link news.
     beats
-        Heartbeats of the task of each unit: they continue while a device is away, and stop if its
-        driver hangs.
+        Heartbeats of the acquisition task of each unit. They continue while the device is
+        disconnected, and stop if its driver hangs.
     """
 
     def __init__(
@@ -151,7 +151,7 @@ class Acquirer:
         self._beats = beats or Heartbeats(clock)
 
     async def run(self) -> None:
-        """Read until all sources have ended. A bug in the task of one ends all."""
+        """Read until all sources have ended; an unexpected error in one task ends all tasks."""
         async with asyncio.TaskGroup() as sources:
             for unit, watched in self._units.items():
                 name = f"acquire {unit}"
@@ -177,7 +177,7 @@ class Acquirer:
                 return
 
     async def _read(self, unit: str, source: SampleSource, pulse: Pulse) -> None:
-        resume = pulse.rest  # without heartbeats of its own, a source may wait without limit
+        resume = pulse.rest  # a source that sends no heartbeats may wait without limit
         if isinstance(source, TimedSource):
             source.set_pulse(pulse)
             resume = pulse.beat
@@ -187,7 +187,7 @@ class Acquirer:
                 if self._live.set_link(unit, LinkState.CONNECTED):
                     log.info("connected", unit=unit)
                     self._report(LinkNews(unit, LinkState.CONNECTED))
-                pulse.rest()  # a full queue is a fault of the analysis
+                pulse.rest()  # waiting for a full queue is no fault of the source
                 await self._publish(block)
                 resume()
 
@@ -200,5 +200,5 @@ class Acquirer:
 def _retry_s(error: AcquisitionError, retry_s: float) -> float:
     if isinstance(error, ConfigError):
         return CONFIG_RETRY_S
-    # devices that vanished together must not be reconnected at the same moment
+    # devices that were lost together must not all reconnect at the same time
     return retry_s * random.uniform(0.5, 1.0)  # noqa: S311  not a secret

@@ -1,4 +1,4 @@
-"""Alarms of all units and of the service: life cycle, listeners, start."""
+"""Engine for the alarms of all units and of the service, with its start from stored alarms."""
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -56,29 +56,29 @@ log = structlog.get_logger()
 TICK_S = 0.5
 
 WITHOUT_LINK = (LINK_LOST, MESSAGES_REFUSED)
-"""Kinds whose condition is also known while no samples arrive."""
+"""Alarm kinds whose condition is known even while no samples arrive."""
 
 LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
 
 Listener = Callable[[SampleBlock, Sequence[AlarmNews]], None]
-"""Receives every block with the alarm news that it caused."""
+"""Callback that receives every block with the alarm news that it caused."""
 
 
 class AlarmEngine:
-    """Owner of all alarms; works on the event loop and never waits.
+    """Owner of all alarms; its methods run on the event loop and do not block.
 
     Parameters
     ----------
     units
         Alarms of each unit.
     put
-        Stores findings.
+        Function that queues findings for the store.
     service
         Alarms about the service itself.
     chatter
-        Definition of chattering alarms.
+        Rule that defines chattering alarms.
     stream
-        Alarms about refused messages, if blocks come over a stream.
+        Alarms about refused messages; None if blocks do not come over a stream.
     """
 
     def __init__(
@@ -100,10 +100,10 @@ class AlarmEngine:
         self._time = HostTime(clock)
         self._observer: Callable[[Sequence[AlarmNews]], None] | None = None
         self.revision = 0
-        """Number that changes with every change of an alarm."""
+        """Counter that increases with every change of an alarm."""
 
     def set_observer(self, observer: Callable[[Sequence[AlarmNews]], None]) -> None:
-        """Call a function with all news as soon as they arise."""
+        """Set a function that is called with all alarm news immediately."""
         self._observer = observer
 
     def restore(
@@ -111,12 +111,12 @@ class AlarmEngine:
         alarms: Iterable[Alarm],
         memories: Mapping[str, AlarmMemory] = MappingProxyType({}),
     ) -> None:
-        """Continue from stored alarms, before anything else is taken.
+        """Restore stored alarms; to be called before any other update.
 
         Parameters
         ----------
         memories
-            State of alarms without a gap in the samples since, by unit.
+            State of the alarms of units whose samples continue without a gap, by unit.
         """
         now_ns, found = self._clock.now_ns(), list(alarms)
         for board in self._reported:
@@ -130,31 +130,31 @@ class AlarmEngine:
         self._publish(self._service.restore(others, now_ns))
 
     def add_alarms(self, board: ReportedAlarms, stored: Iterable[Alarm]) -> None:
-        """Take over alarms of another process from their stored state."""
+        """Add alarms that another process was responsible for, from their stored state."""
         self._reported.append(board)
         self._publish(board.restore(stored, self._clock.now_ns()))
         self.revision += 1
 
     def remove_alarms(self, board: ReportedAlarms) -> None:
-        """Hand alarms over to another process."""
+        """Remove alarms that another process becomes responsible for."""
         self._reported.remove(board)
         self.revision += 1
 
     def refuse(self, unit: str, reason: str) -> None:
-        """Report a message of a unit that was refused."""
+        """Report a refused stream message of a unit."""
         if self._stream is not None:
             report_refused(self._stream, unit, reason)
 
     def is_connected(self, unit: str) -> bool:
-        """Return whether samples of a unit arrive, as last reported."""
+        """Return whether samples of a unit arrive, according to the last link report."""
         return self._units[unit].is_connected
 
     def memory(self, unit: str) -> AlarmMemory:
-        """Return the state of the alarms of a unit, from which another process continues."""
+        """Return the state of a unit's alarms that another process needs to continue."""
         return self._units[unit].memory
 
     def recall(self, events: Iterable[AlarmEvent]) -> None:
-        """Add past events, oldest first, to those that are examined for chattering alarms."""
+        """Add past events, oldest first, to the statistics of chattering alarms."""
         for event in events:
             self._chatter.note(event, event.time_ns)
 
@@ -164,12 +164,12 @@ class AlarmEngine:
         assessments: Sequence[Assessment],
         films: Mapping[str, Judgement] = MappingProxyType({}),
     ) -> list[AlarmNews]:
-        """Judge a block and its results; return the news, to be stored with them.
+        """Update alarms with a block and its results; return the news to store with the results.
 
         Parameters
         ----------
         films
-            Conditions of films by id of the alarm.
+            Conditions of the film alarms, by alarm id.
         """
         own = self._units[block.unit]
         if assessments or films:
@@ -187,20 +187,20 @@ class AlarmEngine:
         self._publish(self._units[unit].link(is_connected, reason, self._host_ns()))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Judge periodically, until cancelled."""
+        """Update the alarms periodically, until cancelled."""
         while True:
             pulse.beat(TICK_S)
             await self._clock.sleep(TICK_S)
             self.tick()
 
     def tick(self) -> None:
-        """Judge lost links, the service and expired shelving once."""
+        """Update the alarms about lost links and the service, and end expired shelving."""
         now_ns = self._host_ns()
         for board in self._boards:
             self._publish(board.tick(now_ns))
 
     def operate(self, id_: str, action: Action) -> Alarm:
-        """Apply an action of a person; return the alarm after it.
+        """Apply an operator's action to an alarm, and return the updated alarm.
 
         Raises
         ------
@@ -219,21 +219,21 @@ class AlarmEngine:
         return self._board_of(id_).alarm(id_)
 
     def is_chattering(self, alarm: Alarm) -> bool:
-        """Return whether an alarm was raised too often recently."""
+        """Return whether an alarm was recently raised more often than the chatter rule allows."""
         return self._chatter.is_chattering(alarm.identity.id, self._clock.now_ns())
 
     def set_reference(self, reference: VectorReference) -> None:
-        """Compare 1× vectors with a new reference; one of an unknown unit is ignored."""
+        """Set the reference of the 1× vectors of a bearing; ignore references of unknown units."""
         if reference.unit in self._units:
             self._units[reference.unit].refer_to(reference)
 
     @property
     def alarms(self) -> list[Alarm]:
-        """All alarms of any state."""
+        """All alarms, in any state."""
         return [alarm for board in self._boards for alarm in board.alarms]
 
     def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether the condition of an alarm is known now; most need a connected unit."""
+        """Return whether the condition of an alarm is known; most kinds need a connected unit."""
         if alarm.identity.kind in WITHOUT_LINK:
             return True
         if alarm.identity.unit not in self._units:
@@ -241,11 +241,11 @@ class AlarmEngine:
         return alarm.condition.is_known and self.is_connected(alarm.identity.unit)
 
     def count(self) -> AlarmCount:
-        """Return the number of alarms."""
+        """Return the numbers of alarms by state."""
         return count_of(self.alarms, self.is_judged)
 
     def _host_ns(self) -> int:
-        """Return the time of the host; if its clock was set, stop all delays."""
+        """Return UTC of the host in ns; interrupt all alarm delays if its clock was set."""
         now_ns, was_set = self._time.look()
         if was_set:
             for board in self._boards:
@@ -253,7 +253,7 @@ class AlarmEngine:
         return now_ns
 
     def _publish(self, news: list[AlarmNews]) -> None:
-        """Announce and store news without a block."""
+        """Announce and store alarm news that no block caused."""
         self._announce(news)
         if news:
             self._put(Findings(alarms=news))
@@ -288,17 +288,17 @@ def _log(event: AlarmEvent) -> None:
 
 @dataclass(frozen=True)
 class PlantPart:
-    """Units of one process, and whether it leads.
+    """Part of a plant that one process is responsible for.
 
     Parameters
     ----------
     own
-        Its units, unless it has all.
+        Units of the process; empty if it is responsible for all units.
     elsewhere
         Units of other processes.
     leads
-        Whether it raises alarms about the service and closes alarms of units that are no longer
-        in the plant file; one process does.
+        Whether the process raises alarms about the service and closes alarms of units that are no
+        longer in the plant file; exactly one process of a plant leads.
     """
 
     own: frozenset[str] = frozenset()
@@ -311,10 +311,10 @@ class PlantPart:
 
 
 WHOLE = PlantPart()
-"""The only process of a plant."""
+"""Part of the only process of a plant: all units."""
 
 MAX_RECALLED = 10_000
-"""Maximum number of events that are examined for chattering alarms after a start."""
+"""Maximum number of past events read for the chattering statistics after a start."""
 
 
 async def alarm_engine(
@@ -329,23 +329,23 @@ async def alarm_engine(
     part: PlantPart = WHOLE,
     memories: Mapping[str, AlarmMemory] = MappingProxyType({}),
 ) -> AlarmEngine:
-    """Build the engine and continue from stored alarms.
+    """Build the alarm engine of a process, and restore the stored alarms.
 
     Parameters
     ----------
     rows
-        Channel of each row of the blocks, for units whose rows are not their channels.
+        Channel of each block row, for units whose block rows differ from their channels.
     look
         Returns the health of the service.
     part
         Part of the plant that this process is responsible for.
     memories
-        State of alarms without a gap in the samples since, by unit.
+        State of the alarms of units whose samples continue without a gap, by unit.
 
     Raises
     ------
     StoreError
-        If stored alarms cannot be read; a start without them would lose them.
+        If stored alarms cannot be read; a start without them would lose alarms.
     """
     units = {
         unit.id: UnitAlarms(
@@ -356,7 +356,7 @@ async def alarm_engine(
         )
         for unit in plant.unit
     }
-    # the health of a replay depends on the host, not on the recording
+    # during a replay, service health describes this host and not the recording
     probe = look if origin is Origin.LIVE else None
     service = ServiceAlarms(units, service_rules_of(plant.alarms), probe, leads=part.leads)
     chatter, is_alone = chatter_rule_of(plant.alarms), part == WHOLE
@@ -377,7 +377,7 @@ async def alarm_engine(
 
 
 def _rules(plant: PlantFile, unit: UnitSettings, origin: Origin) -> UnitRules:
-    """Return the rules of a unit, with one for its films if they are watched."""
+    """Return the alarm rules of a unit, with a film rule if its films are monitored."""
     is_watched = isinstance(film_rules_of(unit, plant.films), FilmRules)
     films = rule_of(0.0, 0.0, is_latching=plant.films.latching) if is_watched else None
     return replace(rules_of(unit, plant.alarms, origin), films=films)

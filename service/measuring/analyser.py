@@ -1,4 +1,4 @@
-"""Analysis of blocks into findings, and the state of a unit that moves to another process."""
+"""Analysis of sample blocks, and the analysis state with which another process continues."""
 
 import asyncio
 from collections.abc import Mapping
@@ -25,16 +25,16 @@ VERSION = 1
 
 @dataclass(frozen=True)
 class UnitMemory:
-    """State of a unit between two blocks.
+    """Analysis state of a unit between two blocks, from which another process continues.
 
     Parameters
     ----------
     films
-        State of its films, if they are watched.
+        State of the oil films of the unit; None if they are not monitored.
     count
-        Sample count of its blocks.
+        Epoch and end of the newest block; None before the first block.
     version
-        Version of this class.
+        Format version of the stored state.
     """
 
     monitor: MonitorState
@@ -50,13 +50,13 @@ NO_MEMORIES: Mapping[str, UnitMemory] = MappingProxyType({})
 NOTHING = Findings()
 
 TURNS = 3
-"""Turns of the event loop between two bearings: those from a request to its response."""
+"""Event-loop iterations between two bearings: as many as an HTTP request needs."""
 
 
 class Analyser:
-    """Analyses the blocks of all units, one after the other.
+    """Analyser of the blocks of all units; the blocks are analysed one after the other.
 
-    If a device restarts its count within an epoch, its blocks get a new epoch here.
+    If a device restarts its sample index within an epoch, its blocks get a new epoch here.
     """
 
     def __init__(
@@ -72,17 +72,17 @@ class Analyser:
         self._counts = {unit: Counts() for unit in monitors}
 
     def require(self, block: SampleBlock) -> None:
-        """Raise `BlockMisfitError` if a block does not fit its unit."""
+        """Raise `BlockMisfitError` if a block does not match the description of its unit."""
         self._monitors[block.unit].require(block)
 
     async def take(self, block: SampleBlock, sampled_s: float) -> None:
-        """Analyse a block and store its findings; its samples arrived at ``sampled_s``."""
+        """Analyse a block that arrived at ``sampled_s``, and queue its findings for the store."""
         findings = await self.analyse(block, sampled_s)
         if findings != NOTHING:
             self._recorder.put(findings)
 
     async def analyse(self, block: SampleBlock, sampled_s: float) -> Findings:
-        """Analyse a block, whose samples arrived at ``sampled_s``; return its findings."""
+        """Analyse a block that arrived at monotonic time ``sampled_s``; return its findings."""
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].placed(block)
         found = []
@@ -102,12 +102,12 @@ class Analyser:
     async def replay(
         self, block: SampleBlock, sampled_s: float, account: SampleAccount | None = None
     ) -> None:
-        """Analyse a block whose findings are already stored; publish no findings.
+        """Analyse a block again to restore the monitor; its findings are already stored.
 
         Parameters
         ----------
         account
-            Stored account of the samples of the unit; the monitor counts these a second time.
+            Stored sample account of the unit to display; the monitor counts replayed samples twice.
         """
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].replayed(block)
@@ -117,11 +117,11 @@ class Analyser:
         self._live.set_received(block, account or monitor.account, sampled_s)
 
     def state(self, unit: str) -> MonitorState:
-        """Return the state of a monitor without its newest samples."""
+        """Return the state of the monitor of a unit, without its sample buffer."""
         return self._monitors[unit].state
 
     def memory(self, unit: str) -> UnitMemory:
-        """Return the state of a unit that another process needs besides its newest samples."""
+        """Return the analysis state of a unit; with it and the newest samples a process resumes."""
         return UnitMemory(
             self.state(unit),
             self._alarms.memory(unit),
@@ -130,17 +130,17 @@ class Analyser:
         )
 
     def rewind(self, unit: str, memory: UnitMemory) -> None:
-        """Restore the monitor of a unit, which then expects its newest samples again."""
+        """Prepare the monitor of a unit for the replay of the newest samples of a stored state."""
         self._monitors[unit].go_on(None)
         self._monitors[unit].rewind(memory.monitor)
         self._counts[unit].restore(memory.count)
 
     def settle(self, unit: str, memory: UnitMemory) -> None:
-        """Restore the monitor of a unit after these samples."""
+        """Restore the stored state of the monitor of a unit after the replay."""
         self._monitors[unit].settle(memory.monitor)
 
     def refuse(self, unit: str, reason: str) -> None:
-        """Report a message of a unit that was refused."""
+        """Report a refused stream message of a unit to the alarms."""
         self._alarms.refuse(unit, reason)
 
     def note_link(self, news: LinkNews) -> None:
@@ -148,12 +148,12 @@ class Analyser:
         self._alarms.link(news.unit, news.is_connected, news.reason)
 
     def is_connected(self, unit: str) -> bool:
-        """Return whether samples of a unit arrive, as last reported."""
+        """Return whether samples of a unit arrive, according to the last link report."""
         return self._alarms.is_connected(unit)
 
 
 async def _yield() -> None:
-    """Let other tasks run: a bearing takes milliseconds."""
+    """Let other tasks run, since the analysis of a bearing takes milliseconds."""
     for _ in range(TURNS):
         await asyncio.sleep(0)
 
@@ -162,7 +162,7 @@ BUS_CAPACITY = 512
 
 
 class Runner:
-    """Acquisition, analysis and storage in one process. A bug in one task ends all."""
+    """Acquisition, analysis and storage in one process; an error in one task ends all tasks."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Learning of baselines from stored readings, and doubts about what was learned."""
+"""Learning of baselines from stored readings, with checks before automatic acceptance."""
 
 from collections.abc import Mapping
 from functools import partial, reduce
@@ -20,20 +20,20 @@ from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.films import FilmStore
 
 PADWATCH = "padwatch"
-"""Author of baselines that are learned and accepted automatically."""
+"""Author name of baselines that are learned and accepted automatically."""
 
 SURE = 3.0
-"""Minimum of a drift in standard uncertainties: a smaller one may be chance."""
+"""Minimum significant drift in standard uncertainties; a smaller drift may be random."""
 
 
 class Learner:
-    """Learns baselines; has no state and may be used in any thread."""
+    """Learner of film baselines; stateless, its methods may be called in any thread."""
 
     def __init__(self, store: FilmStore, settings: FilmAlarmSettings) -> None:
         self._store, self._settings = store, settings
 
     def is_due(self, place: FilmPlace, now_ns: int) -> bool:
-        """Return whether a bearing is to be learned now, for the first time or again."""
+        """Return whether the baseline of a bearing is due for learning, the first time or again."""
         versions = self.versions(place)
         since_ns = self._since_ns(place, versions)
         if versions.is_frozen or since_ns is None:
@@ -54,7 +54,7 @@ class Learner:
         return now_ns - newest.created_ns >= self._settings.learn_every_days * DAY_NS
 
     def versions(self, place: FilmPlace) -> Versions:
-        """Return the state of the baselines of a bearing."""
+        """Return the versions of the baselines of a bearing: in force, frozen, first accepted."""
         return versions_after(self._store.steps(place.unit, place.bearing))
 
     def learn(
@@ -64,7 +64,7 @@ class Learner:
 
         Returns
         -------
-        None if there are too few readings.
+        The learned baseline; None with too few readings.
         """
         versions = self.versions(place)
         found = self._readings(place, versions, now_ns)
@@ -129,9 +129,9 @@ class Learner:
         return steps
 
     def _disagreement(self, baseline: BearingBaseline, versions: Versions) -> str | None:
-        """Return the difference from the first accepted version, if it is too large.
+        """Return text on a large difference from the first accepted version; None if it is small.
 
-        A comparison with the last version would accept a film that softens slowly.
+        A comparison with the last version would accept a slow decrease of the stiffness.
         """
         origin = baseline.origin
         if versions.first_accepted is None:
@@ -151,7 +151,7 @@ def drifted(
     baseline: BearingBaseline,
     limit: float,
 ) -> str | None:
-    """Return the change of a film during learning, if it is significant: it may show a fault."""
+    """Return text on a significant stiffness change during learning, which may show a fault."""
     for quantity in baseline.quantities:
         found = learning_drift(history, is_healthy, quantity)
         if found and abs(found.change) >= max(limit, SURE * found.std):
@@ -176,13 +176,13 @@ def _step(baseline: BearingBaseline, step: BaselineStep, reason: str) -> StoredS
 
 
 def healthy(film: FilmHistory) -> npt.NDArray[np.bool_]:
-    """Return which readings are settled and without an alarm."""
+    """Return a mask of the readings that are settled and without an alarm, (n,)."""
     is_healthy: npt.NDArray[np.bool_] = film.is_settled & ~np.any(film.level > 0, axis=0)
     return is_healthy
 
 
 def common_rows(found: Mapping[str, FilmHistory]) -> dict[str, npt.NDArray[np.bool_]]:
-    """Return for each history which readings are at times that all histories contain."""
+    """Return masks, by bearing, of the readings at times that all histories contain."""
     times = {bearing: film.history.time_ns for bearing, film in found.items()}
     common = reduce(partial(np.intersect1d, assume_unique=True), times.values())
     return {bearing: np.isin(time_ns, common) for bearing, time_ns in times.items()}

@@ -1,4 +1,4 @@
-"""The version of a baseline in force, and the state of films after a start."""
+"""Selection of the baseline version in force, and restoration of the film state at a start."""
 
 from collections.abc import Mapping
 
@@ -21,16 +21,16 @@ from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.films import FilmStore
 
 TAIL_NS = 2 * DAY_NS
-"""History that the operating state is computed from: longer than the warm-up."""
+"""Length of the history that restores the operating state; longer than the warm-up."""
 
 CATCH_UP_NS = 21 * DAY_NS
-"""History that decisions are computed from: several times the longest mean."""
+"""Length of the history that restores decisions; several times the longest averaging time."""
 
 
 def in_force(
     store: FilmStore, place: FilmPlace, rules: FilmRules
 ) -> tuple[BearingBaseline | None, tuple[Decision, ...]]:
-    """Return the baseline of a bearing that is in force, and the newest decisions with it."""
+    """Return the baseline in force for a bearing, and the newest decisions based on it."""
     version = versions_after(store.steps(place.unit, place.bearing)).in_force
     baseline = None if version is None else store.baseline(place.unit, place.bearing, version)
     if baseline is None or baseline.origin.estimator != place.estimator:
@@ -48,7 +48,7 @@ def in_force(
 def _decisions(
     store: FilmStore, place: FilmPlace, rules: FilmRules, baseline: BearingBaseline
 ) -> tuple[Decision, ...]:
-    """Return the decisions x and y as if a baseline had been in force for the newest readings."""
+    """Return the decisions in x and y that a baseline gives for the newest stored readings."""
     start_ns = _newest_ns(store, place) - round(CATCH_UP_NS / rules.time_lapse)
     found = store.history(FilmQuery(place.unit, place.bearing, place.estimator, start_ns))
     learned = (baseline.of(direction) for direction in DIRECTIONS)
@@ -67,7 +67,7 @@ def resume_films(
     response: ShaftResponse | None,
     watch: FilmWatch,
 ) -> None:
-    """Restore the watch of the films of a unit from all stored readings."""
+    """Restore the film watch of a unit from stored readings, baselines and decisions."""
     places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
     start_ns = _newest_ns(store, places[0]) - TAIL_NS
     found = {
@@ -89,7 +89,7 @@ def _newest_ns(store: FilmStore, place: FilmPlace) -> int:
 
 
 def _recent(found: Mapping[str, FilmHistory], watch: FilmWatch) -> list[FloatArray]:
-    """Return the newest settled readings at common times, (5, n_films) each."""
+    """Return the newest settled readings at times common to all bearings, (5, n_films) each."""
     common, columns = common_rows(found), []
     settled = np.logical_and.reduce([film.is_settled[common[b]] for b, film in found.items()])
     for bearing, film in found.items():
@@ -104,7 +104,7 @@ def _recent(found: Mapping[str, FilmHistory], watch: FilmWatch) -> list[FloatArr
 
 
 def _rises(history: StiffnessHistory, baseline: BearingBaseline | None) -> FloatArray:
-    """Return the rise of the baseline with eccentricity, (2, n); NaN where there is none."""
+    """Return the baseline's stiffness rise with eccentricity, (2, n); NaN without a baseline."""
     rises = np.full((len(DIRECTIONS), len(history)), np.nan)
     for row, direction in enumerate(DIRECTIONS):
         learned = baseline.of(direction) if baseline else None

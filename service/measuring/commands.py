@@ -1,4 +1,4 @@
-"""Commands of operators, carried out in the measuring process."""
+"""Execution of operator commands in the measuring process."""
 
 import asyncio
 
@@ -12,22 +12,22 @@ from service.measuring.recorder import NotStoredError, Recorder
 from service.store.port import StoreError
 
 STORED_WITHIN_S = 10.0
-"""Maximum wait for the disk."""
+"""Maximum wait until an action is on the disk, s."""
 
 ANSWERS_WITHIN_S = 10.0
-"""Maximum wait for the empty transaction before an action."""
+"""Maximum wait for the empty transaction that tests the store before an action, s."""
 
 
 class LocalCommands:
-    """Applies commands to the alarms and films of this process."""
+    """Executor of commands on the alarms and films of this process."""
 
     def __init__(self, alarms: AlarmEngine, films: FilmMonitor, recorder: Recorder) -> None:
         self._alarms, self._films, self._recorder = alarms, films, recorder
 
     async def operate(self, id_: str, action: Action) -> Alarm:
-        """Apply an action to an alarm; return after it is on the disk.
+        """Apply an action to an alarm; return the alarm once the action is on the disk.
 
-        The action is refused while the store fails, since it must be in the audit trail.
+        While the store fails, actions are refused, since the audit trail must contain them.
         """
         await self._require_store(self._alarms.alarm(id_))
         alarm = self._alarms.operate(id_, action)
@@ -64,5 +64,5 @@ class LocalCommands:
         await self._films.act(place, action, actor, reason)
 
     async def refer_to(self, reference: VectorReference) -> None:
-        """Compare 1× vectors with a new reference."""
+        """Set the reference with which the 1× vectors of a bearing are compared."""
         self._alarms.set_reference(reference)

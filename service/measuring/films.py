@@ -1,4 +1,4 @@
-"""Film monitors of all units."""
+"""Monitor of the oil films of all units: judgement, baselines and their learning."""
 
 import asyncio
 from collections.abc import Mapping, Sequence
@@ -30,12 +30,12 @@ from service.store.port import StoreError
 log = structlog.get_logger()
 
 MAX_LEARN_S = 900.0
-"""Maximum duration of learning one bearing from its whole history."""
+"""Maximum duration of learning one baseline from the whole history of a bearing, s."""
 
 
 @dataclass(frozen=True)
 class WatchedFilms:
-    """Films of a unit with their rules, watch and newest news by bearing."""
+    """Rules and watch of the oil films of a unit, and the newest film news by bearing."""
 
     rules: FilmRules
     watch: FilmWatch
@@ -43,12 +43,12 @@ class WatchedFilms:
 
 
 class FilmMonitor:
-    """Monitor of the films of all units; judges on the event loop, reads and learns in threads.
+    """Monitor of the oil films of all units; store access and learning run in threads.
 
     Parameters
     ----------
     rules
-        Rules of every unit, or why its films cannot be watched.
+        Film rules of each unit, or the reason why its films cannot be monitored.
     """
 
     def __init__(
@@ -61,7 +61,7 @@ class FilmMonitor:
     ) -> None:
         self._store, self._clock, self.settings = store, clock, settings
         self.learner = Learner(store, settings)
-        self._acting = asyncio.Lock()  # each action depends on the result of the one before
+        self._acting = asyncio.Lock()  # each action depends on the result of the previous action
         self.unwatched = {unit: why for unit, why in rules.items() if isinstance(why, str)}
         self._films = {
             unit: _watched(units[unit], found)
@@ -70,12 +70,12 @@ class FilmMonitor:
         }
 
     async def start(self) -> None:
-        """Continue from stored readings, before the first result.
+        """Restore the film state from stored readings, before the first result.
 
         Raises
         ------
         StoreError
-            If they cannot be read; a start without them would lose findings.
+            If the readings cannot be read; a start without them would lose findings.
         """
         responses = await asyncio.to_thread(self._store.responses)
         for unit, films in self._films.items():
@@ -83,38 +83,38 @@ class FilmMonitor:
             await asyncio.to_thread(resume_films, self._store, *how)
 
     def memory(self, unit: str) -> FilmMemory | None:
-        """Return the state of the films of a unit that another process needs to continue."""
+        """Return the film state of a unit for another process; None if it is not monitored."""
         return self._films[unit].watch.memory if unit in self._films else None
 
     def resume(self, unit: str, memory: FilmMemory | None) -> None:
-        """Continue where another process stopped; called after `start`."""
+        """Restore the film state that another process has stored; call `start` before."""
         if memory is not None and unit in self._films:
             self._films[unit].watch.restore(memory)
 
     def rules(self, unit: str) -> FilmRules | None:
-        """Return the rules of the films of a unit; None if they are not watched."""
+        """Return the film rules of a unit; None if its films are not monitored."""
         return self._films[unit].rules if unit in self._films else None
 
     def place(self, unit: str, bearing: str) -> FilmPlace | None:
-        """Return a bearing with the estimator of its stiffness; None if it is not watched."""
+        """Return a bearing and its stiffness estimator; None if its film is not monitored."""
         rules = self.rules(unit)
         if rules is None or bearing not in rules.estimators:
             return None
         return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """Return the newest news of a bearing since the service started."""
+        """Return the newest film news of a bearing; None before the first since the start."""
         return self._films[unit].newest.get(bearing) if unit in self._films else None
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
-        """Return the baseline of a bearing that is in force."""
+        """Return the baseline that is in force for a bearing; None without a baseline."""
         films = self._films.get(unit)
         return films.watch.judge.baseline(bearing) if films else None
 
     def take(
         self, unit: str, assessments: Sequence[Assessment]
     ) -> tuple[Sequence[Assessment], list[FilmNews]]:
-        """Add the operating condition to results, and judge films if a reading is due."""
+        """Return results with their operating condition, and the film news if a reading is due."""
         films = self._films.get(unit)
         if films is None or not assessments:
             return assessments, []
@@ -123,7 +123,7 @@ class FilmMonitor:
         return seen, news
 
     def conditions(self, news: Sequence[FilmNews]) -> dict[str, Judgement]:
-        """Return the conditions of the alarms about films, by id of the alarm."""
+        """Return the conditions of the film alarms, by alarm id."""
         return {
             AlarmIdentity(each.reading.unit, each.reading.bearing, kind).id: alarm_condition(
                 finding, self._films[each.reading.unit].rules.change
@@ -133,7 +133,7 @@ class FilmMonitor:
         }
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Learn baselines that are due, until cancelled."""
+        """Learn due baselines periodically, until cancelled."""
         period_s = min(3600.0, 86_400.0 * self.settings.learn_every_days / 4)
         while True:
             try:
@@ -144,7 +144,7 @@ class FilmMonitor:
             await self._clock.sleep(period_s)
 
     async def learn_due(self, pulse: Pulse = UNHEARD) -> None:
-        """Learn every bearing that is due."""
+        """Learn the due baselines of all units, and the shaft responses of these units."""
         for unit, films in self._films.items():
             pulse.beat(MAX_LEARN_S)
             due = [
@@ -160,7 +160,7 @@ class FilmMonitor:
                 await self._learn_response(unit)
 
     async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:
-        """Learn a bearing now; return None if there are too few readings."""
+        """Learn and store the baseline of a bearing now; None with too few readings."""
         now_ns = self._clock.now_ns()
         async with self._acting:
             learned = await asyncio.to_thread(self.learner.learn, place, now_ns, **why)
@@ -182,14 +182,14 @@ class FilmMonitor:
     async def act(
         self, place: FilmPlace, action: BaselineAction, actor: str, reason: str
     ) -> Versions:
-        """Apply an action of an engineer to the baselines of a bearing.
+        """Apply an engineer's action to the baselines of a bearing; return their new state.
 
         Raises
         ------
         BaselineRefusedError
             If the action does not fit the state of the baselines.
         StoreError
-            If it was not stored; then nothing has changed.
+            If the action was not stored; the baselines are then unchanged.
         """
         async with self._acting:
             step = await asyncio.to_thread(self._step, place, action, actor, reason)
@@ -206,7 +206,7 @@ class FilmMonitor:
         return baseline_step(action, place, versions, entries, actor, reason, self._clock.now_ns())
 
     async def put_in_force(self, place: FilmPlace) -> None:
-        """Compare a bearing with the baseline that its stored steps put in force."""
+        """Activate the baseline of a bearing that is in force according to the stored steps."""
         films = self._films[place.unit]
         held = films.watch.judge.baseline(place.bearing)
         found, decisions = await asyncio.to_thread(in_force, self._store, place, films.rules)
@@ -222,12 +222,12 @@ def _watched(unit: Unit, rules: FilmRules) -> WatchedFilms:
 async def film_monitor(
     plant: PlantFile, machines: Mapping[str, Unit], store: FilmStore, clock: Clock
 ) -> FilmMonitor:
-    """Build the monitor of all films and continue from stored readings.
+    """Build the film monitor of a plant, and restore its state from stored readings.
 
     Raises
     ------
     StoreError
-        If they cannot be read.
+        If the stored readings cannot be read.
     """
     rules = {unit.id: film_rules_of(unit, plant.films) for unit in plant.unit}
     monitor = FilmMonitor(machines, rules, plant.films, store, clock)

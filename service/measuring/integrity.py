@@ -1,4 +1,4 @@
-"""Monitor of the integrity of stored data while the service runs."""
+"""Monitor of the integrity of the database while the service runs."""
 
 import asyncio
 
@@ -15,24 +15,24 @@ from service.store.store import Store
 log = structlog.get_logger()
 
 LOOK_EVERY_S = 3.0
-"""Time until a removed or replaced database file is noticed."""
+"""Period of the checks, and so the time until a removed database file is detected, s."""
 
 MAX_REPORTED = 100
-"""Maximum number of damaged rows that are entered in the audit trail after a start."""
+"""Maximum number of damaged rows recorded in the audit trail after a start."""
 
 
 class IntegrityMonitor:
-    """Reports damaged rows, an older copy of the database, and a missing database file.
+    """Detector of damaged rows, an older copy of the database, and a missing database file.
 
     Parameters
     ----------
     live
-        Receives a store error while the database file is missing or replaced.
+        Live view that shows a store error while the database file is missing or replaced.
 
     Attributes
     ----------
     rolled_back
-        How the database differs from the one of the last run; None if it does not.
+        Differences from the database of the last run, as text; None without differences.
     """
 
     def __init__(self, store: Store, clock: Clock, live: LiveView) -> None:
@@ -43,17 +43,17 @@ class IntegrityMonitor:
 
     @property
     def n_damaged(self) -> int:
-        """Damaged rows found since the start; they are left out of all answers."""
+        """Number of damaged rows found since the start; query results omit these rows."""
         return self._store.integrity.n_damaged
 
     @property
     def mark_error(self) -> str | None:
-        """Why the commit counter could not be written; None if it was."""
+        """Error of the last attempt to write the commit counter; None if it succeeded."""
         return self._store.integrity.mark_error
 
     @property
     def trouble(self) -> str | None:
-        """All faults in one line; None if there are none."""
+        """Text with all present faults; None without faults."""
         mark, n_damaged = self.mark_error, self.n_damaged
         faults = [
             self._no_file,
@@ -65,14 +65,14 @@ class IntegrityMonitor:
         return "; ".join(each for each in faults if each) or None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Check periodically, until cancelled."""
+        """Check the database periodically, until cancelled."""
         while True:
             await self.look()
             pulse.beat(LOOK_EVERY_S)
             await self._clock.sleep(LOOK_EVERY_S)
 
     async def look(self) -> None:
-        """Check once."""
+        """Check the database file and the stored rows once."""
         if not await self._has_file():
             return
         try:
@@ -81,7 +81,7 @@ class IntegrityMonitor:
             log.error("the integrity of stored data cannot be checked", reason=str(error))
 
     async def _has_file(self) -> bool:
-        """Return whether the database file is the one that is open."""
+        """Return whether the open database file still exists at its path; log changes."""
         before = self._no_file
         try:
             await asyncio.to_thread(self._store.integrity.require_file)

@@ -1,4 +1,4 @@
-"""Metrics of samples, links, results, alarms, films, queue and store."""
+"""Prometheus metrics of samples, links, results, alarms, films, queue, store and disks."""
 
 import re
 from collections import Counter
@@ -23,7 +23,7 @@ from service.runtime.metrics import Rows, counter, gauge, histogram, plain_histo
 from service.runtime.polls import TimedSource
 
 MAX_REASONS = 24
-"""Maximum number of reasons per unit; further ones are counted as `OTHER`."""
+"""Maximum number of reason labels per unit; further reasons are counted as `OTHER`."""
 
 OTHER = "other"
 
@@ -33,7 +33,7 @@ UNIT = ("unit",)
 
 
 def sample_metrics(live: LiveView, units: Iterable[str]) -> Iterator[Metric]:
-    """Yield the account of samples: offered = received + missing + rejected."""
+    """Yield the sample counters: offered = received + missing + rejected."""
     accounts = [((unit,), live.status(unit).account) for unit in units]
     yield counter(
         "samples_offered",
@@ -80,7 +80,7 @@ def sample_metrics(live: LiveView, units: Iterable[str]) -> Iterator[Metric]:
 def link_metrics(
     live: LiveView, units: Sequence[str], sources: Mapping[str, TimedSource], now_ns: int
 ) -> Iterator[Metric]:
-    """Yield the state of the links."""
+    """Yield link state, sample ages, clock offset, poll durations and refused frames."""
     status = [((unit,), live.status(unit)) for unit in units]
     yield gauge(
         "link_connected",
@@ -128,7 +128,7 @@ def link_metrics(
 
 
 def bounded(rejected: Mapping[str, int]) -> dict[str, int]:
-    """Return counts by reason, with a limited number of reasons."""
+    """Return counts by reason; reasons that exceed the limit or are no valid label are `OTHER`."""
     counts: dict[str, int] = {}
     for reason, n_samples in rejected.items():
         is_label = _WORD.fullmatch(reason) and len(counts) < MAX_REASONS
@@ -146,7 +146,7 @@ def _by_reason(counts: Iterable[tuple[str, Mapping[str, int]]]) -> Rows:
 def result_metrics(
     timings: Timings, live: LiveView, units: Mapping[str, Sequence[str]]
 ) -> Iterator[Metric]:
-    """Yield duration, age and quality of results; ``units`` are the bearings of each unit."""
+    """Yield duration, age and quality of results; ``units`` has the bearings of each unit."""
     yield histogram(
         "assessment_duration_seconds",
         "Duration of the analysis for each result of a bearing.",
@@ -173,7 +173,7 @@ def result_metrics(
 
 
 def alarm_metrics(alarms: AlarmList, units: Iterable[str]) -> Iterator[Metric]:
-    """Yield the number of alarms, counted as on the dashboard."""
+    """Yield the numbers of active, unacknowledged, hidden and unjudged alarms."""
     count = alarms.count()
     yield gauge(
         "alarms_active",
@@ -190,7 +190,7 @@ def alarm_metrics(alarms: AlarmList, units: Iterable[str]) -> Iterator[Metric]:
 
 
 def _active(alarms: Iterable[Alarm], units: Sequence[str]) -> Rows:
-    """Count active alarms; those of units that are not in the plant file count as of the plant."""
+    """Count active alarms by unit and level; alarms of unknown units count for the plant."""
     found: Counter[tuple[str, AlarmLevel]] = Counter()
     for alarm in alarms:
         if alarm.level is not None and alarm.state not in HIDDEN:
@@ -209,7 +209,7 @@ def film_metrics(
     Parameters
     ----------
     newest
-        Returns the news of a bearing of a unit; None before its first reading.
+        Returns the newest film news of a unit and bearing; None before the first reading.
     """
     found = Counter(
         (unit, finding.verdict)
@@ -231,7 +231,7 @@ def film_metrics(
 
 
 def queue_metrics(bus: Bus) -> Iterator[Metric]:
-    """Yield the state of the queue from acquisition to analysis."""
+    """Yield length, capacity and waiting time of the queue from acquisition to analysis."""
     yield one("queue_blocks", "Blocks that wait for analysis.", bus.depth)
     yield one("queue_capacity_blocks", "Maximum number of waiting blocks.", bus.capacity)
     yield one("queue_wait_seconds", "Waiting time of the oldest block.", bus.oldest_wait_s)
@@ -240,7 +240,7 @@ def queue_metrics(bus: Bus) -> Iterator[Metric]:
 def store_metrics(
     recorder: Recorder, live: LiveView, timings: Timings, kind: str | None
 ) -> Iterator[Metric]:
-    """Yield the state of the writes to the store."""
+    """Yield duration, backlog and failures of the writes to the store."""
     yield plain_histogram(
         "store_commit_duration_seconds",
         "Duration of writing findings to the disk.",
@@ -265,12 +265,12 @@ def store_metrics(
 
 
 def store_info(kind: str) -> Metric:
-    """Return the family that names the kind of the database."""
+    """Return the metric whose label is the kind of the database."""
     return gauge("store_info", "1; kind of the database.", ("kind",), [((kind,), 1)])
 
 
 def soundness_metrics(found: IntegrityMonitor | None) -> Iterator[Metric]:
-    """Yield the results of the integrity checks, if there are any."""
+    """Yield the results of the integrity checks; nothing without an integrity monitor."""
     if found is None:
         return
     yield one(
@@ -291,7 +291,7 @@ def soundness_metrics(found: IntegrityMonitor | None) -> Iterator[Metric]:
 
 
 def space_metrics(space: SpaceWatch | None) -> Iterator[Metric]:
-    """Yield the space on the disks that have been measured."""
+    """Yield free space, size and time until full of each measured disk."""
     disks = [((disk.name,), disk) for disk in (space.disks if space else ())]
     for name, meaning, rows in (
         ("disk_free_bytes", "Free space of a disk.", [(n, d.space.free_bytes) for n, d in disks]),

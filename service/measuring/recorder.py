@@ -1,4 +1,4 @@
-"""Recorder of findings: in order, in batches, with retries and a file of refused rows."""
+"""Recorder: writes findings to the store in batches, with retries and a file of refused rows."""
 
 import asyncio
 import json
@@ -29,22 +29,22 @@ from service.store.store import Store
 FILE = "parked.jsonl"
 
 MAX_BYTES = 16_000_000
-"""Maximum size of the file and of its predecessor: a damaged page refuses every result."""
+"""Size at which the file is rotated; a damaged database page may refuse every result."""
 
 
 class ParkedRows:
-    """File of refused rows with the reasons, one JSON object per line; readable by the owner."""
+    """File of rows that the database refused, with reasons; one JSON object per line, mode 0600."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def add(self, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
-        """Append rows with the reason of each, and sync them to the disk.
+        """Append pairs of a row and its reason, and sync the file to the disk.
 
         Raises
         ------
         OSError
-            If the disk refuses.
+            If the file cannot be written.
         """
         lines = [
             json.dumps(
@@ -78,7 +78,7 @@ log = structlog.get_logger()
 RETRY_S = 1.0
 
 MAX_NEWS = 100_000
-"""Maximum number of alarm news in the queue; about 100 MB."""
+"""Maximum number of queued alarm news; about 100 MB of memory."""
 
 GIVEN_UP = "given_up"
 
@@ -91,7 +91,7 @@ class NotStoredError(Exception):
 
 @dataclass(frozen=True)
 class Findings:
-    """Findings from one block, stored together or not at all."""
+    """Results, gaps, alarm news and film news of one block, stored in one transaction."""
 
     assessments: Sequence[Assessment] = ()
     gaps: Sequence[UnitGap] = ()
@@ -101,7 +101,7 @@ class Findings:
 
     @property
     def parts(self) -> Iterator["Findings"]:
-        """Each row by itself, in an order in which they can be stored."""
+        """Findings with one row each, in an order in which the rows can be stored separately."""
         yield from (Findings(alarms=[news]) for news in self.alarms)
         yield from (Findings([assessment]) for assessment in self.assessments)
         yield from (Findings(gaps=[gap]) for gap in self.gaps)
@@ -111,28 +111,28 @@ class Findings:
 
     @property
     def row(self) -> object:
-        """The only row of a part."""
+        """The row of findings that have exactly one row, as in `parts`."""
         return next(iter((*self.alarms, *self.assessments, *self.gaps, *self.films, self.position)))
 
 
 class Recorder:
-    """Writes findings to the store in a thread, so that a slow disk does not delay samples.
+    """Writer of findings to the store in a thread, so that a slow disk does not delay samples.
 
-    A row that the database refuses is written to a file, and the others are stored.
+    A row that the database refuses is written to a file; all other rows are stored.
 
     Parameters
     ----------
     parked
         File of refused rows.
     capacity
-        Maximum number of queued findings; above it the oldest are dropped and counted in
-        :attr:`LiveView.n_unstored`. Alarm news has a queue of its own, up to `MAX_NEWS`.
+        Maximum number of queued findings; the oldest findings above it are dropped and counted in
+        :attr:`LiveView.n_unstored`. Alarm news has a separate queue of up to `MAX_NEWS`.
     on_stored
-        Called after alarm news was written.
+        Callback after alarm news was written.
     timed
-        Context manager around each write, in the thread.
+        Returns a context manager for each write, entered in the writer thread.
     finds_again
-        Whether the next process repeats the findings that were not written, from a stream.
+        Whether the next process repeats unwritten findings by reading the stream again.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class Recorder:
         self._news = asyncio.Event()
         self._progress = asyncio.Condition()
         self._outcomes: dict[int, asyncio.Future[str | None]] = {}
-        # not the default threads, which may all be busy with requests
+        # a separate thread: those of the default executor may all be busy with requests
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="recorder")
 
     @property
@@ -167,13 +167,13 @@ class Recorder:
 
     @property
     def behind_s(self) -> float:
-        """Time for which the queue has waited without any write."""
+        """Time for which findings have been queued without a successful write, s."""
         if not (self._waiting or self._alarms):
             return 0.0
         return self._clock.monotonic_s() - self._waits_since_s
 
     def put(self, findings: Findings) -> None:
-        """Queue findings."""
+        """Queue findings for the next write."""
         if not (self._waiting or self._alarms):
             self._waits_since_s = self._clock.monotonic_s()
         if findings.assessments or findings.gaps or findings.position:
@@ -186,12 +186,12 @@ class Recorder:
         self._news.set()
 
     async def stored(self) -> None:
-        """Wait without limit until the newest alarm news is on the disk.
+        """Wait without timeout until the newest queued alarm news is on the disk.
 
         Raises
         ------
         NotStoredError
-            If it was dropped or refused.
+            If this alarm news was dropped or refused.
         """
         if not self._alarms:
             return
@@ -202,25 +202,25 @@ class Recorder:
             raise NotStoredError(refusal)
 
     async def reached(self, position: StreamPosition) -> None:
-        """Wait without limit until a queued position is on the disk."""
+        """Wait without timeout until a queued stream position is on the disk."""
         async with self._progress:
             await self._progress.wait_for(
                 lambda: all(findings.position is not position for findings in self._waiting)
             )
 
     async def require_store(self) -> None:
-        """Write an empty transaction.
+        """Check that the store accepts writes, with an empty transaction.
 
         Raises
         ------
         StoreError
-            If nothing can be written now.
+            If the transaction fails.
         """
         loop = asyncio.get_running_loop()
         await loop.run_in_executor(self._thread, self._store.append, [], [])
 
     async def settled(self) -> None:
-        """Wait until the queue is on the disk, or the store has failed."""
+        """Wait until the queue is written to the disk, or a write has failed."""
         async with self._progress:
             await self._progress.wait_for(
                 lambda: self._live.store_error or not (self._waiting or self._alarms)
@@ -238,7 +238,7 @@ class Recorder:
                     await self._clock.sleep(RETRY_S)
 
     async def flush(self) -> None:
-        """Write the queue once, at the end of the process."""
+        """Write the queue once at the end of the process; log the findings that were not stored."""
         if (self._waiting or self._alarms) and not await self._write():
             counts = {"n_findings": len(self._waiting), "n_alarm_news": len(self._alarms)}
             if self._finds_again:
@@ -247,7 +247,7 @@ class Recorder:
                 log.error("results are lost", **counts)
 
     def _drop_oldest(self) -> None:
-        """Drop the oldest findings above the capacity, except those being written."""
+        """Drop the oldest findings above the capacity, except the batch that is being written."""
         while len(self._waiting) > self._capacity + self._n_writing:
             del self._waiting[self._n_writing]
             self._live.note_unstored(1, GIVEN_UP)
@@ -283,7 +283,7 @@ class Recorder:
         return True
 
     def _append(self, batch: Iterable[Findings]) -> list[tuple[object, str]]:
-        """Store findings; park the rows that are refused and return them with the reasons."""
+        """Store findings; write refused rows to the file, and return them with the reasons."""
         refused: list[tuple[object, str]] = []
         with self._timed():
             self._append_parts([part for findings in batch for part in findings.parts], refused)
@@ -295,7 +295,7 @@ class Recorder:
         return refused
 
     def _append_parts(self, parts: Sequence[Findings], refused: list[tuple[object, str]]) -> None:
-        """Store parts in one transaction; if that is refused, store each half."""
+        """Store parts in one transaction; if it is refused, store each half separately."""
         try:
             self._store.append(
                 [row for part in parts for row in part.assessments],
@@ -315,7 +315,7 @@ class Recorder:
             self._append_without_spectrum(parts[0].assessments)
 
     def _append_without_spectrum(self, assessments: Sequence[Assessment]) -> None:
-        """Store a result without its spectrum, which may be the refused part."""
+        """Store refused results without their spectra, which may have caused the refusal."""
         if any(assessment.spectrum.frequency_hz.size for assessment in assessments):
             with suppress(RefusedRowError):
                 self._store.append([replace(a, spectrum=NO_SPECTRUM) for a in assessments], [])
@@ -327,7 +327,7 @@ class Recorder:
             log.error("results cannot be stored", n_parked=len(refused), reason=reason)
 
     def _resolve(self, news: AlarmNews, refusal: str | None) -> None:
-        """Report to waiting callers whether alarm news was stored."""
+        """Set the outcome for callers that wait for alarm news: the refusal, None if stored."""
         outcome = self._outcomes.pop(id(news), None)
         if outcome is not None and not outcome.done():
             outcome.set_result(refusal)

@@ -1,4 +1,4 @@
-"""References of the shaft centre and of 1×: in force, given, or from newest readings."""
+"""Gap references of the shaft centre, and reference vectors of 1×."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -27,7 +27,7 @@ log = structlog.get_logger()
 LOOK_EVERY_S = 2.0
 
 Key = tuple[str, str]
-"""Unit and bearing."""
+"""Unit id and bearing id."""
 
 
 def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:
@@ -36,9 +36,9 @@ def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:
 
 
 def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
-    """Return a bearing with a stored reference in place of that of the plant file.
+    """Return a bearing with a stored gap reference in place of the one in the plant file.
 
-    Without gaps of the opposite probes, those of the plant file remain.
+    If the reference has no gaps of the opposite probes, the plant file's gaps remain in force.
     """
     opposite = reference.opposite_reference_um
     if opposite is None or not any(opposite_axes(bearing)):
@@ -51,7 +51,7 @@ def with_reference(bearing: Bearing, reference: GapReference) -> Bearing:
 
 
 class HasUnit(Protocol):
-    """A monitor, or the description of a unit that another process monitors."""
+    """Object with a unit description: a monitor, or a `UnitDescription` without a monitor."""
 
     unit: Unit
 
@@ -61,7 +61,7 @@ class HasUnit(Protocol):
 
 
 class ReferencesInForce:
-    """References in force: the newest stored ones, else those of the plant file.
+    """Gap references in force: the newest stored references, otherwise those of the plant file.
 
     Parameters
     ----------
@@ -81,11 +81,11 @@ class ReferencesInForce:
         self._trouble = TroubleLog("references cannot be read", "references can be read again")
 
     def of(self, unit: str, bearing: str) -> GapReference | None:
-        """Return the stored reference of a bearing; None if that of the plant file is in force."""
+        """Return the stored reference in force; None if the plant file's reference is in force."""
         return self._in_force.get((unit, bearing))
 
     def bearing(self, unit: str, bearing: str) -> Bearing:
-        """Return a bearing with the reference in force."""
+        """Return the description of a bearing with the gap reference in force."""
         described = self._bearings[unit, bearing]
         reference = self.of(unit, bearing)
         return described if reference is None else with_reference(described, reference)
@@ -98,7 +98,7 @@ class ReferencesInForce:
             await self.look()
 
     async def look(self) -> None:
-        """Read stored references once; after an error, those in force remain."""
+        """Read stored references once; after a read error, the references in force remain."""
         try:
             found = await asyncio.to_thread(self._store.references)
         except StoreError as error:
@@ -136,14 +136,14 @@ class ReferencesInForce:
 
 
 MAX_AGE_S = 600.0
-"""Maximum age of gaps that are taken as the present ones."""
+"""Maximum age of measured gaps that may become a reference, s."""
 
 NEAR_GAPS = ("gap_x_um", "gap_y_um")
 OPPOSITE_GAPS = ("opposite_gap_x_um", "opposite_gap_y_um")
 
 GivenPair = tuple[float | None, float | None]
 Gaps = tuple[MicrometrePair, MicrometrePair | None]
-"""Gaps of the probes on the positive axes, and of the opposite probes if there are any."""
+"""Gaps in µm of the probes on the positive axes, and of the opposite probes or None."""
 
 
 class ReferenceRefusedError(Exception):
@@ -151,7 +151,7 @@ class ReferenceRefusedError(Exception):
 
 
 def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
-    """Return given gaps in µm, checked against the probes of the bearing.
+    """Return gaps in µm that a user has entered, checked against the probes of the bearing.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
     Raises
     ------
     ReferenceRefusedError
-        If there is none, it is older than ten minutes, or its gaps are not usable.
+        If there is no result, it is older than ten minutes, or a gap has no value.
     """
     if newest is None:
         raise ReferenceRefusedError("there is no stored result yet")
@@ -193,7 +193,7 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
 
 
 def doubts(newest: StoredReadings) -> list[str]:
-    """Return a warning for each gap that is usable but uncertain."""
+    """Return a warning for each gap of the newest result whose quality is uncertain."""
     gaps = {name: newest.readings.get(name) for name in (*NEAR_GAPS, *OPPOSITE_GAPS)}
     return [
         f"{name} is uncertain: {reading.quality.reason}"
@@ -203,7 +203,7 @@ def doubts(newest: StoredReadings) -> list[str]:
 
 
 def _across(bearing: Bearing, near: MicrometrePair, found: GivenPair) -> MicrometrePair | None:
-    """Return the gaps of the opposite probes; that of an axis without one is not used."""
+    """Return the gaps of the opposite probes; an axis without a probe gets an unused value."""
     if not any(opposite_axes(bearing)):
         return None
     unused = bearing.opposite_reference_um or near
@@ -233,7 +233,7 @@ def _usable(newest: StoredReadings, name: str) -> float:
 
 
 NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMENTS)
-"""Reasons for which an amplitude cannot be a reference."""
+"""Quality reasons for which an uncertain amplitude cannot be a reference."""
 
 
 class VectorRefusedError(Exception):
@@ -241,7 +241,7 @@ class VectorRefusedError(Exception):
 
 
 def measured_vectors(assessment: Assessment | None) -> VectorReference:
-    """Return the 1× vectors of a current result with its operating state.
+    """Return the 1× vectors and the operating state of a current result as a reference.
 
     Raises
     ------

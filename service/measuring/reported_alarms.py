@@ -1,4 +1,4 @@
-"""Alarms whose conditions are reported from outside the monitors."""
+"""Alarms whose conditions other components report: silent units and refused messages."""
 
 from collections.abc import Iterable, Sequence
 
@@ -11,7 +11,7 @@ from service.settings.alarm_kinds import ANALYSIS_GONE, MESSAGES_REFUSED, STREAM
 
 
 class ReportedAlarms(AlarmBoard):
-    """Alarms whose conditions are reported from outside and judged at the next tick."""
+    """Alarms whose conditions are set by `report` and judged at the next tick."""
 
     def __init__(self, watches: Iterable[Watch]) -> None:
         self._watches = {watch.id: watch for watch in watches}
@@ -30,7 +30,7 @@ class ReportedAlarms(AlarmBoard):
         self._once.add(id_)
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Judge the reported conditions."""
+        """Judge the reported conditions once, and return the alarm news."""
         for id_, condition in self._found.items():
             self.update(self._watches[id_], condition, host_ns)
         self._found |= dict.fromkeys(self._once, WITHIN)
@@ -39,11 +39,11 @@ class ReportedAlarms(AlarmBoard):
 
 
 SHARED = "shared work"
-"""Name in place of a unit for reports and commands about shared alarms. No unit can have it."""
+"""Pseudo-unit in reports and commands about shared alarms; not a valid unit id."""
 
 
 def is_shared(alarm: Alarm) -> bool:
-    """Return whether an alarm belongs to the process that does the shared work."""
+    """Return whether the process that does the shared work is responsible for an alarm."""
     return alarm.identity.kind == ANALYSIS_GONE
 
 
@@ -55,7 +55,7 @@ def gone_alarms(units: Iterable[str]) -> ReportedAlarms:
 def report_silence(
     alarms: ReportedAlarms, silent: Sequence[str], alive: Sequence[str], after_s: float
 ) -> None:
-    """Report which units are analysed, and which have been silent for too long."""
+    """Report the units that are analysed, and the units silent for more than ``after_s``."""
     reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
     gone = Judgement(AlarmLevel.DANGER, reason=reason)
     for units, condition in ((silent, gone), (alive, WITHIN)):
@@ -64,19 +64,19 @@ def report_silence(
 
 
 def identity_of(unit: str) -> AlarmIdentity:
-    """Return the alarm about a unit without analysis."""
+    """Return the identity of the alarm about a unit without analysis."""
     return AlarmIdentity(PLANT, unit, ANALYSIS_GONE)
 
 
 REFUSED_FOR_S = 600.0
-"""Duration of the alarm after the last refused message."""
+"""Off-delay of the alarm after the last refused message, s."""
 
 MAX_REASON = 200
-"""Maximum length of a reason; a refused message may contain anything."""
+"""Maximum length of a reason in characters; a reason may quote the refused message."""
 
 
 def stream_alarms(units: Iterable[str]) -> ReportedAlarms:
-    """Return the alarms about refused messages of units."""
+    """Return the alarms about refused stream messages of units."""
     alarms = ReportedAlarms(
         Watch(_refused(unit), rule_of(0.0, REFUSED_FOR_S), STREAM) for unit in units
     )
@@ -86,7 +86,7 @@ def stream_alarms(units: Iterable[str]) -> ReportedAlarms:
 
 
 def report_refused(alarms: ReportedAlarms, unit: str, reason: str) -> None:
-    """Report a refused message of a unit."""
+    """Report a refused stream message of a unit."""
     words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
     alarms.report_event(_refused(unit).id, Judgement(AlarmLevel.ALERT, reason=words))
 

@@ -1,4 +1,4 @@
-"""Alarms about the service itself."""
+"""Alarms about the service itself: storage, queues, disks, clocks and lost samples."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
@@ -33,20 +33,20 @@ class ServiceHealth:
     Parameters
     ----------
     readings
-        Readings that the table of alarm kinds names: a number for the limits of the kind, the text
-        of a fault, or None.
+        Readings by their name in the table of alarm kinds: a number to compare with the limits of
+        the kind, the text of a fault, or None.
     store_error
-        Why the store refused the newest write; None if it did not.
+        Error of the newest write; None if it succeeded.
     store_behind_s
-        Time for which findings have waited without any being written.
+        Time for which findings have waited without a write, s.
     n_unstored, unstored_reason
-        Findings since the start that were not stored, and why the newest of them was not.
+        Number of findings since the start that were not stored, and the reason of the newest loss.
     n_recordings_damaged
-        Recordings that were found damaged or missing since the start.
+        Number of recordings found damaged or missing since the start.
     accounts
-        Account of samples of each unit that has sent samples since the start.
+        Sample account of each unit that has sent samples since the start.
     disk
-        Judges the fullest disk, given the level of the condition before.
+        Function that judges the fullest disk, given the previous level of the condition.
     """
 
     readings: Mapping[str, float | str | None] = field(default_factory=dict)
@@ -69,9 +69,9 @@ class StreamStatus:
     Parameters
     ----------
     trouble
-        Returns why no blocks arrive; None if they do.
+        Returns the reason why no blocks arrive; None while blocks arrive.
     behind_s
-        Returns the age of the block analysed last.
+        Returns the delay of the newest analysed block, s.
     """
 
     trouble: Callable[[], str | None]
@@ -81,20 +81,20 @@ class StreamStatus:
 log = structlog.get_logger()
 
 STEP_S = 0.5
-"""Change of the clock at once that shows it was set; a disciplined clock is slewed."""
+"""Minimum step of the wall clock that shows it was set, s; a synchronized clock is slewed."""
 
 
 class HostTime:
-    """Wall clock of the host, compared with its monotonic clock."""
+    """Wall clock of the host; steps are detected by comparison with the monotonic clock."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._seen: tuple[int, float] | None = None
 
     def look(self) -> tuple[int, bool]:
-        """Return UTC nanoseconds, and whether the clock was set since the last call.
+        """Return UTC in ns, and whether the clock was set since the last call.
 
-        The difference then counts for no delay.
+        If it was set, the elapsed time is unknown and must not count towards alarm delays.
         """
         now_ns, steady_s = self._clock.now_ns(), self._clock.monotonic_s()
         before, self._seen = self._seen, (now_ns, steady_s)
@@ -108,10 +108,10 @@ class HostTime:
 
 
 FULL_SHARE = 0.9
-"""Filled share of the queue at which acquisition is about to wait."""
+"""Fill level of the queue at danger level, 0 to 1: acquisition will soon have to wait."""
 
 LOSS_MINUTES = 10
-"""Window of the share of lost samples, and duration of an alarm about lost results."""
+"""Window of the share of lost samples, and off-delay of alarms about lost results, min."""
 
 AT_ONCE, STEADY = rule_of(0.0, 0.0), rule_of(5.0, 30.0)
 
@@ -123,15 +123,15 @@ class ServiceRules:
     Parameters
     ----------
     store_behind
-        Limit of the time that results wait for the store, s.
+        Limit of the time for which results wait for the store, s.
     waiting
-        Limits of the filled share of the queue to the analysis.
+        Limits of the fill level of the analysis queue, 0 to 1.
     delay
-        Limit of the time that samples wait in it, s.
+        Limit of the time for which samples wait in the analysis queue, s.
     loss
-        Limit of the share of lost samples of a unit in ten minutes.
+        Limit of the share of lost samples of a unit in ten minutes, 0 to 1.
     at_once, steady, lasting
-        Rules without limits: without delay, with delays, and lasting for ten minutes.
+        Rules without limits: no delays, both delays, and an off-delay of ten minutes.
     """
 
     store_behind: LimitRule = field(default_factory=lambda: LimitRule(Limits(10.0), AT_ONCE))
@@ -146,7 +146,7 @@ class ServiceRules:
 
 
 def service_rules_of(alarms: AlarmSettings) -> ServiceRules:
-    """Return the rules of the plant file."""
+    """Return the rules of the service alarms with the limits of the plant file."""
     share, delay_s = alarms.max_waiting_share, alarms.max_analysis_delay_s
     waiting = Limits(share, FULL_SHARE if share < FULL_SHARE else None, share / 5)
     return ServiceRules(
@@ -163,7 +163,7 @@ def loss_key(unit: str) -> str:
 
 
 def reporting_unit(identity: AlarmIdentity) -> str:
-    """Return the unit whose process reports an alarm, also an alarm of the plant."""
+    """Return the unit whose process reports an alarm, even if the alarm belongs to the plant."""
     return identity.subject if identity.kind == SAMPLES_LOST else identity.unit
 
 
@@ -183,7 +183,7 @@ class SampleLoss:
         self._seen: deque[tuple[int, int, int, int]] = deque()
 
     def share(self, account: SampleAccount, now_ns: int) -> float:
-        """Update with the account of the unit and return the share."""
+        """Update the window with the sample account of the unit, and return the lost share."""
         offered = account.n_offered
         lost = account.n_gap + sum(account.rejected.values())
         if self._seen and offered < self._seen[-1][1]:
@@ -198,12 +198,12 @@ class SampleLoss:
         return (lost - lost_then + n_dropped) / max(n_new + n_dropped, 1)
 
     def is_complete(self, now_ns: int) -> bool:
-        """Return whether the account covers the last ten minutes, or nearly."""
+        """Return whether the window covers the last ten minutes, within one update interval."""
         return bool(self._seen) and now_ns - self._seen[0][0] >= LOSS_NS - LOOK_EVERY_NS
 
 
 class ServiceAlarms(AlarmBoard):
-    """Alarms without a unit, and alarms of units that are no longer in the plant file.
+    """Alarms about the service, and alarms of units that are no longer in the plant file.
 
     Parameters
     ----------
@@ -212,9 +212,9 @@ class ServiceAlarms(AlarmBoard):
     rules
         Rules of the alarms.
     look
-        Returns the health of the service; without it nothing is judged.
+        Function that returns the health of the service; without it, no alarm is judged.
     leads
-        Whether this process judges what concerns the whole plant; each process judges the lost
+        Whether this process judges the alarms of the whole plant; each process judges the lost
         samples of its own units.
     """
 
@@ -228,7 +228,7 @@ class ServiceAlarms(AlarmBoard):
     ) -> None:
         self._look, names = look, list(units) if look else []
         subjects = {loss_key(unit): (unit, SERVICE_KINDS[SAMPLES_LOST]) for unit in names}
-        # refused messages and units without analysis are judged by unit, elsewhere
+        # `ReportedAlarms` judges refused messages and units without analysis
         self._judged = [
             kind
             for kind in SERVICE_KINDS.values()
@@ -248,7 +248,7 @@ class ServiceAlarms(AlarmBoard):
     def restore(
         self, stored: Iterable[Alarm], host_ns: int, memory: AlarmMemory | None = None
     ) -> list[AlarmNews]:
-        """Continue from stored alarms.
+        """Restore stored alarms.
 
         Earlier losses are unknown, so an active alarm about lost samples stays active until this
         process has seen ten minutes without losses.
@@ -262,7 +262,7 @@ class ServiceAlarms(AlarmBoard):
         return news
 
     def tick(self, host_ns: int) -> list[AlarmNews]:
-        """Judge the health of the service."""
+        """Judge the health of the service once, and return the alarm news."""
         if self._look is not None:
             health = self._look()
             for kind in self._judged:
@@ -293,7 +293,7 @@ class ServiceAlarms(AlarmBoard):
         return self._compared(name, reading)
 
     def _increase(self, name: str, n_found: int, level: AlarmLevel, reason: str) -> Judgement:
-        """Judge a count that should not increase."""
+        """Return an alarm condition if a count of faults has increased since the last call."""
         n_more, self._counted[name] = n_found - self._counted.get(name, 0), n_found
         return Judgement(level, value=float(n_found), reason=reason) if n_more > 0 else WITHIN
 

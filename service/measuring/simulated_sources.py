@@ -1,4 +1,4 @@
-"""Simulated machines as sources: with constant films, or with a life of wear and damage."""
+"""Simulated machines as sample sources: with constant films, or with years of wear and damage."""
 
 from collections.abc import Mapping
 
@@ -31,16 +31,16 @@ from service.settings.sources.simulated import (
 from service.settings.units import UnitSettings
 
 NOISES = {"gap_noise_um_rms", "velocity_noise_mm_s_rms", "acceleration_noise_m_s2_rms"}
-"""Keys of the noise of transducers; by default it is that of real ones."""
+"""Settings of the transducer noise; a life without them has the noise of real transducers."""
 
 MAX_MISFIT = 0.005
-"""Maximum relative difference between the settings of a unit and its life."""
+"""Maximum relative difference between a setting of a unit and the value in its simulated life."""
 
 
 def simulated_history(
     unit: UnitSettings, now_ns: int, years: float = 1.0
 ) -> Mapping[str, StiffnessHistory]:
-    """Return the readings of a unit's life until now, by bearing; none if it has no life.
+    """Return the simulated stiffness readings until now, by bearing; empty without a life.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def simulated_history(
     ConfigError
         If the settings of the unit do not fit its life.
     ValueError
-        If the life is shorter.
+        If the life is shorter than ``years``.
     """
     simulation = unit.simulation
     if simulation is None or simulation.life_seed is None:
@@ -109,12 +109,12 @@ def _compare(unit: UnitSettings, key: str, found: float, wanted: float) -> None:
 
 
 def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:
-    """Return the simulated machine of a unit, whose first sample is now.
+    """Return the simulated machine of a unit; its first sample has the present time.
 
     Raises
     ------
     LookupError
-        If the unit has none.
+        If the unit has no simulation settings.
     ConfigError
         If the settings of the unit do not fit its life.
     """
@@ -138,7 +138,7 @@ def scenario_of(simulation: SimulationSettings) -> Scenario:
     Raises
     ------
     LookupError
-        If it has a life instead.
+        If the unit has a simulated life instead of constant films.
     """
     if simulation.speed_rpm is None or simulation.power_mw is None:
         raise LookupError("a simulated unit with a life has no constant scenario")

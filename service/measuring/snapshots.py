@@ -1,4 +1,4 @@
-"""State of units for publication, from the live objects of the analysing process."""
+"""Snapshots of the unit states in the analysing process, which other processes read."""
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
@@ -14,7 +14,7 @@ from service.settings.units import UnitSettings
 
 
 def bearing_state(assessment: Assessment) -> BearingState:
-    """Return a result without its arrays."""
+    """Return the fields of an assessment that a report contains; arrays are omitted."""
     names = [each.name for each in fields(BearingState)]
     return BearingState(**{name: getattr(assessment, name) for name in names})
 
@@ -22,7 +22,7 @@ def bearing_state(assessment: Assessment) -> BearingState:
 def unit_state(
     settings: UnitSettings, live: LiveView, alarms: AlarmEngine, films: FilmMonitor
 ) -> UnitState:
-    """Return the state of a unit."""
+    """Return the results, alarms, film readings and baseline versions of a unit."""
     unit, bearings = settings.id, [bearing.id for bearing in settings.bearing]
     own = alarm_state(
         [alarm for alarm in alarms.alarms if reporting_unit(alarm.identity) == unit], alarms
@@ -39,7 +39,7 @@ def unit_state(
 
 
 def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
-    """Return a state with alarms only."""
+    """Return a unit state that contains only alarms."""
     return UnitState(
         bearings={},
         alarms=tuple(own),
@@ -51,12 +51,12 @@ def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
 
 
 def plant_signs(live: LiveView) -> UnitSigns:
-    """Return the signs of the process itself."""
+    """Return the signs of the process itself: its store errors, without a link or data ages."""
     return UnitSigns(UnitStatus(), None, {}, live.n_unstored, live.store_error)
 
 
 def unit_signs(settings: UnitSettings, live: LiveView) -> UnitSigns:
-    """Return link state and ages of a unit."""
+    """Return the link state of a unit, and the ages of its samples and results."""
     unit = settings.id
     ages_s = {bearing.id: live.current(unit, bearing.id).age_s for bearing in settings.bearing}
     return UnitSigns(

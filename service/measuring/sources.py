@@ -1,4 +1,4 @@
-"""Sources and monitors of the units of a plant file."""
+"""Sample sources and monitors of the units of a plant file."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -41,7 +41,7 @@ ModbusSettings = (
 
 
 def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
-    """Return the adapter's settings of a device with a register map."""
+    """Return the adapter settings of a polled device with a register map."""
     return PolledSettings(
         **link_fields(device),
         poll_period_s=device.poll_period_s,
@@ -52,7 +52,7 @@ def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
 def modbus_source(
     source: ModbusSettings, unit: Unit, calibration: UnitCalibration, clock: Clock
 ) -> SampleSource:
-    """Return the source of a Modbus device; its monitor is that of `monitor_for`."""
+    """Return the sample source of a Modbus device; `monitor_for` returns the matching monitor."""
     ids = [channel.id for channel in unit.channels]
     match source:
         case ModbusPolledSettings():
@@ -83,7 +83,7 @@ def modbus_source(
 
 
 def monitor_for(source: SourceSettings, unit: Unit, settings: AnalysisSettings) -> UnitMonitor:
-    """Return the monitor of a unit; a poll of a polled device is a sample or a set of vectors."""
+    """Return the monitor of a unit; a poll of a polled device is one sample or a set of vectors."""
     match source:
         case ModbusVectorSettings():
             unit = replace(unit, rate_hz=source.rate_hz)
@@ -97,13 +97,13 @@ def monitor_for(source: SourceSettings, unit: Unit, settings: AnalysisSettings) 
 
 @dataclass(frozen=True)
 class WatchedUnit:
-    """Source of a unit, and the monitor of its blocks.
+    """Sample source of a unit, and the monitor that analyses its blocks.
 
     Parameters
     ----------
     retry_s
-        Maximum wait before a lost link is tried again: the poll period of the source, so that
-        samples arrive within two periods after the device is back.
+        Maximum delay before an attempt to reopen a lost link, s: the poll period of the source, so
+        that samples arrive within two periods after the device is back.
     """
 
     source: SampleSource
@@ -112,16 +112,16 @@ class WatchedUnit:
 
 
 DEFAULT_RETRY_S = 0.5
-"""Retry period of sources that are not polled."""
+"""Maximum reconnection delay of sources without a poll period, s."""
 
 QUEUE_RETRY_S = 0.25
-"""Retry period of queues, which are polled 200 times a second."""
+"""Maximum reconnection delay of Modbus FIFO queues, which are polled 200 times a second, s."""
 
 
 def watched_units(
     plant: PlantFile, source: Callable[[UnitSettings], SampleSource]
 ) -> dict[str, WatchedUnit]:
-    """Return source and monitor of every unit of a plant."""
+    """Return the source and monitor of every unit of a plant, by unit."""
     return {
         unit.id: WatchedUnit(source(unit), monitor_of(unit, plant.analysis), retry_s(unit))
         for unit in plant.unit
@@ -134,12 +134,12 @@ def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
 
 
 def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
-    """Return all units with the sources of the plant file."""
+    """Return all units with live sources as configured in the plant file, by unit."""
     return watched_units(plant, lambda unit: TimedSource(partial(source_of, unit), clock))
 
 
 def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
-    """Return the channel of each row of the blocks of units whose devices deliver vectors."""
+    """Return the channel of each block row, by unit, for units whose devices deliver vectors."""
     return {
         unit.id: [row.channel for row in unit.source.rows]
         for unit in plant.unit
@@ -148,7 +148,7 @@ def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
 
 
 def retry_s(unit: UnitSettings) -> float:
-    """Return the wait before a lost link of a unit is tried again."""
+    """Return the maximum delay before an attempt to reopen a lost link of a unit, s."""
     if isinstance(unit.source, ModbusFifoSettings):
         return QUEUE_RETRY_S
     period_s: float = getattr(unit.source, "poll_period_s", DEFAULT_RETRY_S)
@@ -156,7 +156,7 @@ def retry_s(unit: UnitSettings) -> float:
 
 
 def source_of(unit: UnitSettings, clock: Clock) -> SampleSource:
-    """Return the source of a unit, joined with that of its slow values if there is one."""
+    """Return the source of a unit, joined with the source of its slow values if configured."""
     calibration, slow = calibration_of(unit), unit.slow_source
     if slow is None:
         return _main_source(unit, calibration, clock)

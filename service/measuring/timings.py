@@ -1,4 +1,4 @@
-"""Durations of evaluations and commits."""
+"""Measurement of the durations of assessments and of commits to the store."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -12,14 +12,14 @@ from service.runtime.metrics import Durations
 from service.runtime.polls import TimedSource
 
 ASSESSMENT_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0)
-"""An assessment takes some milliseconds."""
+"""Histogram bounds of assessment durations; an assessment takes a few milliseconds."""
 
 COMMIT_BOUNDS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
-"""A commit waits for the disk, and for at most five seconds for the lock of the database."""
+"""Histogram bounds of commit durations: disk writes, and at most 5 s for the database lock."""
 
 
 class Timings:
-    """Durations of assessments, by unit, and of commits."""
+    """Duration histograms of the assessments of each unit and of the commits."""
 
     def __init__(self, units: Iterable[str], clock: Clock) -> None:
         self._clock = clock
@@ -27,21 +27,21 @@ class Timings:
         self.commits = Durations(COMMIT_BOUNDS_S, clock)
 
     def begin(self) -> float:
-        """Return the time at which an assessment begins, for `assessed`."""
+        """Return the start time of an assessment, an argument of `assessed`."""
         return self._clock.monotonic_s()
 
     def assessed(self, unit: str, began_s: float) -> None:
-        """Add the duration of an assessment that ends now."""
+        """Record the duration of an assessment that started at ``began_s`` and ends now."""
         self.assessments[unit].observe(self._clock.monotonic_s() - began_s)
 
 
 class TimedMonitor(UnitMonitor):
-    """A monitor that measures the durations of its assessments.
+    """Unit monitor that measures the durations of its assessments.
 
     Parameters
     ----------
     monitor
-        Monitor whose state is taken over; it must not be used afterwards.
+        Monitor whose state this object takes over; it must not be used afterwards.
     """
 
     def __init__(self, monitor: UnitMonitor, timings: Timings) -> None:
@@ -59,7 +59,7 @@ class TimedMonitor(UnitMonitor):
 
 
 def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, WatchedUnit]:
-    """Return the units with timed monitors."""
+    """Return the units with monitors that measure their assessment durations."""
     return {
         unit: replace(watched, monitor=TimedMonitor(watched.monitor, timings))
         for unit, watched in units.items()
@@ -67,6 +67,6 @@ def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, Watch
 
 
 def timed_sources(units: Mapping[str, WatchedUnit]) -> dict[str, TimedSource]:
-    """Return the timed sources by unit."""
+    """Return the sources that measure their poll durations, by unit."""
     sources = {unit: watched.source for unit, watched in units.items()}
     return {unit: each for unit, each in sources.items() if isinstance(each, TimedSource)}
