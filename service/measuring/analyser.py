@@ -76,13 +76,13 @@ class Analyser:
         self._monitors[block.unit].require(block)
 
     async def take(self, block: SampleBlock, sampled_s: float) -> None:
-        """Analyse a block that arrived at ``sampled_s``, and queue its findings for the store."""
+        """Analyse a block and queue its findings; its last sample has the time ``sampled_s``."""
         findings = await self.analyse(block, sampled_s)
         if findings != NOTHING:
             self._recorder.put(findings)
 
     async def analyse(self, block: SampleBlock, sampled_s: float) -> Findings:
-        """Analyse a block that arrived at monotonic time ``sampled_s``; return its findings."""
+        """Analyse a block and return its findings; its last sample has the time ``sampled_s``."""
         monitor = self._monitors[block.unit]
         block = self._counts[block.unit].placed(block)
         found = []
@@ -121,7 +121,7 @@ class Analyser:
         return self._monitors[unit].state
 
     def memory(self, unit: str) -> UnitMemory:
-        """Return the analysis state of a unit; with it and the newest samples a process resumes."""
+        """Return the state that another process needs to continue, besides the newest samples."""
         return UnitMemory(
             self.state(unit),
             self._alarms.memory(unit),

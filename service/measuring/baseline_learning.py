@@ -129,7 +129,7 @@ class Learner:
         return steps
 
     def _disagreement(self, baseline: BearingBaseline, versions: Versions) -> str | None:
-        """Return text on a large difference from the first accepted version; None if it is small.
+        """Return a message about a large difference from the first accepted version, or None.
 
         A comparison with the last version would accept a slow decrease of the stiffness.
         """
@@ -151,7 +151,7 @@ def drifted(
     baseline: BearingBaseline,
     limit: float,
 ) -> str | None:
-    """Return text on a significant stiffness change during learning, which may show a fault."""
+    """Return a message about a significant stiffness change during learning, or None."""
     for quantity in baseline.quantities:
         found = learning_drift(history, is_healthy, quantity)
         if found and abs(found.change) >= max(limit, SURE * found.std):

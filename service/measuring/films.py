@@ -87,7 +87,7 @@ class FilmMonitor:
         return self._films[unit].watch.memory if unit in self._films else None
 
     def resume(self, unit: str, memory: FilmMemory | None) -> None:
-        """Restore the film state that another process has stored; call `start` before."""
+        """Restore the film state of another process; `start` must have been called before."""
         if memory is not None and unit in self._films:
             self._films[unit].watch.restore(memory)
 

@@ -128,7 +128,7 @@ def link_metrics(
 
 
 def bounded(rejected: Mapping[str, int]) -> dict[str, int]:
-    """Return counts by reason; reasons that exceed the limit or are no valid label are `OTHER`."""
+    """Return counts by label; reasons above the limit or unfit as labels count as `OTHER`."""
     counts: dict[str, int] = {}
     for reason, n_samples in rejected.items():
         is_label = _WORD.fullmatch(reason) and len(counts) < MAX_REASONS
@@ -204,7 +204,7 @@ def _active(alarms: Iterable[Alarm], units: Sequence[str]) -> Rows:
 def film_metrics(
     newest: Callable[[str, str], FilmNews | None], bearings: Mapping[str, Sequence[str]]
 ) -> Iterator[Metric]:
-    """Yield the number of films by verdict.
+    """Yield the number of films by unit and verdict.
 
     Parameters
     ----------

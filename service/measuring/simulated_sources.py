@@ -40,7 +40,7 @@ MAX_MISFIT = 0.005
 def simulated_history(
     unit: UnitSettings, now_ns: int, years: float = 1.0
 ) -> Mapping[str, StiffnessHistory]:
-    """Return the simulated stiffness readings until now, by bearing; empty without a life.
+    """Return the simulated stiffness history of each bearing until now; empty without a life.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _noise(simulation: SimulationSettings) -> TransducerNoise:
 
 
 def _refuse_misfit(unit: UnitSettings, simulation: SimulationSettings) -> None:
-    """Raise `ConfigError` if the settings of a unit do not fit its life."""
+    """Raise `ConfigError` if settings of a unit differ from the data of its simulated life."""
     speed_rpm = rated_speed_rpm(simulation.life_seed or 0)
     _compare(unit, "rated_speed_rpm", unit.rated_speed_rpm, speed_rpm)
     if unit.rated_power_mw is not None:
@@ -109,7 +109,7 @@ def _compare(unit: UnitSettings, key: str, found: float, wanted: float) -> None:
 
 
 def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:
-    """Return the simulated machine of a unit; its first sample has the present time.
+    """Return the simulated machine of a unit, which starts at the present time.
 
     Raises
     ------

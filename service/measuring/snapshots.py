@@ -14,7 +14,7 @@ from service.settings.units import UnitSettings
 
 
 def bearing_state(assessment: Assessment) -> BearingState:
-    """Return the fields of an assessment that a report contains; arrays are omitted."""
+    """Return the state of a bearing: its assessment without spectrum and orbit."""
     names = [each.name for each in fields(BearingState)]
     return BearingState(**{name: getattr(assessment, name) for name in names})
 
@@ -51,7 +51,7 @@ def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
 
 
 def plant_signs(live: LiveView) -> UnitSigns:
-    """Return the signs of the process itself: its store errors, without a link or data ages."""
+    """Return the signs of the process itself: only its unstored findings and store error."""
     return UnitSigns(UnitStatus(), None, {}, live.n_unstored, live.store_error)
 
 

@@ -12,10 +12,10 @@ from service.runtime.metrics import Durations
 from service.runtime.polls import TimedSource
 
 ASSESSMENT_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0)
-"""Histogram bounds of assessment durations; an assessment takes a few milliseconds."""
+"""Bucket bounds of assessment durations, s; an assessment takes a few milliseconds."""
 
 COMMIT_BOUNDS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
-"""Histogram bounds of commit durations: disk writes, and at most 5 s for the database lock."""
+"""Bucket bounds of commit durations, s: disk writes, and up to 5 s for the database lock."""
 
 
 class Timings:
@@ -27,7 +27,7 @@ class Timings:
         self.commits = Durations(COMMIT_BOUNDS_S, clock)
 
     def begin(self) -> float:
-        """Return the start time of an assessment, an argument of `assessed`."""
+        """Return the monotonic start time of an assessment, for the later call of `assessed`."""
         return self._clock.monotonic_s()
 
     def assessed(self, unit: str, began_s: float) -> None:
@@ -49,7 +49,7 @@ class TimedMonitor(UnitMonitor):
         self._timings = timings
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
-        """Analyse a block, one bearing at a time; raises as `UnitMonitor.steps` does."""
+        """Analyse a block, one bearing at a time; same errors as `UnitMonitor.steps`."""
         steps = super().steps(block)
         began_s = self._timings.begin()
         for assessment in steps:
