@@ -1,4 +1,4 @@
-"""Consumer of the stream: analyses its messages, and acknowledges them after storing results."""
+"""Consumer of the stream: messages are analysed, and acknowledged after storing the results."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping

@@ -55,7 +55,7 @@ class UnitNow:
 
 
 class Reporter:
-    """Reporter that reads the unit states on the event loop and writes them in a thread.
+    """Writer of reports: reads the unit states on the event loop, writes them in a thread.
 
     Parameters
     ----------

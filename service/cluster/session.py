@@ -50,7 +50,7 @@ ROOT = "padwatch"
 
 
 def plant_mark(plant: PlantFile) -> bytes:
-    """Return the fingerprint of the name of a plant, which its messages and stream carry."""
+    """Return the fingerprint of a plant's name, which identifies its messages and stream."""
     return fingerprint(ROOT, plant.plant.name)
 
 
@@ -94,7 +94,7 @@ def identity_of(plant: PlantFile, unit: UnitSettings) -> UnitIdentity:
 
 
 OLDEST_SERVER = (2, 10)
-"""Minimum version of the NATS server, which has all stream and consumer features in use."""
+"""Minimum version of the NATS server that has all stream and consumer features in use."""
 
 CONNECT_S = 3
 PING_S = 5

@@ -1,4 +1,4 @@
-"""Detection of units whose samples or analysis have stopped."""
+"""Detection of units whose analysis reports or stream messages have stopped."""
 
 import asyncio
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -50,7 +50,7 @@ class SilentUnits:
         self._board: ReportedAlarms | None = None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Check while this process leads, until cancelled."""
+        """Check the reports periodically while this process leads, until cancelled."""
         try:
             await periodic(self.look, EVERY_S, self._clock, pulse)
         finally:
@@ -134,7 +134,7 @@ class SilenceWatch:
         trouble: str | None,
         waiting: Collection[str] = frozenset(),
     ) -> None:
-        """Check all units once.
+        """Check the time since the last message of every unit once.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Engine for the alarms of all units and of the service, with its start from stored alarms."""
+"""Alarm engine: life cycle and listeners of the alarms of all units and of the service."""
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping, Sequence

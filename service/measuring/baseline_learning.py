@@ -54,7 +54,7 @@ class Learner:
         return now_ns - newest.created_ns >= self._settings.learn_every_days * DAY_NS
 
     def versions(self, place: FilmPlace) -> Versions:
-        """Return the versions of the baselines of a bearing: in force, frozen, first accepted."""
+        """Return the state of the baseline versions of a bearing, from its stored steps."""
         return versions_after(self._store.steps(place.unit, place.bearing))
 
     def learn(

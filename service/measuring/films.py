@@ -103,7 +103,7 @@ class FilmMonitor:
         return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """Return the newest film news of a bearing; None before the first since the start."""
+        """Return the newest film news of a bearing; None before a reading since the start."""
         return self._films[unit].newest.get(bearing) if unit in self._films else None
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:

@@ -91,7 +91,7 @@ class NotStoredError(Exception):
 
 @dataclass(frozen=True)
 class Findings:
-    """Results, gaps, alarm news and film news of one block, stored in one transaction."""
+    """Results, gaps, alarm news and film news of one block, written in one transaction."""
 
     assessments: Sequence[Assessment] = ()
     gaps: Sequence[UnitGap] = ()

@@ -94,7 +94,7 @@ class HostTime:
     def look(self) -> tuple[int, bool]:
         """Return UTC in ns, and whether the clock was set since the last call.
 
-        If it was set, the elapsed time is unknown and must not count towards alarm delays.
+        If the clock was set, the elapsed time is unknown and must not count towards alarm delays.
         """
         now_ns, steady_s = self._clock.now_ns(), self._clock.monotonic_s()
         before, self._seen = self._seen, (now_ns, steady_s)
