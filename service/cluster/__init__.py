@@ -1,1 +1,1 @@
-"""Several processes on one plant: JetStream, ownership of units, state through the database."""
+"""Operation of a plant by several processes: JetStream, ownership of units, shared state."""

@@ -1,4 +1,4 @@
-"""Consumer of blocks: passes them to the analysis and acknowledges them once they are stored."""
+"""Consumer of the stream: messages are analysed, and acknowledged after storing the results."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
@@ -39,20 +39,20 @@ from service.settings.processes import StreamSettings
 FETCH_S = 5.0
 REST_S = 1.0
 BATCH = 32
-"""Maximum number of messages of a unit that are acknowledged together."""
+"""Maximum number of messages of a unit that are stored and acknowledged together."""
 
 MAX_UNACKNOWLEDGED = 256
 ACK_WAIT_S = 60.0
 
 Begin = Callable[[str, int], Awaitable[Mapping[str, UnitProgress]]]
-"""Returns the progress of all units on a stream, given its name with its time of creation and its
-newest message."""
+"""Function that returns the progress of all units on a stream. Its arguments are the stream's name
+with creation time, and the sequence number of the newest message."""
 
 
 class Consumer:
-    """Passes the messages of the stream to the units.
+    """Consumer that fetches the messages of all units and passes them to their `UnitProgress`.
 
-    The loss of a connection does not interrupt the processing of fetched messages.
+    A lost connection does not interrupt the processing of messages that were already fetched.
     """
 
     def __init__(
@@ -79,16 +79,16 @@ class Consumer:
 
     @property
     def trouble(self) -> str | None:
-        """Why blocks are not being read; None if they are."""
+        """Reason why blocks are not being read; None while they are read."""
         return self._state.trouble
 
     @property
     def waiting(self) -> frozenset[str]:
-        """Units with fetched messages that are not processed yet, as while the store fails."""
+        """Units with fetched messages that are not processed yet, such as during store failures."""
         return frozenset(unit for unit, queue in self._queues.items() if not queue.empty())
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Consume until cancelled; a lost connection is renewed."""
+        """Fetch and process messages until cancelled; renew lost connections."""
         async with asyncio.TaskGroup() as tasks:
             while True:
                 pulse.rest()
@@ -102,7 +102,7 @@ class Consumer:
                     await self._clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
 
     async def _find(self, stream: JetStreamContext, tasks: asyncio.TaskGroup) -> None:
-        """Identify the stream and the position at which each unit resumes."""
+        """Check the identity of the stream; at the first call, start each unit at its position."""
         found = await require(stream, self._plant)
         state = (await stream.stream_info(stream_name(self._plant))).state
         newest = max(self._fetched.values(), default=0)
@@ -132,7 +132,7 @@ class Consumer:
     async def _fetch_unit(self, stream: JetStreamContext, unit: str) -> None:
         name, durable = stream_name(self._plant), consumer_name(unit)
         with suppress(NotFoundError):
-            await stream.delete_consumer(name, durable)  # another reader of it ends
+            await stream.delete_consumer(name, durable)  # stops another reader of this consumer
         await stream.add_consumer(
             name,
             ConsumerConfig(
@@ -157,7 +157,7 @@ class Consumer:
         self.n_pending[unit] = message.metadata.num_pending
         if (
             sequence <= self._fetched[unit]
-        ):  # redelivered: waits here, or its acknowledgement was lost
+        ):  # redelivered: still queued here, or its acknowledgement was lost
             if sequence <= self._settled.get(unit, 0):
                 with suppress(Error):
                     await message.ack()
@@ -166,7 +166,7 @@ class Consumer:
         self._fetched[unit] = sequence
 
     async def _take_all(self, unit: str) -> None:
-        """Process the messages of a unit, independently of the connection."""
+        """Process and acknowledge the messages of a unit, even while the connection is lost."""
         queue, progress = self._queues[unit], self.units[unit]
         while True:
             batch = [await queue.get()]
@@ -175,12 +175,12 @@ class Consumer:
             refused = [m for m in batch if not await progress.take(_sequence(m), m.data)]
             await self._stored(progress)
             for message in batch:
-                with suppress(Error):  # stored; without acknowledgement the message is redelivered
+                with suppress(Error):  # stored; an unacknowledged message is redelivered
                     await (message.term() if message in refused else message.ack())
             self._settled[unit] = _sequence(batch[-1])
 
     async def _stored(self, progress: UnitProgress) -> None:
-        """Wait until the results and the position of a unit are stored."""
+        """Queue the position of a unit, and wait until its results and its position are stored."""
         if progress.is_replaying:
             return
         position = progress.position()
@@ -189,7 +189,7 @@ class Consumer:
 
 
 async def _fetched(puller: JetStreamContext.PullSubscription) -> Iterable[Msg]:
-    """Wait for the first message and return it with all others that are available."""
+    """Return the available messages of a consumer, up to a limit; empty after a timeout."""
     try:
         messages = await puller.fetch(1, FETCH_S)
         waiting = messages[-1].metadata.num_pending
@@ -209,7 +209,7 @@ UNIT = ("unit",)
 
 
 def consumer_metrics(consumer: Consumer) -> Iterator[Metric]:
-    """Yield the backlog of each unit, and counts of refused and redelivered messages."""
+    """Yield the backlog of each unit, and its counts of refused and redelivered messages."""
     units = consumer.units.items()
     connected = consumer.trouble is None
     yield one("stream_connected", "1 while blocks are read from the stream.", connected)

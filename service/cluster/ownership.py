@@ -1,4 +1,4 @@
-"""Ownership: exclusive locks of units and of the shared work, and partitions of a plant."""
+"""Ownership of units: database locks of units and of the shared work, and plant partitions."""
 
 import asyncio
 import re
@@ -22,11 +22,11 @@ EVERY_S = 1.0
 
 
 class HoldLostError(StoreError):
-    """The connection to the database was lost, and another process may analyse the units."""
+    """The database connection and its locks were lost; another process may analyse the units."""
 
 
 class Holds:
-    """Exclusive locks of some units in the database, all or none."""
+    """Exclusive database locks for the analysis of a set of units; all or none are held."""
 
     def __init__(self, store: Store, units: Iterable[str], clock: Clock) -> None:
         self._store, self._clock = store, clock
@@ -36,7 +36,7 @@ class Holds:
         self.waits_for: str | None = "not started"
 
     async def take(self) -> None:
-        """Wait until all locks are free and take them; a standby waits here."""
+        """Acquire all locks; wait while another process holds any of them, as a standby does."""
         while True:
             refusal = await asyncio.to_thread(self._try)
             if refusal is None:
@@ -48,7 +48,7 @@ class Holds:
         self.waits_for = None
 
     def require(self) -> None:
-        """Raise `HoldLostError` unless all locks are held."""
+        """Raise `HoldLostError` if a lock is no longer held."""
         if not all(hold.is_held for hold in self._holds):
             raise HoldLostError(
                 "the connection to the database was lost, and with it the locks of the units;"
@@ -60,7 +60,7 @@ class Holds:
         self._stack.close()
 
     def _try(self) -> str | None:
-        """Take all locks; return the reason if one is held by another process."""
+        """Acquire all locks or none; return the reason of a failure, None on success."""
         with ExitStack() as stack:
             try:
                 self._holds = [stack.enter_context(self._store.hold(name)) for name in self._names]
@@ -71,17 +71,17 @@ class Holds:
 
 
 SHARED_WORK = "shared work"
-"""Name of the lock for notifications, roll-ups and retention."""
+"""Name of the lock for the shared work: notifications, roll-ups and retention."""
 
 TRY_EVERY_S = 2.0
 LOOK_EVERY_S = 1.0
 
 
 class Leadership:
-    """Runs loops while it holds a lock in the database, so that one process of the plant does.
+    """Leader election: runs loops only while this process holds a lock in the database.
 
-    Two processes may run the loops for a short time when the lock changes hands; the work of the
-    loops is idempotent.
+    Two processes may run the loops for a short time when another process acquires the lock; the
+    work of the loops is idempotent.
     """
 
     def __init__(
@@ -95,14 +95,14 @@ class Leadership:
         self.is_leading = False
 
     async def run(self, pulse: Pulse) -> None:
-        """Lead whenever the lock is free, until cancelled."""
+        """Acquire the lock whenever it is free and run the loops, until cancelled."""
         while True:
             pulse.beat(TRY_EVERY_S)
             with ExitStack() as held:
                 try:
                     hold = await asyncio.to_thread(held.enter_context, self._hold(SHARED_WORK))
                 except StoreError:
-                    pass  # held by another process, or no connection: try again later
+                    pass  # another process holds the lock, or no connection: retry
                 else:
                     await self._lead(hold, pulse)
             await self._clock.sleep(TRY_EVERY_S)
@@ -132,14 +132,14 @@ FORM = re.compile(r"([0-9]{1,4})/([0-9]{1,4})")
 
 @dataclass(frozen=True)
 class Partition:
-    """Part ``number`` of ``n_parts`` of a plant, counted from 1."""
+    """Partition of the units of a plant: part ``number``, from 1, of ``n_parts``."""
 
     number: int = 1
     n_parts: int = 1
 
     @classmethod
     def of(cls, text: str) -> "Partition":
-        """Parse ``i/n``. Raises `ValueError` if the text is malformed."""
+        """Parse a partition ``i/n``. Raises `ValueError` if the text is malformed."""
         found = FORM.fullmatch(text)
         part = cls(int(found[1]), int(found[2])) if found else cls(0, 0)
         if not 1 <= part.number <= part.n_parts:
@@ -149,13 +149,13 @@ class Partition:
         return part
 
     def units(self, units: Sequence[str]) -> list[str]:
-        """Return the units of this part: every n-th of the sorted ids."""
+        """Return the unit ids of this part: every ``n_parts``-th of the sorted ids."""
         return sorted(units)[self.number - 1 :: self.n_parts]
 
     def part_of(self, plant: PlantFile) -> PlantFile:
-        """Return the plant with the units of this part only.
+        """Return a copy of the plant file that has only the units of this part.
 
-        Raises `ValueError` if the part has no units.
+        Raises `ValueError` if this part has no units.
         """
         mine = set(self.units([unit.id for unit in plant.unit]))
         if not mine:
@@ -166,7 +166,7 @@ class Partition:
         return plant.model_copy(update={"unit": tuple(u for u in plant.unit if u.id in mine)})
 
     def share_of(self, plant: PlantFile) -> PlantPart:
-        """Return the part of a whole plant that this process is responsible for."""
+        """Return the units of this part and of all other parts; the process of part 1 leads."""
         every = [unit.id for unit in plant.unit]
         own = frozenset(self.units(every))
         return PlantPart(own, frozenset(every) - own, leads=self.number == 1)

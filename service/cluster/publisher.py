@@ -1,4 +1,4 @@
-"""Publisher of blocks: keeps each block until the servers have confirmed it."""
+"""Publisher of blocks on the stream; queues each block until the servers have confirmed it."""
 
 import asyncio
 from collections import deque
@@ -40,12 +40,12 @@ from service.settings.processes import StreamSettings
 
 @dataclass(frozen=True)
 class Outgoing:
-    """A message with an id that is the same for every attempt.
+    """Outgoing message with an id that is the same for every publish attempt.
 
     Parameters
     ----------
     is_news
-        Whether it is about a link; of consecutive ones only the last is sent.
+        Whether the message is a link state; of consecutive link states, only the last is sent.
     """
 
     id: str
@@ -54,7 +54,7 @@ class Outgoing:
 
 
 class Outbound:
-    """Queue of messages to publish.
+    """Queue of messages to publish, for each unit, with a common capacity in bytes.
 
     `put` waits while ``capacity`` bytes are queued. The ring of the device buffers samples
     meanwhile, and if it overruns, the index of the next block shows the exact gap.
@@ -71,33 +71,33 @@ class Outbound:
 
     @property
     def n_waiting(self) -> int:
-        """Number of waiting messages."""
+        """Number of queued messages of all units."""
         return sum(len(queue) for queue in self._waiting.values())
 
     @property
     def behind_s(self) -> float:
-        """Time for which messages have waited without any being published."""
+        """Time for which messages have been queued without a confirmed message, s."""
         return self._clock.monotonic_s() - self._last_s if self.n_waiting else 0.0
 
     async def put(self, unit: str, message: Outgoing) -> None:
-        """Queue a message; waits while the queue is full."""
+        """Queue a message; wait while the queue is full."""
         async with self._room:
             await self._room.wait_for(lambda: self._fits(message))
             self.add(unit, message)
 
     def add(self, unit: str, message: Outgoing) -> None:
-        """Queue a message at once; news of a link replace waiting ones."""
+        """Queue a message without waiting; a link state replaces a queued link state before it."""
         queue = self._waiting[unit]
         if not self.n_waiting:
             self._last_s = self._clock.monotonic_s()
-        if message.is_news and len(queue) > 1 and queue[-1].is_news:  # the first is being sent
+        if message.is_news and len(queue) > 1 and queue[-1].is_news:  # the first is in transit
             self.n_bytes -= len(queue.pop().payload)
         queue.append(message)
         self.n_bytes += len(message.payload)
         self._news[unit].set()
 
     async def first(self, unit: str) -> Outgoing:
-        """Wait for the oldest message of a unit, which stays in the queue until `published`."""
+        """Wait for the oldest message of a unit; `published` removes it from the queue."""
         while not self._waiting[unit]:
             self._news[unit].clear()
             await self._news[unit].wait()
@@ -125,7 +125,7 @@ FULL_RETRY_S = 1.0
 
 UNCONFIRMED = "the servers do not confirm blocks: check their disks and the cluster"
 MAX_UNCONFIRMED = 3
-"""Consecutive unconfirmed attempts of all units before the connection is renewed."""
+"""Number of consecutive unconfirmed attempts after which the connection is renewed."""
 
 STREAM_FULL = (10047, 10077, 10023)
 """Error codes of the servers: no storage, maximum bytes exceeded, insufficient resources."""
@@ -134,7 +134,7 @@ BYTES_PER_MB = 1e6
 
 
 class Publisher:
-    """Publishes blocks and news of links.
+    """Publisher of the blocks and link states of all units on the stream.
 
     One message per unit is sent at a time, so that the messages of a unit arrive in order. A
     message that was not confirmed is sent again with the same id.
@@ -160,11 +160,11 @@ class Publisher:
 
     @property
     def trouble(self) -> str | None:
-        """Why blocks are not being published; None if they are."""
+        """Reason why blocks are not being published; None while they are published."""
         return self._state.trouble
 
     async def publish(self, block: SampleBlock) -> None:
-        """Queue a block; waits while the queue is full."""
+        """Queue a block; wait while the queue is full."""
         identity = self._identities[block.unit]
         message = encoded_block(block, identity, self._taken_ns(block))
         outgoing = Outgoing(message_id(identity, block), message)
@@ -177,7 +177,7 @@ class Publisher:
         return now_ns - ns_from_s(self._clock.monotonic_s() - block.sampled_s)
 
     def publish_link(self, news: LinkNews) -> None:
-        """Queue news of a link, unless they are unchanged."""
+        """Queue the link state of a unit if it has changed."""
         if self._links.get(news.unit) == news:
             return
         self._links[news.unit] = news
@@ -186,7 +186,7 @@ class Publisher:
         self.waiting.add(news.unit, Outgoing(id_, encoded_link(news, identity), is_news=True))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Publish until cancelled; a lost connection is renewed."""
+        """Publish queued messages until cancelled; renew lost connections."""
         while True:
             pulse.rest()
             try:
@@ -220,7 +220,7 @@ class Publisher:
                 await self._clock.sleep(FULL_RETRY_S)
 
     async def _sent(self, stream: JetStreamContext, where: str, message: Outgoing) -> bool:
-        """Send a message and wait for its confirmation; False if it must be sent again."""
+        """Send a message and wait for its confirmation; return False if it must be sent again."""
         try:
             answer = await stream.publish(
                 where,
@@ -233,7 +233,7 @@ class Publisher:
             self._state.note(UNCONFIRMED)
             self._n_unconfirmed += 1
             if self._n_unconfirmed % MAX_UNCONFIRMED == 0:
-                # a server without a quorum answers everything else; the stream may be gone
+                # without a quorum, a server still answers other requests; the stream may not exist
                 raise StreamError(UNCONFIRMED) from None
             return False
         except MaxPayloadError:
@@ -260,7 +260,7 @@ def _refusal(error: APIError, name: str) -> str:
 
 
 def publisher_metrics(publisher: Publisher) -> Iterator[Metric]:
-    """Yield the metrics of the queue and of the published messages."""
+    """Yield the metrics of the outgoing queue and of the published messages."""
     waiting = publisher.waiting
     connected = publisher.trouble is None
     yield one("stream_connected", "1 while the servers of the stream accept blocks.", connected)

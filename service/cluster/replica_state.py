@@ -1,4 +1,4 @@
-"""Live state, films and alarms of a process that only serves, read from the database."""
+"""Live view, films and alarms of a replica, which serves the HTTP API from stored reports."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -29,7 +29,7 @@ MAX_DRIFT = 1e-3
 """Upper bound of the relative drift of two monotonic clocks."""
 
 SILENT_AFTER_S = 5.0
-"""Age of the last report above which a unit counts as not analysed; reports come every second."""
+"""Age of the last report above which a unit is not analysed, s; reports have a period of 1 s."""
 
 NOT_ANALYSED = "no process that analyses this unit is alive"
 
@@ -41,17 +41,17 @@ NO_SIGNS = UnitSigns(UnitStatus(), None, {})
 
 @dataclass(frozen=True)
 class LatestReport:
-    """Latest report on a unit.
+    """Latest report on a unit, with its derived status.
 
     Parameters
     ----------
     beat
-        Process and number of the report; None before the first.
+        Process and sequence number of the report; None before the first report.
     sent_s
-        When the report was sent, by the monotonic clock of this process. None for the first report
-        of a process, whose age is unknown.
+        Time at which the report was sent, by the monotonic clock of this process, s. None for the
+        first report of a process, whose age is unknown.
     status
-        Status of the unit, valid while reports arrive.
+        Link status of the unit, valid while reports arrive.
     """
 
     beat: tuple[str, int] | None = None
@@ -62,11 +62,11 @@ class LatestReport:
 
 
 class ReplicaLive:
-    """Live view made of the latest reports; outdated values are not shown as current.
+    """Live view of a replica, from the latest reports; outdated values are not shown as current.
 
     Ages are measured by the monotonic clock of this process from the arrival of a report, less the
-    delay of the report. The clocks of the hosts need not agree, and a report that the database
-    delayed does not make its values younger.
+    delay of the report. The clocks of the hosts need not agree, and the delay of a report by the
+    database does not reduce the ages of its values.
     """
 
     def __init__(self, units: Iterable[str], clock: Clock, stale_after_s: float) -> None:
@@ -75,15 +75,15 @@ class ReplicaLive:
         self._latest = dict.fromkeys((*units, PLANT, SHARED), LatestReport())
         self.revision = 0
         self.read_error: str | None = None
-        """Why reports cannot be read; None if they can."""
+        """Error of the last read of the reports; None if it succeeded."""
 
     @property
     def units(self) -> Sequence[str]:
-        """All units, `PLANT` and `SHARED`."""
+        """All units of the plant, and the pseudo-units `PLANT` and `SHARED`."""
         return tuple(self._latest)
 
     def update(self, unit: str, process: str, n_beats: int, signs: UnitSigns) -> None:
-        """Apply the latest report on a unit; a known report has no effect."""
+        """Apply the latest report on a unit; a report that was applied before has no effect."""
         latest, beat = self._latest[unit], (process, n_beats)
         if latest.beat == beat:
             return
@@ -108,29 +108,29 @@ class ReplicaLive:
         self._latest[unit] = replace(self._latest[unit], results=found)
 
     def silence_s(self, unit: str) -> float | None:
-        """Time since the last report on a unit; None before the first with a known age."""
+        """Return the time since the last report on a unit, s; None before a report of known age."""
         sent_s = self._latest[unit].sent_s
         return None if sent_s is None else self._clock.monotonic_s() - sent_s
 
     def is_alive(self, unit: str) -> bool:
-        """Return whether a process analyses the unit and reports on it."""
+        """Return whether a process has reported on the unit within `SILENT_AFTER_S`."""
         silence_s = self.silence_s(unit)
         return silence_s is not None and silence_s <= SILENT_AFTER_S
 
     @property
     def store_error(self) -> str | None:
-        """Why reports cannot be read, or why a process that is alive cannot store its results."""
+        """Error of reading reports, or store error of a process that is alive; None without one."""
         errors = (self._latest[u].signs.store_error for u in self._latest if self.is_alive(u))
         return self.read_error or next((error for error in errors if error), None)
 
     @property
     def n_unstored(self) -> int:
-        """Findings that the processes have lost since their start."""
+        """Number of findings that the reporting processes have not stored since their start."""
         latest = self._latest.values()
         return sum({each.beat[0]: each.signs.n_unstored for each in latest if each.beat}.values())
 
     def status(self, unit: str) -> UnitStatus:
-        """Status of the samples of a unit; not connected while reports are missing."""
+        """Return the link status of a unit; it is not connected while reports are missing."""
         latest = self._latest[unit]
         if latest.beat is None:
             return NOT_REPORTED
@@ -141,23 +141,23 @@ class ReplicaLive:
         )
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Raise `NotAvailableError`: samples stay in the process that analyses them."""
+        """Raise `NotAvailableError`, since samples exist only in the process that analyses them."""
         raise NotAvailableError(f"live samples of unit {unit} are not available from this replica")
 
     def newest_block(self, unit: str) -> SampleBlock | None:  # noqa: ARG002  interface of LiveView
-        """Return None: samples stay in the process that analyses them."""
+        """Return None, since samples exist only in the process that analyses them."""
         return None
 
     def why_no_samples(self, unit: str) -> Reason | None:
-        """Why the newest samples of a unit are not current; None if they are."""
+        """Return the reason why the newest samples of a unit are not current; None if current."""
         return self._why_not_current(unit, self.data_age_s(unit))
 
     def data_age_s(self, unit: str) -> float | None:
-        """Age of the newest block of a unit; None if unknown."""
+        """Return the age of the newest block of a unit, s; None if unknown."""
         return self._age_s(unit, self._latest[unit].signs.data_age_s)
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """Return None without a result; else raise `NotAvailableError`: arrays are not reported."""
+        """Return None without a result; else raise `NotAvailableError`: reports have no arrays."""
         if bearing not in self._latest[unit].results:
             return None
         raise NotAvailableError(
@@ -166,7 +166,7 @@ class ReplicaLive:
         )
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:
-        """Return the newest result; without readings if it is not current."""
+        """Return the newest result of a bearing; its readings are missing if it is not current."""
         latest = self._latest[unit]
         result = latest.results.get(bearing)
         age_s = self._age_s(unit, latest.signs.result_ages_s.get(bearing))
@@ -195,9 +195,9 @@ class ReplicaLive:
 
 
 class ReportDelays:
-    """Estimates the delay of each report against the fastest report of its process.
+    """Estimator of the delay of each report relative to the fastest report of its process.
 
-    Two monotonic clocks differ by a constant. The delay that all reports share is not observable;
+    The offset of two monotonic clocks is constant. The common delay of all reports is unobservable;
     reading the database twice a second keeps it below half a second.
     """
 
@@ -205,14 +205,14 @@ class ReportDelays:
         self._fastest: dict[str, tuple[float, float]] = {}
 
     def delay_s(self, process: str, sent_s: float | None, received_s: float) -> float:
-        """Return the delay of a report beyond the fastest one.
+        """Return the delay of a report relative to the fastest report of the process, s.
 
         Parameters
         ----------
         sent_s
-            By the monotonic clock of the reporting process; None if not reported.
+            Send time by the monotonic clock of the reporting process, s; None if not reported.
         received_s
-            By the monotonic clock of this process.
+            Arrival time by the monotonic clock of this process, s.
         """
         if sent_s is None:
             return 0.0
@@ -224,11 +224,11 @@ class ReportDelays:
 
 
 Key = tuple[str, str]
-"""Unit and bearing."""
+"""Unit id and bearing id."""
 
 
 class ReplicaFilms:
-    """Film verdicts of the reports, and baselines of the store."""
+    """Film state of a replica: verdicts from the reports, and baselines from the store."""
 
     def __init__(self, plant: PlantFile, store: FilmStore) -> None:
         self._store = store
@@ -236,7 +236,7 @@ class ReplicaFilms:
         self._rules = {unit: rules for unit, rules in found.items() if isinstance(rules, FilmRules)}
         self.settings = plant.films
         self.unwatched = {unit: why for unit, why in found.items() if isinstance(why, str)}
-        """Why films are not monitored, by unit."""
+        """Reason why the films of a unit are not monitored, by unit."""
         self._newest: dict[Key, FilmNews] = {}
         self._baselines: dict[Key, BearingBaseline] = {}
 
@@ -245,24 +245,24 @@ class ReplicaFilms:
         return self._rules.get(unit)
 
     def place(self, unit: str, bearing: str) -> FilmPlace | None:
-        """Return a bearing with its watched estimator; None if it is not monitored."""
+        """Return a bearing and its stiffness estimator; None if its film is not monitored."""
         rules = self.rules(unit)
         if rules is None or bearing not in rules.estimators:
             return None
         return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """Return the newest verdict on a bearing."""
+        """Return the newest film news of a bearing; None before the first report of a verdict."""
         return self._newest.get((unit, bearing))
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
-        """Return the baseline of a bearing that is in force."""
+        """Return the baseline that is in force for a bearing; None without a baseline."""
         return self._baselines.get((unit, bearing))
 
     def fetch(self, unit: str, state: UnitState) -> Mapping[str, BearingBaseline]:
-        """Read the baselines that are in force by a state; blocks.
+        """Return the baselines in force in a unit state, from the store if not in memory; blocks.
 
-        Raises `StoreError` if they cannot be read.
+        Raises `StoreError` if a baseline cannot be read.
         """
         found = {}
         for bearing, in_force in state.baselines.items():
@@ -274,7 +274,7 @@ class ReplicaFilms:
         return found
 
     def take(self, unit: str, state: UnitState, baselines: Mapping[str, BearingBaseline]) -> None:
-        """Apply the state of a unit, with the baselines that `fetch` returned."""
+        """Apply a reported unit state, with the baselines that `fetch` returned for it."""
         for bearing, film in state.films.items():
             news = FilmNews(film.reading, film.findings, (INITIAL_DECISION, INITIAL_DECISION))
             self._newest[unit, bearing] = news
@@ -283,7 +283,7 @@ class ReplicaFilms:
 
 
 class ReplicaAlarms:
-    """Alarms of the reports and of the table of alarms; those of silent units are not judged."""
+    """Alarms of a replica, from reports and the alarm table; those of silent units are unjudged."""
 
     def __init__(
         self, units: Iterable[str], is_alive: Callable[[str], bool], chatter_rule: ChatterRule
@@ -298,22 +298,22 @@ class ReplicaAlarms:
 
     @property
     def revision(self) -> int:
-        """Number that changes with the state of any alarm."""
+        """Counter that increases with every change of an alarm or of the silence of a unit."""
         alive = {unit: self._is_alive(unit) for unit in self._judged}
-        if alive != self._alive:  # no report announces the end of reports
+        if alive != self._alive:  # a unit falls silent without a report
             self._alive = alive
             self._revision += 1
         return self._revision
 
     def take(self, unit: str, state: UnitState) -> None:
-        """Apply the state of a unit."""
+        """Apply the alarms of a reported unit state."""
         self._revision += 1
         self._judged[unit], self._chattering[unit] = state.judged, state.chattering
-        # a process may hold alarms of units that another process has taken over
+        # a process may still have alarms of units for which another process is now responsible
         self.take_stored(alarm for alarm in state.alarms if self._owner(alarm) == unit)
 
     def take_stored(self, alarms: Iterable[Alarm]) -> None:
-        """Apply alarms that are newer than the known ones."""
+        """Apply stored alarms that are at least as new as the alarms in memory."""
         self._revision += 1
         for alarm in alarms:
             held = self._alarms.get(alarm.identity.id)
@@ -322,7 +322,7 @@ class ReplicaAlarms:
 
     @property
     def alarms(self) -> Sequence[Alarm]:
-        """All alarms in any state."""
+        """All alarms, in any state."""
         return list(self._alarms.values())
 
     def alarm(self, id_: str) -> Alarm:
@@ -330,16 +330,16 @@ class ReplicaAlarms:
         return self._alarms[id_]
 
     def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether the monitored quantity of an alarm is known now."""
+        """Return whether the condition of an alarm is known now, by the latest report."""
         unit = self._owner(alarm)
         return self._is_alive(unit) and alarm.identity.id in self._judged.get(unit, ())
 
     def is_chattering(self, alarm: Alarm) -> bool:
-        """Return whether an alarm was raised too often recently."""
+        """Return whether an alarm is chattering, by the latest report."""
         return alarm.identity.id in self._chattering.get(self._owner(alarm), ())
 
     def owner(self, id_: str) -> str:
-        """Return the unit whose process operates an alarm. Raises `LookupError` if none exists."""
+        """Return the unit whose process changes an alarm. Raises `LookupError` if it is unknown."""
         return self._owner(self.alarm(id_))
 
     def _owner(self, alarm: Alarm) -> str:
@@ -349,5 +349,5 @@ class ReplicaAlarms:
         return unit if unit in self._units else PLANT
 
     def count(self) -> AlarmCount:
-        """Return the number of alarms on the list."""
+        """Return the numbers of alarms by state."""
         return count_of(self.alarms, self.is_judged)

@@ -1,4 +1,4 @@
-"""State of units: written to the database by analysing processes and read by replicas."""
+"""Reports on units, which analysing processes write to the database and replicas read."""
 
 import asyncio
 import os
@@ -40,12 +40,12 @@ REPORT_EVERY_S = 1.0
 
 @dataclass(frozen=True)
 class UnitNow:
-    """Present state of a unit.
+    """Present signs and state of a unit, as content of a report.
 
     Parameters
     ----------
     state
-        None if unchanged since it was last written.
+        State to write; None if it is unchanged since the last write.
     """
 
     unit: str
@@ -55,13 +55,13 @@ class UnitNow:
 
 
 class Reporter:
-    """Reads the units on the event loop and writes their reports in a thread.
+    """Writer of reports: reads the unit states on the event loop, writes them in a thread.
 
     Parameters
     ----------
     held
-        Returns the units that this process is responsible for; with `PLANT` if it also reports
-        alarms of no unit, and `SHARED` if it does the shared work.
+        Returns the units that this process is responsible for; also `PLANT` if it reports the
+        alarms without a unit, and `SHARED` if it does the shared work.
     """
 
     def __init__(
@@ -83,13 +83,13 @@ class Reporter:
         self._trouble = TroubleLog("units are not reported on", "units are reported on again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Report until cancelled."""
+        """Write reports periodically, until cancelled."""
         await periodic(self.report, REPORT_EVERY_S, self._clock, pulse)
 
     async def report(self) -> None:
-        """Report once; if that fails, readers treat the units as silent."""
+        """Write one report per unit; while writing fails, readers treat the units as silent."""
         held = list(self._held())
-        for unit in self._written.keys() - set(held):  # others may write it meanwhile
+        for unit in self._written.keys() - set(held):  # another process may now write it
             self._written[unit] = (self._written[unit][0], None)
         found = [self._unit_now(unit) for unit in held]
         if not found:
@@ -101,7 +101,7 @@ class Reporter:
             )
         except StoreError as error:
             self._trouble.note(str(error))
-            # the report may have been stored: its revision is not used for another state
+            # the report may have been stored: do not reuse its revision for another state
             self._written |= {s.unit: (s.revision, None) for s in found if s.state is not None}
             return
         self._trouble.note(None)
@@ -149,17 +149,17 @@ log = structlog.get_logger()
 READ_EVERY_S = 0.5
 
 Revision = tuple[str, int]
-"""Process, and revision of the state that it wrote."""
+"""Id of a process, and revision of the unit state that it wrote."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """Report on one unit as read from the database.
+    """Decoded report on one unit, as read from the database.
 
     Parameters
     ----------
     state
-        State with its revision and the baselines in force; None if unchanged.
+        Revision, state and baselines in force; None if the revision was read before.
     """
 
     beat: UnitBeat
@@ -168,7 +168,7 @@ class Report:
 
 
 class Feed:
-    """Applies the reports of the database to the live view, alarms and films of a replica."""
+    """Reader of the reports in the database; updates live view, alarms and films of a replica."""
 
     def __init__(
         self,
@@ -187,17 +187,17 @@ class Feed:
     async def start(self) -> None:
         """Read the stored alarms and the reports before the first request.
 
-        Raises `StoreError` if they cannot be read.
+        Raises `StoreError` if the database cannot be read.
         """
         self._alarms.take_stored(await asyncio.to_thread(self._store.alarms))
         self._take(await asyncio.to_thread(self._read))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Read until cancelled."""
+        """Read the reports periodically, until cancelled."""
         await periodic(self.look, READ_EVERY_S, self._clock, pulse)
 
     async def look(self) -> None:
-        """Read once; if that fails, the values keep aging."""
+        """Read the reports once; if reading fails, the values remain and their age increases."""
         try:
             reports = await asyncio.to_thread(self._read)
         except StoreError as error:
@@ -216,7 +216,7 @@ class Feed:
         return [report for report in found if report is not None]
 
     def _report(self, beat: UnitBeat, document: tuple[str, int, bytes] | None) -> Report | None:
-        """Decode a report; None if it is unreadable, which is logged once."""
+        """Decode a report; log an unreadable report once and return None."""
         try:
             signs = read_signs(beat.signs)
             if document is None:
@@ -243,16 +243,16 @@ class Feed:
 
 
 def process_name() -> str:
-    """Return a unique name of this process: host, process id and a random word."""
+    """Return a unique name of this process: host name, process id and random hex digits."""
     return f"{socket.gethostname()}:{os.getpid()}:{uuid4().hex[:12]}"
 
 
 @dataclass
 class UnitDescription:
-    """Description of a unit in a process without a monitor; references of the shaft change it."""
+    """Description of a unit in a process without a monitor; new gap references replace it."""
 
     unit: Unit
 
     def replace_description(self, unit: Unit) -> None:
-        """Set a new description of the same unit."""
+        """Replace the description by a new description of the same unit."""
         self.unit = unit

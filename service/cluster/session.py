@@ -1,4 +1,4 @@
-"""Connections to JetStream, and creation of the stream."""
+"""Sessions with JetStream servers, and creation of the stream of a plant."""
 
 import asyncio
 import re
@@ -29,7 +29,7 @@ from service.settings.units import UnitSettings
 
 
 class StreamError(Exception):
-    """The servers do not answer or return an error; retrying later may succeed."""
+    """The servers do not answer or return an error; a later attempt may succeed."""
 
 
 class StreamMisfitError(StreamError):
@@ -37,12 +37,12 @@ class StreamMisfitError(StreamError):
 
 
 class StreamAnewError(Exception):
-    """The stream was replaced; positions on it are no longer valid."""
+    """The stream was replaced; stored positions in the old stream are no longer valid."""
 
 
 RETRY_S = 1.0
 MISFIT_RETRY_S = 5.0
-"""Pauses after a lost connection, and after a mismatch."""
+"""Delay of the next attempt after a `StreamMisfitError`, s; `RETRY_S` after other errors."""
 
 NOT_REACHED = "the servers have not been reached yet"
 
@@ -50,12 +50,12 @@ ROOT = "padwatch"
 
 
 def plant_mark(plant: PlantFile) -> bytes:
-    """Return the fingerprint of a plant."""
+    """Return the fingerprint of a plant's name, which identifies its messages and stream."""
     return fingerprint(ROOT, plant.plant.name)
 
 
 def stream_name(plant: PlantFile) -> str:
-    """Return the name of the plant's stream, readable and unique."""
+    """Return the stream name: as configured, or made of the plant's name and fingerprint."""
     if plant.stream is not None and plant.stream.name is not None:
         return plant.stream.name
     legible = re.sub(r"[^A-Za-z0-9]+", "-", plant.plant.name).strip("-")[:32]
@@ -63,38 +63,38 @@ def stream_name(plant: PlantFile) -> str:
 
 
 def subjects(plant: PlantFile) -> str:
-    """Return the subjects of all units of a plant."""
+    """Return the wildcard subject of the stream, which matches the subjects of all units."""
     return f"{ROOT}.{stream_name(plant)}.*"
 
 
 def subject(plant: PlantFile, unit: str) -> str:
-    """Return the subject of a unit, without dots in its id, which separate tokens."""
+    """Return the subject of a unit; dots in its id are replaced, since they separate tokens."""
     return f"{ROOT}.{stream_name(plant)}.{unit.replace('.', '=')}"
 
 
 def consumer_name(unit: str) -> str:
-    """Return the name of a unit's consumer on the servers."""
+    """Return the name of the durable consumer of a unit on the servers."""
     return f"analyse-{unit.replace('.', '=')}"
 
 
 def message_id(identity: UnitIdentity, block: SampleBlock) -> str:
-    """Return a unique id of a block, the same for every attempt.
+    """Return the unique message id of a block, the same for every publish attempt.
 
-    It contains the time because a device may restart its indices.
+    The id contains the start time because a device may restart its sample index.
     """
     place = f"{block.epoch}.{block.first_index}.{block.start_ns}"
     return f"{identity.plant.hex()[:8]}.{block.unit}.{place}"
 
 
 def identity_of(plant: PlantFile, unit: UnitSettings) -> UnitIdentity:
-    """Return the identity that the messages of a unit must carry."""
+    """Return the identity that all messages of a unit must carry: plant, rate and channels."""
     channels = [(channel.id, str(channel.measurand)) for channel in unit.channel]
     make = fingerprint(unit.id, unit.sampling_hz, unit.source.kind, channels)
     return UnitIdentity(unit.id, plant_mark(plant), make)
 
 
 OLDEST_SERVER = (2, 10)
-"""First version with all the features of streams and consumers that padwatch uses."""
+"""Minimum version of the NATS server that has all stream and consumer features in use."""
 
 CONNECT_S = 3
 PING_S = 5
@@ -102,12 +102,12 @@ PING_S = 5
 
 @asynccontextmanager
 async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStreamContext]:
-    """Connect to the servers; the body is cancelled when the connection is lost.
+    """Connect to the NATS servers; cancel the body of the context if the connection is lost.
 
     Raises
     ------
     StreamError
-        If the connection fails or is lost, or if the body raises an error of the library.
+        If the connection fails or is lost, or if the body raises an error of the NATS library.
     """
     lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
     client = await _connected(settings, name, lost)
@@ -116,7 +116,7 @@ async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStrea
             watching = tasks.create_task(_ended(lost, settings), name="stream watch")
             yield client.jetstream(timeout=settings.ack_timeout_s)
             watching.cancel()
-    except* (StreamError, Error, OSError) as group:  # two clauses would raise a group again
+    except* (StreamError, Error, OSError) as group:  # with two clauses, a group would be raised
         raise _most_specific(group, settings) from None
     finally:
         await _closed(client)
@@ -169,7 +169,7 @@ async def _ended(lost: asyncio.Future[None], settings: StreamSettings) -> None:
 
 
 async def _closed(client: Client) -> None:
-    """Close without waiting for a server that does not answer."""
+    """Close a client within `CONNECT_S`, even if the server does not answer."""
     with suppress(Error, OSError, TimeoutError):
         await asyncio.wait_for(client.close(), CONNECT_S)
     # the library leaves the socket open if the server disconnects while data is being sent
@@ -205,7 +205,7 @@ def _renamed(error: BaseException, settings: StreamSettings) -> StreamError:
 def _most_specific(
     group: BaseExceptionGroup[BaseException], settings: StreamSettings
 ) -> StreamError:
-    """Return the most informative of several errors; the loss of a connection causes many."""
+    """Return the most specific error of a group; a lost connection causes several errors."""
     found = sorted(_leaves(group), key=lambda error: not isinstance(error, StreamMisfitError))
     own = [error for error in found if isinstance(error, StreamError)]
     return own[0] if own else _renamed(found[0], settings)
@@ -244,14 +244,14 @@ BYTES_PER_GB = 1e9
 S_PER_H = 3600.0
 
 PLANT, FORMAT = "padwatch-plant", "padwatch-format"
-"""Metadata of the stream that identify its plant and format."""
+"""Metadata keys of the stream for the fingerprint of its plant and for its format."""
 
 
 def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
-    """Return the configuration of the stream.
+    """Return the stream configuration that the plant file requires.
 
-    A full stream refuses new blocks, which then wait at the devices with an alarm. The other
-    policy would drop old blocks before they are analysed.
+    A full stream refuses new blocks, which then wait at the devices with an alarm. The discard
+    policy "old" would drop old blocks before they are analysed.
     """
     return StreamConfig(
         name=stream_name(plant),
@@ -270,7 +270,7 @@ def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
 
 
 async def ensure(stream: JetStreamContext, plant: PlantFile, settings: StreamSettings) -> None:
-    """Create the stream, or apply the limits of the plant file to it.
+    """Create the stream of a plant, or update the limits of an existing stream.
 
     Raises `StreamMisfitError` if JetStream is off, or the stream belongs to another plant or cannot
     be configured.
@@ -283,9 +283,9 @@ async def ensure(stream: JetStreamContext, plant: PlantFile, settings: StreamSet
 
 
 async def require(stream: JetStreamContext, plant: PlantFile) -> str:
-    """Return the name of the stream with its time of creation.
+    """Check that the stream of a plant exists; return its name with its creation time.
 
-    Raises `StreamError` if it does not exist yet. Raises `StreamMisfitError` if JetStream is off,
+    Raises `StreamError` if the stream does not exist, and `StreamMisfitError` if JetStream is off
     or the stream belongs to another plant.
     """
     name, found = stream_name(plant), await _info(stream, plant)
@@ -305,7 +305,7 @@ NO_ANSWER = (NoStreamResponseError, ServiceUnavailableError, nats.errors.NoRespo
 
 
 async def _info(stream: JetStreamContext, plant: PlantFile) -> StreamInfo | None:
-    """Return the plant's stream; None if it does not exist."""
+    """Return information on the stream of a plant; None if the stream does not exist."""
     name = stream_name(plant)
     try:
         found = await stream.stream_info(name)

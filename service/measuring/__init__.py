@@ -1,1 +1,1 @@
-"""Acquisition, analysis, alarms and storage of results; no HTTP."""
+"""Acquisition, analysis, alarms and storage of results; the HTTP interface is elsewhere."""
