@@ -1,1 +1,1 @@
-"""Several processes on one plant: JetStream, ownership of units, state through the database."""
+"""Distribution of a plant over several processes: JetStream, unit locks and reported state."""

@@ -1,4 +1,4 @@
-"""Consumer of blocks: passes them to the analysis and acknowledges them once they are stored."""
+"""Consumer of the stream: analyses sample blocks; acknowledges them once results are stored."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
@@ -39,20 +39,20 @@ from service.settings.processes import StreamSettings
 FETCH_S = 5.0
 REST_S = 1.0
 BATCH = 32
-"""Maximum number of messages of a unit that are acknowledged together."""
+"""Maximum number of messages of a unit that are stored and acknowledged together."""
 
 MAX_UNACKNOWLEDGED = 256
 ACK_WAIT_S = 60.0
 
 Begin = Callable[[str, int], Awaitable[Mapping[str, UnitProgress]]]
-"""Returns the progress of all units on a stream, given its name with its time of creation and its
-newest message."""
+"""Function that returns the progress of each unit on a stream. Arguments: identifier of the stream
+(name and time of creation), and sequence number of its newest message."""
 
 
 class Consumer:
-    """Passes the messages of the stream to the units.
+    """Consumer that fetches the messages of the stream and passes them to the units.
 
-    The loss of a connection does not interrupt the processing of fetched messages.
+    Fetched messages are processed even while the connection is lost.
     """
 
     def __init__(
@@ -79,16 +79,16 @@ class Consumer:
 
     @property
     def trouble(self) -> str | None:
-        """Why blocks are not being read; None if they are."""
+        """Reason why blocks are not being read; None if blocks are being read."""
         return self._state.trouble
 
     @property
     def waiting(self) -> frozenset[str]:
-        """Units with fetched messages that are not processed yet, as while the store fails."""
+        """Units with fetched but unprocessed messages, for example while the store fails."""
         return frozenset(unit for unit, queue in self._queues.items() if not queue.empty())
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Consume until cancelled; a lost connection is renewed."""
+        """Consume messages until cancelled; reconnect after the connection is lost."""
         async with asyncio.TaskGroup() as tasks:
             while True:
                 pulse.rest()
@@ -102,7 +102,10 @@ class Consumer:
                     await self._clock.sleep(MISFIT_RETRY_S if is_misfit else RETRY_S)
 
     async def _find(self, stream: JetStreamContext, tasks: asyncio.TaskGroup) -> None:
-        """Identify the stream and the position at which each unit resumes."""
+        """Identify the stream, and on first use the position at which each unit resumes.
+
+        Raises `StreamAnewError` if the stream was replaced while it was read.
+        """
         found = await require(stream, self._plant)
         state = (await stream.stream_info(stream_name(self._plant))).state
         newest = max(self._fetched.values(), default=0)
@@ -132,7 +135,7 @@ class Consumer:
     async def _fetch_unit(self, stream: JetStreamContext, unit: str) -> None:
         name, durable = stream_name(self._plant), consumer_name(unit)
         with suppress(NotFoundError):
-            await stream.delete_consumer(name, durable)  # another reader of it ends
+            await stream.delete_consumer(name, durable)  # ends the reading of another process
         await stream.add_consumer(
             name,
             ConsumerConfig(
@@ -157,7 +160,7 @@ class Consumer:
         self.n_pending[unit] = message.metadata.num_pending
         if (
             sequence <= self._fetched[unit]
-        ):  # redelivered: waits here, or its acknowledgement was lost
+        ):  # redelivered: still queued, or its acknowledgement was lost
             if sequence <= self._settled.get(unit, 0):
                 with suppress(Error):
                     await message.ack()
@@ -166,7 +169,7 @@ class Consumer:
         self._fetched[unit] = sequence
 
     async def _take_all(self, unit: str) -> None:
-        """Process the messages of a unit, independently of the connection."""
+        """Process the queued messages of a unit, independently of the connection."""
         queue, progress = self._queues[unit], self.units[unit]
         while True:
             batch = [await queue.get()]
@@ -175,7 +178,9 @@ class Consumer:
             refused = [m for m in batch if not await progress.take(_sequence(m), m.data)]
             await self._stored(progress)
             for message in batch:
-                with suppress(Error):  # stored; without acknowledgement the message is redelivered
+                with suppress(
+                    Error
+                ):  # results are stored: an unacknowledged message is redelivered
                     await (message.term() if message in refused else message.ack())
             self._settled[unit] = _sequence(batch[-1])
 
@@ -189,7 +194,10 @@ class Consumer:
 
 
 async def _fetched(puller: JetStreamContext.PullSubscription) -> Iterable[Msg]:
-    """Wait for the first message and return it with all others that are available."""
+    """Wait for a message and return all available messages, at most `BATCH` + 1.
+
+    Returns an empty list if no message arrives within `FETCH_S`.
+    """
     try:
         messages = await puller.fetch(1, FETCH_S)
         waiting = messages[-1].metadata.num_pending
@@ -209,7 +217,7 @@ UNIT = ("unit",)
 
 
 def consumer_metrics(consumer: Consumer) -> Iterator[Metric]:
-    """Yield the backlog of each unit, and counts of refused and redelivered messages."""
+    """Yield the backlog of each unit, and the numbers of refused and redelivered messages."""
     units = consumer.units.items()
     connected = consumer.trouble is None
     yield one("stream_connected", "1 while blocks are read from the stream.", connected)

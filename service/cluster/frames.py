@@ -1,4 +1,4 @@
-"""Encoding of blocks and news of links as messages, and decoding without loss."""
+"""Lossless encoding and decoding of sample blocks and link states as messages."""
 
 import hashlib
 import itertools
@@ -23,7 +23,7 @@ from service.measuring.acquirer import LinkNews
 
 
 class WireError(ValueError):
-    """A message cannot be used; decoding it again fails in the same way."""
+    """A message is invalid; decoding it again raises the same error. ``kind`` labels the metric."""
 
     def __init__(self, kind: str, message: str) -> None:
         super().__init__(message)
@@ -31,10 +31,10 @@ class WireError(ValueError):
 
 
 def require_possible(block: SampleBlock) -> None:
-    """Refuse a block that no adapter produces, before it is analysed.
+    """Check that a block could have been produced by an adapter.
 
-    Raises `WireError` if a block has no samples, a calibration or slow value that is not finite, or
-    a negative number of rejected samples.
+    Raises `WireError` if the block has no samples, a calibration or slow value that is not finite,
+    or a negative number of rejected samples.
     """
     if not block.n_samples:
         raise WireError("impossible", "a block without samples")
@@ -51,14 +51,14 @@ FINGERPRINT_BYTES = 16
 
 @dataclass(frozen=True)
 class UnitIdentity:
-    """Identity of a unit, which every message of the unit carries.
+    """Identity of a unit, part of every message of the unit.
 
     Parameters
     ----------
     plant
-        Fingerprint of the name of the plant.
+        Hash of the name of the plant.
     make
-        Fingerprint of rate and channels, without which samples would be misinterpreted.
+        Hash of source kind, rate and channels; it detects a message of another configuration.
     """
 
     unit: str
@@ -67,7 +67,7 @@ class UnitIdentity:
 
 
 def fingerprint(*words: object) -> bytes:
-    """Return a short hash of some JSON values."""
+    """Return a hash of `FINGERPRINT_BYTES` bytes over a sequence of JSON values."""
     text = json.dumps(words, ensure_ascii=True, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).digest()[:FINGERPRINT_BYTES]
 
@@ -76,7 +76,7 @@ MAGIC = b"PWSM"
 
 VERSION = 2
 READABLE = (2,)
-"""A reader supports its own version and the previous one, as it is upgraded before the writers."""
+"""Format versions that a reader supports: current and previous, as readers are upgraded first."""
 
 MAX_HEAD_BYTES = 1 << 18
 MAX_SAMPLE_BYTES = 1 << 26
@@ -86,7 +86,7 @@ _CRC = struct.Struct("<I")
 
 
 class Kind(IntEnum):
-    """Kind of a message."""
+    """Kind of a message: sample block or link state."""
 
     BLOCK = 1
     LINK = 2
@@ -94,7 +94,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Frame:
-    """Parts of a message; the head is not decoded."""
+    """Message split into kind, undecoded head and sample bytes."""
 
     kind: Kind
     head: bytes
@@ -102,7 +102,10 @@ class Frame:
 
 
 def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b"") -> bytes:
-    """Assemble a message. Raises `ValueError` if a part exceeds the limit of readers."""
+    """Return a message with header and checksum.
+
+    Raises `ValueError` if head or samples exceed the size limits.
+    """
     if len(head) > MAX_HEAD_BYTES or len(samples) > MAX_SAMPLE_BYTES:
         raise ValueError(
             f"a message holds at most {MAX_HEAD_BYTES} bytes of head and {MAX_SAMPLE_BYTES} of"
@@ -116,10 +119,10 @@ def framed(kind: Kind, identity: UnitIdentity, head: bytes, samples: bytes = b""
 
 
 def unframed(message: bytes, identity: UnitIdentity) -> Frame:
-    """Split a message into its parts.
+    """Check header and checksum of a message, and return its kind, head and samples.
 
-    Raises `WireError` if the bytes are not a message, or are damaged, or have another version,
-    plant or configuration. No other exception is raised for any bytes.
+    Raises `WireError` if the bytes are not a message, are damaged, or have a different version,
+    plant or configuration. No input raises any other exception.
     """
     if len(message) < _START.size + _CRC.size or message[:4] != MAGIC:
         raise WireError("not_a_message", f"{len(message)} bytes that are not a message of padwatch")
@@ -155,14 +158,14 @@ def _other_version(version: int) -> str:
 
 
 SAMPLE: Mapping[str, np.dtype[Any]] = {"int16": np.dtype("<i2"), "float32": np.dtype("<f4")}
-"""Counts of a converter, or engineering units, as they travel."""
+"""Sample types of a message: counts of a converter (int16) or engineering units (float32)."""
 
 Epoch = Annotated[int, Field(ge=0, lt=2**63)]
 Index = Annotated[int, Field(ge=0, lt=2**53)]
-"""Exact as a double, which recordings use."""
+"""Sample index below 2^53, exact as a double, which recordings use."""
 
 Ns = Annotated[int, Field(ge=-(2**62), lt=2**62)]
-"""From 1823 to 2116, so that sums and differences do not overflow in a database."""
+"""Nanoseconds since 1970, from 1823 to 2116; sums and differences do not overflow 64 bits."""
 
 T = TypeVar("T")
 
@@ -170,7 +173,7 @@ STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="constants")
 
 
 class Cell(NamedTuple):
-    """Values beside the samples from one sample on; ``ok`` has a bit for each channel."""
+    """Time stamp, OK bits (one per channel) and slow values that apply from sample ``start`` on."""
 
     start: Index
     start_ns: Ns
@@ -180,7 +183,7 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True)
 class BlockHead:
-    """Fields of a block without its samples."""
+    """Head of a block message: all fields of a block except its samples."""
 
     __pydantic_config__ = STRICT
 
@@ -199,7 +202,7 @@ class BlockHead:
 
 @dataclass(frozen=True)
 class LinkHead:
-    """News of a link."""
+    """Head of a link message: state of the link of a unit."""
 
     __pydantic_config__ = STRICT
 
@@ -213,13 +216,13 @@ _BLOCK, _LINK = TypeAdapter(BlockHead), TypeAdapter(LinkHead)
 
 @dataclass(frozen=True)
 class Taken:
-    """A block with its time of acquisition.
+    """Decoded sample block with its acquisition time.
 
     Parameters
     ----------
     taken_ns
-        Time of its last sample by the clock of the acquiring host; the delay of the analysis is
-        measured from it.
+        Time of the last sample by the clock of the acquiring host, from which the delay of the
+        analysis is measured.
     """
 
     block: SampleBlock
@@ -227,7 +230,7 @@ class Taken:
 
 
 def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> bytes:
-    """Encode a block. Raises `ValueError` if it exceeds the limits of readers."""
+    """Return a block as a message. Raises `ValueError` if the block exceeds the size limits."""
     side, type_ = block.side, block.counts.dtype.name
     columns = (side.starts.tolist(), side.start_ns.tolist(), side.ok.T.tolist())
     head = BlockHead(
@@ -251,18 +254,18 @@ def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> 
 
 
 def encoded_link(news: LinkNews, identity: UnitIdentity) -> bytes:
-    """Encode news of a link."""
+    """Return a link state as a message."""
     head = LinkHead(news.unit, news.state, None if news.reason is None else news.reason[:1000])
     return framed(Kind.LINK, identity, _LINK.dump_json(head))
 
 
 def decoded(message: bytes, identity: UnitIdentity) -> Taken | LinkNews:
-    """Decode a message.
+    """Return the sample block or link state of a message.
 
     Raises
     ------
     WireError
-        If the message cannot be used. No other exception is raised for any bytes.
+        If the message is invalid. No input raises any other exception.
     """
     frame = unframed(message, identity)
     if frame.kind is Kind.LINK:
@@ -298,14 +301,14 @@ def _block(frame: Frame, identity: UnitIdentity) -> Taken:
 
 @lru_cache(maxsize=1024)
 def _shared(calibration: UnitCalibration) -> UnitCalibration:
-    """The same object for equal calibrations, as all blocks of a source have."""
+    """Return the same object for equal calibrations; all blocks of a source share a calibration."""
     return calibration
 
 
 def _side_values(head: BlockHead) -> SideValues:
     n_channels, n_slow = len(head.calibration.channels), len(head.calibration.slow)
     starts = [cell.start for cell in head.cells]
-    edges = [*starts, max(head.n_samples, 1)]  # an empty block has one cell, without a sample
+    edges = [*starts, max(head.n_samples, 1)]  # an empty block has one empty cell
     if (
         starts[:1] != [0]
         or any(start >= stop for start, stop in itertools.pairwise(edges))

@@ -1,4 +1,4 @@
-"""Ownership: exclusive locks of units and of the shared work, and partitions of a plant."""
+"""Ownership: exclusive locks for units and for shared work, and partitions of a plant."""
 
 import asyncio
 import re
@@ -22,11 +22,11 @@ EVERY_S = 1.0
 
 
 class HoldLostError(StoreError):
-    """The connection to the database was lost, and another process may analyse the units."""
+    """The database connection and the unit locks were lost; another process may own the units."""
 
 
 class Holds:
-    """Exclusive locks of some units in the database, all or none."""
+    """Exclusive database locks for a set of units, acquired together."""
 
     def __init__(self, store: Store, units: Iterable[str], clock: Clock) -> None:
         self._store, self._clock = store, clock
@@ -36,7 +36,7 @@ class Holds:
         self.waits_for: str | None = "not started"
 
     async def take(self) -> None:
-        """Wait until all locks are free and take them; a standby waits here."""
+        """Acquire all locks; wait while another process holds one, as in a standby process."""
         while True:
             refusal = await asyncio.to_thread(self._try)
             if refusal is None:
@@ -60,7 +60,7 @@ class Holds:
         self._stack.close()
 
     def _try(self) -> str | None:
-        """Take all locks; return the reason if one is held by another process."""
+        """Try to acquire all locks; return the reason of a failure, or None."""
         with ExitStack() as stack:
             try:
                 self._holds = [stack.enter_context(self._store.hold(name)) for name in self._names]
@@ -78,9 +78,9 @@ LOOK_EVERY_S = 1.0
 
 
 class Leadership:
-    """Runs loops while it holds a lock in the database, so that one process of the plant does.
+    """Leader election: the process that holds a database lock runs the loops of the shared work.
 
-    Two processes may run the loops for a short time when the lock changes hands; the work of the
+    Two processes may run the loops for a short time when the lock is transferred; the work of the
     loops is idempotent.
     """
 
@@ -95,7 +95,7 @@ class Leadership:
         self.is_leading = False
 
     async def run(self, pulse: Pulse) -> None:
-        """Lead whenever the lock is free, until cancelled."""
+        """Try to acquire the lock and run the loops while it is held, until cancelled."""
         while True:
             pulse.beat(TRY_EVERY_S)
             with ExitStack() as held:
@@ -132,14 +132,14 @@ FORM = re.compile(r"([0-9]{1,4})/([0-9]{1,4})")
 
 @dataclass(frozen=True)
 class Partition:
-    """Part ``number`` of ``n_parts`` of a plant, counted from 1."""
+    """Partition ``number`` of ``n_parts`` partitions of a plant, counted from 1."""
 
     number: int = 1
     n_parts: int = 1
 
     @classmethod
     def of(cls, text: str) -> "Partition":
-        """Parse ``i/n``. Raises `ValueError` if the text is malformed."""
+        """Parse a partition ``i/n``. Raises `ValueError` if the text is malformed."""
         found = FORM.fullmatch(text)
         part = cls(int(found[1]), int(found[2])) if found else cls(0, 0)
         if not 1 <= part.number <= part.n_parts:
@@ -149,13 +149,13 @@ class Partition:
         return part
 
     def units(self, units: Sequence[str]) -> list[str]:
-        """Return the units of this part: every n-th of the sorted ids."""
+        """Return the ids of the units in this partition: every n-th of the sorted ids."""
         return sorted(units)[self.number - 1 :: self.n_parts]
 
     def part_of(self, plant: PlantFile) -> PlantFile:
-        """Return the plant with the units of this part only.
+        """Return the plant file with only the units of this partition.
 
-        Raises `ValueError` if the part has no units.
+        Raises `ValueError` if the partition has no units.
         """
         mine = set(self.units([unit.id for unit in plant.unit]))
         if not mine:
@@ -166,7 +166,7 @@ class Partition:
         return plant.model_copy(update={"unit": tuple(u for u in plant.unit if u.id in mine)})
 
     def share_of(self, plant: PlantFile) -> PlantPart:
-        """Return the part of a whole plant that this process is responsible for."""
+        """Return the units that this process and other processes are responsible for."""
         every = [unit.id for unit in plant.unit]
         own = frozenset(self.units(every))
         return PlantPart(own, frozenset(every) - own, leads=self.number == 1)

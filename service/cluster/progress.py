@@ -1,4 +1,4 @@
-"""Progress of a unit on the stream: resumption after a restart, and its position."""
+"""Progress of a unit on the stream: its position, and resumption after a restart."""
 
 from collections import Counter, deque
 from collections.abc import Iterable
@@ -23,12 +23,12 @@ _MEMORY = TypeAdapter(UnitMemory)
 
 
 def written(memory: UnitMemory) -> bytes:
-    """Serialize a memory without loss."""
+    """Return the memory of a unit as JSON, without loss."""
     return _MEMORY.dump_json(memory)
 
 
 def read(document: bytes) -> UnitMemory | None:
-    """Parse a memory; None if it has another version."""
+    """Return the memory of a unit from JSON; None if its version is different or it is invalid."""
     try:
         memory = _MEMORY.validate_json(document)
     except ValidationError:
@@ -37,7 +37,7 @@ def read(document: bytes) -> UnitMemory | None:
 
 
 def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
-    """Return the stored memories that can be read, by unit."""
+    """Return the readable stored memories, by unit."""
     found = {position.unit: read(position.memory) for position in stored}
     for unit, memory in found.items():
         if memory is None:
@@ -48,7 +48,10 @@ def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
 
 
 def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPosition | None:
-    """Return a stored position if it is valid on this stream, otherwise None."""
+    """Return a stored position if it is valid on this stream, otherwise None.
+
+    ``newest`` is the sequence number of the newest message on the stream.
+    """
     if stored is None:
         return None
     if stored.stream != stream:
@@ -68,19 +71,19 @@ class _Seen:
 
 
 class Window:
-    """Newest messages of a unit that the monitor still needs after a restart."""
+    """Window of the newest messages of a unit that the monitor requires after a restart."""
 
     def __init__(self) -> None:
         self._seen: deque[_Seen] = deque()
 
     def note(self, sequence: int, block: SampleBlock, state: MonitorState) -> None:
-        """Add a processed block, and remove messages that are no longer needed."""
+        """Add a processed block, and remove messages that are no longer required."""
         self._seen.append(_Seen(sequence, state.epoch, block.stop_index))
         while len(self._seen) > 1 and not self._is_needed(self._seen[0], state):
             self._seen.popleft()
 
     def first(self, otherwise: int) -> int:
-        """Return the first message that is needed."""
+        """Return the sequence number of the first required message; ``otherwise`` if none."""
         return self._seen[0].sequence if self._seen else otherwise
 
     @staticmethod
@@ -91,26 +94,26 @@ class Window:
 log = structlog.get_logger()
 
 MAY_ARRIVE = (LinkState.CONNECTING, LinkState.CONNECTED)
-"""States in which samples may arrive."""
+"""Link states in which samples may arrive."""
 
 
 class UnitProgress:
-    """Processes the messages of one unit in order, each once.
+    """Processor of the messages of one unit: each message is processed once, in order.
 
-    Messages up to the stored position are replayed without results, which restores the state of the
-    monitor. Later messages are processed as if the process had never stopped.
+    Messages up to the stored position are replayed without publishing results, which restores the
+    state of the monitor. Later messages are processed as if the process had never stopped.
 
     Parameters
     ----------
     stored
-        Position of the stored results on the same stream; None without any.
+        Position of the stored results on the same stream; None if no position is stored.
     memory
-        State of the unit at that position.
+        State of the unit at the stored position.
     clock
-        Clock of this host. The delay of a block is as accurate as this clock agrees with that of
-        the acquiring host.
+        Clock of this host. The error of the delay of a block is the offset of this clock from the
+        clock of the acquiring host.
     done
-        Reach of the stored results, if their position on the stream is unknown.
+        End of the stored results, if their position on the stream is unknown.
     """
 
     def __init__(
@@ -142,13 +145,13 @@ class UnitProgress:
 
     @property
     def first_needed(self) -> int:
-        """First message that is needed at the start."""
+        """Sequence number of the first message that is required at the start."""
         return 1 if self._stored is None else self._stored.window_sequence
 
     def reaches_back(self, first_sequence: int) -> None:
-        """Log whether the stream still has the needed messages.
+        """Log an error or a warning if required messages are no longer on the stream.
 
-        Missing messages are a gap in the samples, which the monitor detects by their index.
+        Missing messages are a gap in the samples, which the monitor detects by the sample index.
         """
         stored = self._stored
         if stored is None or self._memory is None or self.sequence:
@@ -159,7 +162,7 @@ class UnitProgress:
             log.warning("the stream begins within the window of the analysis", unit=self.unit)
 
     async def take(self, sequence: int, payload: bytes) -> bool:
-        """Process a message; return False if it is refused."""
+        """Process the message with a sequence number; return False if the message is rejected."""
         if sequence <= self.sequence:
             self._arrived_s = self._clock.monotonic_s()
             self.n_repeated += 1
@@ -184,7 +187,7 @@ class UnitProgress:
         return True
 
     def _require_fit(self, message: Taken) -> None:
-        """Refuse a block that the monitor of the unit does not accept."""
+        """Raise `WireError` if the monitor of the unit cannot process a block."""
         require_possible(message.block)
         try:
             self._analyser.require(message.block)
@@ -192,18 +195,21 @@ class UnitProgress:
             raise WireError("misfit", str(error)) from None
 
     def position(self) -> StreamPosition:
-        """Return the position of the unit with its present memory."""
+        """Return the position of the unit on the stream, with its current memory."""
         memory = written(self._analyser.memory(self.unit))
         first = self._window.first(self.sequence + 1)
         return StreamPosition(self.unit, self._stream, self.sequence, first, memory)
 
     @property
     def is_replaying(self) -> bool:
-        """Whether the last message was before the stored position."""
+        """Whether the last processed message is at or before the stored position."""
         return self._stored is not None and self.sequence <= self._stored.sequence
 
     def fall_silent(self, after_s: float, trouble: str | None = None) -> None:
-        """Mark the unit as not connected if no usable message arrived for a time."""
+        """Set the unit to not connected if no valid message has arrived for ``after_s``.
+
+        ``trouble`` is the reason, if known.
+        """
         if self._clock.monotonic_s() - self._arrived_s <= after_s:
             return
         if self._live.status(self.unit).state in MAY_ARRIVE or self._analyser.is_connected(
@@ -225,9 +231,10 @@ class UnitProgress:
         self._window.note(sequence, message.block, self._analyser.state(self.unit))
 
     def _is_done(self, message: Taken | LinkNews) -> bool:
-        """Return whether the results of a block are stored; False from the first new block on.
+        """Return whether the results of a block are already stored.
 
-        A second analysis on another grid of segments would store results twice.
+        After the first new block the result is always False. A second analysis, with differently
+        placed segments, would store results twice.
         """
         if self._done is None or isinstance(message, LinkNews):
             return False
@@ -243,8 +250,8 @@ class UnitProgress:
     def _rewind(self, block: SampleBlock) -> None:
         """Restore the stored state before the first replayed block.
 
-        Only a block shows that samples of the window are left: news of links may stay on the stream
-        longer than blocks, and blocks of another configuration are refused.
+        Only a valid block shows that samples of the window are still on the stream: link states
+        may remain longer than blocks, and blocks of a different configuration are rejected.
         """
         memory = self._memory
         if memory is None or self._is_rewound:
@@ -254,7 +261,7 @@ class UnitProgress:
             self._is_rewound = True
 
     def _commit(self) -> None:
-        """End the replay; without replayed blocks the unit starts anew."""
+        """End the replay; without replayed blocks the monitor starts from its initial state."""
         if self._memory is not None and self._is_rewound:
             self._analyser.settle(self.unit, self._memory)
         self._stored = self._memory = None
@@ -264,7 +271,7 @@ class UnitProgress:
             self._take_news(message)
             self.sequence = sequence
             return
-        # neither the replay nor a stored alarm has reported the link
+        # neither the replay nor a stored alarm reports the link state
         is_known = self._analyser.is_connected(self.unit)
         if not is_known or self._live.status(self.unit).state is not LinkState.CONNECTED:
             self._take_news(LinkNews(self.unit, LinkState.CONNECTED))
@@ -275,7 +282,10 @@ class UnitProgress:
             self._recorder.put(replace(findings, position=self.position()))
 
     def _sampled_s(self, message: Taken) -> float:
-        """Return the time of sampling by the monotonic clock, if the clocks of both hosts agree."""
+        """Return the sampling time of a block, s, by the monotonic clock of this host.
+
+        The clocks of both hosts are assumed to agree.
+        """
         self.behind_s = max(0.0, s_from_ns(self._clock.now_ns() - message.taken_ns))
         return self._clock.monotonic_s() - self.behind_s
 
@@ -289,7 +299,7 @@ class UnitProgress:
         self._why_refused = str(error)
         if (
             self._stored is None or sequence > self._stored.sequence
-        ):  # otherwise it was reported then
+        ):  # already reported before the restart
             self._analyser.refuse(self.unit, str(error))
         if not self.refused[error.kind]:
             log.error("a message is refused", unit=self.unit, reason=str(error))

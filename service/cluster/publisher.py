@@ -1,4 +1,4 @@
-"""Publisher of blocks: keeps each block until the servers have confirmed it."""
+"""Publisher of sample blocks to JetStream; a block is queued until the servers acknowledge it."""
 
 import asyncio
 from collections import deque
@@ -40,12 +40,12 @@ from service.settings.processes import StreamSettings
 
 @dataclass(frozen=True)
 class Outgoing:
-    """A message with an id that is the same for every attempt.
+    """Outgoing message, with an id that is the same for every attempt.
 
     Parameters
     ----------
     is_news
-        Whether it is about a link; of consecutive ones only the last is sent.
+        Whether the message reports a link state; of consecutive link states only the last is sent.
     """
 
     id: str
@@ -54,10 +54,10 @@ class Outgoing:
 
 
 class Outbound:
-    """Queue of messages to publish.
+    """Queue of outgoing messages, by unit.
 
-    `put` waits while ``capacity`` bytes are queued. The ring of the device buffers samples
-    meanwhile, and if it overruns, the index of the next block shows the exact gap.
+    `put` waits while ``capacity`` bytes are queued. Meanwhile the ring of the device buffers
+    samples; if the ring overruns, the sample index of the next block shows the exact gap.
     """
 
     def __init__(self, units: Iterable[str], capacity: int, clock: Clock) -> None:
@@ -71,12 +71,12 @@ class Outbound:
 
     @property
     def n_waiting(self) -> int:
-        """Number of waiting messages."""
+        """Number of queued messages."""
         return sum(len(queue) for queue in self._waiting.values())
 
     @property
     def behind_s(self) -> float:
-        """Time for which messages have waited without any being published."""
+        """Time since a message was last acknowledged while messages are queued, s."""
         return self._clock.monotonic_s() - self._last_s if self.n_waiting else 0.0
 
     async def put(self, unit: str, message: Outgoing) -> None:
@@ -86,7 +86,7 @@ class Outbound:
             self.add(unit, message)
 
     def add(self, unit: str, message: Outgoing) -> None:
-        """Queue a message at once; news of a link replace waiting ones."""
+        """Queue a message without waiting; a link state replaces a queued link state before it."""
         queue = self._waiting[unit]
         if not self.n_waiting:
             self._last_s = self._clock.monotonic_s()
@@ -97,14 +97,14 @@ class Outbound:
         self._news[unit].set()
 
     async def first(self, unit: str) -> Outgoing:
-        """Wait for the oldest message of a unit, which stays in the queue until `published`."""
+        """Return the oldest message of a unit, waiting if necessary; the message stays queued."""
         while not self._waiting[unit]:
             self._news[unit].clear()
             await self._news[unit].wait()
         return self._waiting[unit][0]
 
     async def published(self, unit: str) -> None:
-        """Remove the oldest message of a unit, which the servers have confirmed."""
+        """Remove the oldest message of a unit after its acknowledgement by the servers."""
         message = self._waiting[unit].popleft()
         self.n_bytes -= len(message.payload)
         self.n_published += 1
@@ -125,19 +125,19 @@ FULL_RETRY_S = 1.0
 
 UNCONFIRMED = "the servers do not confirm blocks: check their disks and the cluster"
 MAX_UNCONFIRMED = 3
-"""Consecutive unconfirmed attempts of all units before the connection is renewed."""
+"""Number of consecutive unacknowledged attempts, of all units, before reconnecting."""
 
 STREAM_FULL = (10047, 10077, 10023)
-"""Error codes of the servers: no storage, maximum bytes exceeded, insufficient resources."""
+"""JetStream error codes: no storage, maximum bytes exceeded, insufficient resources."""
 
 BYTES_PER_MB = 1e6
 
 
 class Publisher:
-    """Publishes blocks and news of links.
+    """Publisher of sample blocks and link states.
 
     One message per unit is sent at a time, so that the messages of a unit arrive in order. A
-    message that was not confirmed is sent again with the same id.
+    message that is not acknowledged is sent again with the same id.
     """
 
     def __init__(
@@ -160,7 +160,7 @@ class Publisher:
 
     @property
     def trouble(self) -> str | None:
-        """Why blocks are not being published; None if they are."""
+        """Reason why blocks are not being published; None if blocks are being published."""
         return self._state.trouble
 
     async def publish(self, block: SampleBlock) -> None:
@@ -177,7 +177,7 @@ class Publisher:
         return now_ns - ns_from_s(self._clock.monotonic_s() - block.sampled_s)
 
     def publish_link(self, news: LinkNews) -> None:
-        """Queue news of a link, unless they are unchanged."""
+        """Queue the state of a link, unless it is unchanged."""
         if self._links.get(news.unit) == news:
             return
         self._links[news.unit] = news
@@ -186,7 +186,7 @@ class Publisher:
         self.waiting.add(news.unit, Outgoing(id_, encoded_link(news, identity), is_news=True))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Publish until cancelled; a lost connection is renewed."""
+        """Publish until cancelled; reconnect after the connection is lost."""
         while True:
             pulse.rest()
             try:
@@ -220,7 +220,7 @@ class Publisher:
                 await self._clock.sleep(FULL_RETRY_S)
 
     async def _sent(self, stream: JetStreamContext, where: str, message: Outgoing) -> bool:
-        """Send a message and wait for its confirmation; False if it must be sent again."""
+        """Send a message and wait for the acknowledgement; return False if none was received."""
         try:
             answer = await stream.publish(
                 where,
@@ -233,7 +233,7 @@ class Publisher:
             self._state.note(UNCONFIRMED)
             self._n_unconfirmed += 1
             if self._n_unconfirmed % MAX_UNCONFIRMED == 0:
-                # a server without a quorum answers everything else; the stream may be gone
+                # a server without a quorum answers other requests; the stream may have been deleted
                 raise StreamError(UNCONFIRMED) from None
             return False
         except MaxPayloadError:
@@ -260,7 +260,7 @@ def _refusal(error: APIError, name: str) -> str:
 
 
 def publisher_metrics(publisher: Publisher) -> Iterator[Metric]:
-    """Yield the metrics of the queue and of the published messages."""
+    """Yield the metrics of the outgoing queue and of the published messages."""
     waiting = publisher.waiting
     connected = publisher.trouble is None
     yield one("stream_connected", "1 while the servers of the stream accept blocks.", connected)

@@ -1,4 +1,4 @@
-"""Receivers, captures and metrics of a process that only serves."""
+"""Notification receivers, captures and metrics of a replica, a process that only serves."""
 
 import asyncio
 import platform
@@ -31,7 +31,7 @@ UNIT = ("unit",)
 
 
 class NoCaptures:
-    """State of captures in a process that captures nothing."""
+    """State of captures in a replica, which does not capture samples."""
 
     error: str | None = None
     trouble: str | None = None
@@ -41,7 +41,7 @@ class NoCaptures:
 
 
 class ReplicaDeliveries:
-    """Reads the outbox and sends nothing."""
+    """State of the notification receivers, read from the outbox by a replica."""
 
     def __init__(self, receivers: Sequence[Receiver], outbox: Outbox) -> None:
         self._receivers, self._outbox = {each.name: each for each in receivers}, outbox
@@ -51,7 +51,7 @@ class ReplicaDeliveries:
         return await asyncio.to_thread(receiver_views, self._receivers, self._outbox, self._status)
 
     def _status(self, name: str) -> SenderStatus:
-        """Return the status by the first waiting letter."""
+        """Return the sender status of a receiver, derived from its first waiting message."""
         for first in self._outbox.waiting(name, 1):
             if not first.n_attempts:
                 return SenderStatus(SenderState.SENDING)
@@ -62,7 +62,7 @@ class ReplicaDeliveries:
 
 @dataclass(frozen=True)
 class ReplicaMetrics:
-    """Collector of a process that only serves."""
+    """Prometheus collector of a replica."""
 
     bearings: Mapping[str, Sequence[str]]
     live: ReplicaLive
@@ -74,14 +74,14 @@ class ReplicaMetrics:
     receivers: Sequence[ReceiverView] | None = None
 
     async def scrape(self) -> "ReplicaMetrics":
-        """Read the receivers; an outbox that cannot be read is reported as a metric."""
+        """Return a collector with the receiver states; without them if the outbox is unreadable."""
         try:
             return replace(self, receivers=await self.deliveries.look())
         except StoreError:
             return self
 
     def collect(self) -> Iterator[Metric]:
-        """Yield all families."""
+        """Yield all metric families."""
         yield gauge(
             "build_info",
             "1; which padwatch this is, and by which Python it runs.",
@@ -108,7 +108,7 @@ class ReplicaMetrics:
 
 
 def unit_metrics(live: ReplicaLive, units: Sequence[str]) -> Iterator[Metric]:
-    """Yield the metrics of each unit by the latest reports."""
+    """Yield the metrics of each unit from the latest reports."""
     connected = (((u,), live.status(u).state is LinkState.CONNECTED) for u in units)
     yield gauge("link_connected", "1 while the device is connected.", UNIT, connected)
     alive = (((u,), live.is_alive(u)) for u in units)

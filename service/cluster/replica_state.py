@@ -1,4 +1,4 @@
-"""Live state, films and alarms of a process that only serves, read from the database."""
+"""Live state, films and alarms of a replica, a process that only serves, from the database."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -29,7 +29,7 @@ MAX_DRIFT = 1e-3
 """Upper bound of the relative drift of two monotonic clocks."""
 
 SILENT_AFTER_S = 5.0
-"""Age of the last report above which a unit counts as not analysed; reports come every second."""
+"""Age of the last report above which a unit counts as not analysed; the interval is one second."""
 
 NOT_ANALYSED = "no process that analyses this unit is alive"
 
@@ -46,12 +46,12 @@ class LatestReport:
     Parameters
     ----------
     beat
-        Process and number of the report; None before the first.
+        Process and number of the report; None before the first report.
     sent_s
-        When the report was sent, by the monotonic clock of this process. None for the first report
-        of a process, whose age is unknown.
+        Time of sending, by the monotonic clock of this process; None for the first report of a
+        process, whose age is unknown.
     status
-        Status of the unit, valid while reports arrive.
+        Status of the samples of the unit, valid while reports arrive.
     """
 
     beat: tuple[str, int] | None = None
@@ -62,11 +62,11 @@ class LatestReport:
 
 
 class ReplicaLive:
-    """Live view made of the latest reports; outdated values are not shown as current.
+    """Live view of a replica, built from the latest reports; stale values are not shown as current.
 
-    Ages are measured by the monotonic clock of this process from the arrival of a report, less the
-    delay of the report. The clocks of the hosts need not agree, and a report that the database
-    delayed does not make its values younger.
+    Ages are measured by the monotonic clock of this process from the arrival of a report, minus the
+    delay of the report. Therefore the clocks of the hosts need not agree, and a report that the
+    database delays does not make its values appear newer.
     """
 
     def __init__(self, units: Iterable[str], clock: Clock, stale_after_s: float) -> None:
@@ -75,15 +75,15 @@ class ReplicaLive:
         self._latest = dict.fromkeys((*units, PLANT, SHARED), LatestReport())
         self.revision = 0
         self.read_error: str | None = None
-        """Why reports cannot be read; None if they can."""
+        """Reason why reports cannot be read; None if they can be read."""
 
     @property
     def units(self) -> Sequence[str]:
-        """All units, `PLANT` and `SHARED`."""
+        """Ids of all units, and the pseudo-units `PLANT` and `SHARED`."""
         return tuple(self._latest)
 
     def update(self, unit: str, process: str, n_beats: int, signs: UnitSigns) -> None:
-        """Apply the latest report on a unit; a known report has no effect."""
+        """Apply the latest report on a unit; a report that was already applied has no effect."""
         latest, beat = self._latest[unit], (process, n_beats)
         if latest.beat == beat:
             return
@@ -99,7 +99,7 @@ class ReplicaLive:
         self._latest[unit] = replace(latest, beat=beat, sent_s=sent_s, signs=signs, status=status)
 
     def set_results(self, unit: str, results: Mapping[str, BearingState]) -> None:
-        """Set the newest results of a unit."""
+        """Set the newest results of a unit, by bearing."""
         self.revision += 1
         found = {
             bearing: Assessment(unit, bearing, spectrum=NO_SPECTRUM, orbit=None, **vars(state))
@@ -108,7 +108,7 @@ class ReplicaLive:
         self._latest[unit] = replace(self._latest[unit], results=found)
 
     def silence_s(self, unit: str) -> float | None:
-        """Time since the last report on a unit; None before the first with a known age."""
+        """Return the age of the last report on a unit, s; None if unknown."""
         sent_s = self._latest[unit].sent_s
         return None if sent_s is None else self._clock.monotonic_s() - sent_s
 
@@ -119,18 +119,18 @@ class ReplicaLive:
 
     @property
     def store_error(self) -> str | None:
-        """Why reports cannot be read, or why a process that is alive cannot store its results."""
+        """Reason why reports are unreadable, or why a process cannot store results; None if ok."""
         errors = (self._latest[u].signs.store_error for u in self._latest if self.is_alive(u))
         return self.read_error or next((error for error in errors if error), None)
 
     @property
     def n_unstored(self) -> int:
-        """Findings that the processes have lost since their start."""
+        """Number of findings that the reporting processes have lost since their start."""
         latest = self._latest.values()
         return sum({each.beat[0]: each.signs.n_unstored for each in latest if each.beat}.values())
 
     def status(self, unit: str) -> UnitStatus:
-        """Status of the samples of a unit; not connected while reports are missing."""
+        """Return the status of the samples of a unit; not connected while reports are missing."""
         latest = self._latest[unit]
         if latest.beat is None:
             return NOT_REPORTED
@@ -141,23 +141,26 @@ class ReplicaLive:
         )
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Raise `NotAvailableError`: samples stay in the process that analyses them."""
+        """Raise `NotAvailableError`; only the analysing process has the samples of a unit."""
         raise NotAvailableError(f"live samples of unit {unit} are not available from this replica")
 
     def newest_block(self, unit: str) -> SampleBlock | None:  # noqa: ARG002  interface of LiveView
-        """Return None: samples stay in the process that analyses them."""
+        """Return None; only the analysing process has the samples of a unit."""
         return None
 
     def why_no_samples(self, unit: str) -> Reason | None:
-        """Why the newest samples of a unit are not current; None if they are."""
+        """Return the reason why the newest samples of a unit are not current; None if current."""
         return self._why_not_current(unit, self.data_age_s(unit))
 
     def data_age_s(self, unit: str) -> float | None:
-        """Age of the newest block of a unit; None if unknown."""
+        """Return the age of the newest sample block of a unit, s; None if unknown."""
         return self._age_s(unit, self._latest[unit].signs.data_age_s)
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """Return None without a result; else raise `NotAvailableError`: arrays are not reported."""
+        """Return None if a bearing has no result.
+
+        Otherwise raise `NotAvailableError`, as reports do not include spectra and orbits.
+        """
         if bearing not in self._latest[unit].results:
             return None
         raise NotAvailableError(
@@ -166,7 +169,7 @@ class ReplicaLive:
         )
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:
-        """Return the newest result; without readings if it is not current."""
+        """Return the newest result of a bearing; its readings are missing if it is not current."""
         latest = self._latest[unit]
         result = latest.results.get(bearing)
         age_s = self._age_s(unit, latest.signs.result_ages_s.get(bearing))
@@ -195,24 +198,24 @@ class ReplicaLive:
 
 
 class ReportDelays:
-    """Estimates the delay of each report against the fastest report of its process.
+    """Estimator of the delay of each report relative to the fastest report of its process.
 
-    Two monotonic clocks differ by a constant. The delay that all reports share is not observable;
-    reading the database twice a second keeps it below half a second.
+    Two monotonic clocks differ by a constant offset. The delay common to all reports is not
+    observable; since the database is read twice a second, it is below half a second.
     """
 
     def __init__(self) -> None:
         self._fastest: dict[str, tuple[float, float]] = {}
 
     def delay_s(self, process: str, sent_s: float | None, received_s: float) -> float:
-        """Return the delay of a report beyond the fastest one.
+        """Return the delay of a report relative to the fastest report of its process, s.
 
         Parameters
         ----------
         sent_s
-            By the monotonic clock of the reporting process; None if not reported.
+            Time of sending by the monotonic clock of the reporting process; None if not reported.
         received_s
-            By the monotonic clock of this process.
+            Time of arrival by the monotonic clock of this process.
         """
         if sent_s is None:
             return 0.0
@@ -224,11 +227,11 @@ class ReportDelays:
 
 
 Key = tuple[str, str]
-"""Unit and bearing."""
+"""Unit id and bearing id."""
 
 
 class ReplicaFilms:
-    """Film verdicts of the reports, and baselines of the store."""
+    """Film monitoring state of a replica: verdicts from reports, baselines from the store."""
 
     def __init__(self, plant: PlantFile, store: FilmStore) -> None:
         self._store = store
@@ -236,7 +239,7 @@ class ReplicaFilms:
         self._rules = {unit: rules for unit, rules in found.items() if isinstance(rules, FilmRules)}
         self.settings = plant.films
         self.unwatched = {unit: why for unit, why in found.items() if isinstance(why, str)}
-        """Why films are not monitored, by unit."""
+        """Reason why films are not monitored, by unit; only units without film monitoring."""
         self._newest: dict[Key, FilmNews] = {}
         self._baselines: dict[Key, BearingBaseline] = {}
 
@@ -245,24 +248,24 @@ class ReplicaFilms:
         return self._rules.get(unit)
 
     def place(self, unit: str, bearing: str) -> FilmPlace | None:
-        """Return a bearing with its watched estimator; None if it is not monitored."""
+        """Return unit, bearing and watched estimator; None if the film is not monitored."""
         rules = self.rules(unit)
         if rules is None or bearing not in rules.estimators:
             return None
         return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """Return the newest verdict on a bearing."""
+        """Return the newest verdict on the film of a bearing; None if there is none."""
         return self._newest.get((unit, bearing))
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
-        """Return the baseline of a bearing that is in force."""
+        """Return the baseline in force for a bearing; None if there is none."""
         return self._baselines.get((unit, bearing))
 
     def fetch(self, unit: str, state: UnitState) -> Mapping[str, BearingBaseline]:
-        """Read the baselines that are in force by a state; blocks.
+        """Return the baselines in force according to a state, by bearing.
 
-        Raises `StoreError` if they cannot be read.
+        Reads the database and blocks. Raises `StoreError` if the baselines are unreadable.
         """
         found = {}
         for bearing, in_force in state.baselines.items():
@@ -274,7 +277,7 @@ class ReplicaFilms:
         return found
 
     def take(self, unit: str, state: UnitState, baselines: Mapping[str, BearingBaseline]) -> None:
-        """Apply the state of a unit, with the baselines that `fetch` returned."""
+        """Apply the state of a unit and the baselines that `fetch` returned for this state."""
         for bearing, film in state.films.items():
             news = FilmNews(film.reading, film.findings, (INITIAL_DECISION, INITIAL_DECISION))
             self._newest[unit, bearing] = news
@@ -283,7 +286,7 @@ class ReplicaFilms:
 
 
 class ReplicaAlarms:
-    """Alarms of the reports and of the table of alarms; those of silent units are not judged."""
+    """Alarms of a replica, from reports and the alarm table; a silent unit has no judged alarms."""
 
     def __init__(
         self, units: Iterable[str], is_alive: Callable[[str], bool], chatter_rule: ChatterRule
@@ -298,22 +301,22 @@ class ReplicaAlarms:
 
     @property
     def revision(self) -> int:
-        """Number that changes with the state of any alarm."""
+        """Revision number, which increases when any alarm changes."""
         alive = {unit: self._is_alive(unit) for unit in self._judged}
-        if alive != self._alive:  # no report announces the end of reports
+        if alive != self._alive:  # the end of the reports is detected only by their age
             self._alive = alive
             self._revision += 1
         return self._revision
 
     def take(self, unit: str, state: UnitState) -> None:
-        """Apply the state of a unit."""
+        """Apply the reported state of a unit to its alarms."""
         self._revision += 1
         self._judged[unit], self._chattering[unit] = state.judged, state.chattering
-        # a process may hold alarms of units that another process has taken over
+        # a process may still have alarms of a unit that another process has taken over
         self.take_stored(alarm for alarm in state.alarms if self._owner(alarm) == unit)
 
     def take_stored(self, alarms: Iterable[Alarm]) -> None:
-        """Apply alarms that are newer than the known ones."""
+        """Apply stored alarms that are not older than the known state of the same alarm."""
         self._revision += 1
         for alarm in alarms:
             held = self._alarms.get(alarm.identity.id)
@@ -322,7 +325,7 @@ class ReplicaAlarms:
 
     @property
     def alarms(self) -> Sequence[Alarm]:
-        """All alarms in any state."""
+        """All alarms, in any state."""
         return list(self._alarms.values())
 
     def alarm(self, id_: str) -> Alarm:
@@ -330,16 +333,16 @@ class ReplicaAlarms:
         return self._alarms[id_]
 
     def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether the monitored quantity of an alarm is known now."""
+        """Return whether the condition of an alarm is currently known."""
         unit = self._owner(alarm)
         return self._is_alive(unit) and alarm.identity.id in self._judged.get(unit, ())
 
     def is_chattering(self, alarm: Alarm) -> bool:
-        """Return whether an alarm was raised too often recently."""
+        """Return whether an alarm is chattering: raised too often in a short time."""
         return alarm.identity.id in self._chattering.get(self._owner(alarm), ())
 
     def owner(self, id_: str) -> str:
-        """Return the unit whose process operates an alarm. Raises `LookupError` if none exists."""
+        """Return the unit whose process owns an alarm. Raises `LookupError` for an unknown id."""
         return self._owner(self.alarm(id_))
 
     def _owner(self, alarm: Alarm) -> str:
@@ -349,5 +352,5 @@ class ReplicaAlarms:
         return unit if unit in self._units else PLANT
 
     def count(self) -> AlarmCount:
-        """Return the number of alarms on the list."""
+        """Return the numbers of alarms on the alarm list."""
         return count_of(self.alarms, self.is_judged)

@@ -1,4 +1,4 @@
-"""Commands of operators, passed through the database."""
+"""Commands of operators, sent to the analysing process through the database."""
 
 import asyncio
 from collections.abc import Callable, Collection
@@ -34,23 +34,26 @@ from service.store.sharing import DONE, OPEN, Answer, Command, CommandState, Ope
 from service.store.store import Store
 
 WAIT_S = 5.0
-"""Longest wait for the process that analyses the unit."""
+"""Maximum time to wait for the answer of the process that analyses the unit."""
 
 EXPIRES_S = 15.0
-"""Age above which a command is not started, if this process cannot withdraw it. The clocks of the
-two hosts may differ by a few seconds."""
+"""Age above which a command is not started, for commands that the sender could not withdraw. The
+clocks of the two hosts may differ by a few seconds."""
 
 POLL_EVERY_S = 0.1
 
 
 class CommandClient:
-    """Sends commands and waits for their answers."""
+    """Client that stores commands in the database and waits for their answers."""
 
     def __init__(self, store: Store, alarms: ReplicaAlarms, clock: Clock) -> None:
         self._store, self._alarms, self._clock = store, alarms, clock
 
     async def operate(self, id_: str, action: Action) -> Alarm:
-        """Operate an alarm; returns its stored state afterwards."""
+        """Apply an action of an operator to an alarm; return the alarm as stored afterwards.
+
+        Raises `LookupError`, `ActionRefusedError` or `CommandFailedError`.
+        """
         unit = self._alarms.owner(id_)
         answer = await self._send(unit, AlarmCommand(id_, action), action.actor)
         if answer.state is CommandState.UNKNOWN:
@@ -61,19 +64,19 @@ class CommandClient:
         return self._alarms.alarm(id_)
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
-        """Change the baselines of a bearing."""
+        """Apply an action of an engineer to the baselines of a bearing."""
         answer = await self._send(place.unit, BaselineCommand(place, action, actor, reason), actor)
         if answer.state is CommandState.REFUSED:
             raise BaselineRefusedError(answer.words)
 
     async def refer_to(self, reference: VectorReference) -> None:
-        """Put a stored reference of 1× vectors in force."""
+        """Activate a stored reference of 1× vectors in the analysing process."""
         await self._send(reference.unit, ReferenceCommand(reference.unit), acting().actor)
 
     async def _send(self, unit: str, task: OperatorCommand, actor: str) -> Answer:
         """Store a command and wait for its answer.
 
-        Raises `CommandFailedError` if the command is not carried out, or its outcome is unknown.
+        Raises `CommandFailedError` if the command is not executed, or its outcome is unknown.
         """
         command = self._command(unit, task, actor)
         await asyncio.to_thread(self._store.commands.ask, command)
@@ -93,7 +96,7 @@ class CommandClient:
         return Command(uuid4().hex, unit, kind, document, *who, now_ns, expires_ns)
 
     async def _answer(self, command: Command) -> Answer:
-        """Wait for the answer to a command; withdraw a command that no process takes."""
+        """Wait for the answer to a command; withdraw the command if no process takes it in time."""
         until_s = self._clock.monotonic_s() + WAIT_S
         while True:
             found = await asyncio.to_thread(self._store.commands.look, command.id)
@@ -127,10 +130,10 @@ INTERRUPTED = Answer(
 
 
 class CommandWorker:
-    """Carries out the commands on the held units, one after the other.
+    """Worker that executes the commands for the units of this process, one at a time.
 
     A command on an alarm is answered in the transaction that stores the event of the alarm.
-    Therefore an open command was not carried out, and another process can start it anew.
+    Therefore an open command has not been executed, and another process can execute it.
     """
 
     def __init__(
@@ -148,16 +151,16 @@ class CommandWorker:
         self._trouble = TroubleLog("commands are not carried out", "commands are carried out again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Carry out commands until cancelled."""
+        """Execute commands until cancelled."""
 
         async def look() -> None:
             await self.look()
-            pulse.rest()  # a store that does not answer is not a fault of this loop
+            pulse.rest()  # a store that does not answer must not make this loop appear dead
 
         await periodic(look, READ_EVERY_S, self._clock, pulse)
 
     async def look(self) -> None:
-        """Carry out the open commands."""
+        """Execute all open commands once."""
         try:
             for found in await asyncio.to_thread(self._store.commands.open, self._held()):
                 await self._take_up(found)
@@ -171,19 +174,19 @@ class CommandWorker:
         answer = self._why_not(found)
         if answer is None:
             if not await asyncio.to_thread(commands.take, command.id, self._process):
-                return  # withdrawn meanwhile
+                return  # the sender has withdrawn the command
             answer = await self._carry_out(command)
         await asyncio.to_thread(commands.answer, command.id, answer, self._clock.now_ns())
 
     def _why_not(self, found: OpenCommand) -> Answer | None:
-        """Return the answer to a command that must not be carried out; None otherwise."""
+        """Return the answer to a command that must not be executed; None if it may be executed."""
         if self._clock.now_ns() > found.command.expires_ns:
             return TOO_LATE
         try:
             task = decoded(found.command.kind, found.command.document)
         except UnreadableCommandError as error:
             return Answer(CommandState.REFUSED, str(error))
-        # baselines are stored in a separate transaction: the outcome is unknown
+        # baselines are stored in a separate transaction: the outcome of a taken command is unknown
         is_in_doubt = isinstance(task, BaselineCommand) and found.taken_by is not None
         return INTERRUPTED if is_in_doubt else None
 

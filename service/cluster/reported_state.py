@@ -1,4 +1,4 @@
-"""State of units: written to the database by analysing processes and read by replicas."""
+"""Reports on units: written to the database by analysing processes and read by replicas."""
 
 import asyncio
 import os
@@ -40,12 +40,12 @@ REPORT_EVERY_S = 1.0
 
 @dataclass(frozen=True)
 class UnitNow:
-    """Present state of a unit.
+    """Current state of a unit, to be reported.
 
     Parameters
     ----------
     state
-        None if unchanged since it was last written.
+        Results and alarms; None if unchanged since the last write.
     """
 
     unit: str
@@ -55,13 +55,13 @@ class UnitNow:
 
 
 class Reporter:
-    """Reads the units on the event loop and writes their reports in a thread.
+    """Writer of the reports; reads the units on the event loop and writes in a thread.
 
     Parameters
     ----------
     held
-        Returns the units that this process is responsible for; with `PLANT` if it also reports
-        alarms of no unit, and `SHARED` if it does the shared work.
+        Function that returns the units that this process is responsible for; includes `PLANT` if
+        the process reports alarms of the plant, and `SHARED` if it performs the shared work.
     """
 
     def __init__(
@@ -83,13 +83,13 @@ class Reporter:
         self._trouble = TroubleLog("units are not reported on", "units are reported on again")
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Report until cancelled."""
+        """Write reports periodically until cancelled."""
         await periodic(self.report, REPORT_EVERY_S, self._clock, pulse)
 
     async def report(self) -> None:
-        """Report once; if that fails, readers treat the units as silent."""
+        """Write one report on each unit; after a failure, readers treat the units as silent."""
         held = list(self._held())
-        for unit in self._written.keys() - set(held):  # others may write it meanwhile
+        for unit in self._written.keys() - set(held):  # another process may have written its state
             self._written[unit] = (self._written[unit][0], None)
         found = [self._unit_now(unit) for unit in held]
         if not found:
@@ -101,7 +101,7 @@ class Reporter:
             )
         except StoreError as error:
             self._trouble.note(str(error))
-            # the report may have been stored: its revision is not used for another state
+            # the report may have been stored: its revision must not be used for a different state
             self._written |= {s.unit: (s.revision, None) for s in found if s.state is not None}
             return
         self._trouble.note(None)
@@ -149,7 +149,7 @@ log = structlog.get_logger()
 READ_EVERY_S = 0.5
 
 Revision = tuple[str, int]
-"""Process, and revision of the state that it wrote."""
+"""Name of the reporting process, and revision of the state in its report."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ class Report:
 
 
 class Feed:
-    """Applies the reports of the database to the live view, alarms and films of a replica."""
+    """Reader of the reports, which updates live view, alarms and films of a replica."""
 
     def __init__(
         self,
@@ -185,19 +185,19 @@ class Feed:
         self._trouble = TroubleLog("units cannot be read", "units can be read again")
 
     async def start(self) -> None:
-        """Read the stored alarms and the reports before the first request.
+        """Read the stored alarms and the reports, before the first request is served.
 
-        Raises `StoreError` if they cannot be read.
+        Raises `StoreError` if the database is unreadable.
         """
         self._alarms.take_stored(await asyncio.to_thread(self._store.alarms))
         self._take(await asyncio.to_thread(self._read))
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Read until cancelled."""
+        """Read reports periodically until cancelled."""
         await periodic(self.look, READ_EVERY_S, self._clock, pulse)
 
     async def look(self) -> None:
-        """Read once; if that fails, the values keep aging."""
+        """Read all reports once; after a failure, the ages of the known values increase."""
         try:
             reports = await asyncio.to_thread(self._read)
         except StoreError as error:
@@ -216,7 +216,7 @@ class Feed:
         return [report for report in found if report is not None]
 
     def _report(self, beat: UnitBeat, document: tuple[str, int, bytes] | None) -> Report | None:
-        """Decode a report; None if it is unreadable, which is logged once."""
+        """Return a decoded report; None if it is unreadable, which is logged once."""
         try:
             signs = read_signs(beat.signs)
             if document is None:
@@ -243,13 +243,13 @@ class Feed:
 
 
 def process_name() -> str:
-    """Return a unique name of this process: host, process id and a random word."""
+    """Return a unique name of this process: host name, process id and random characters."""
     return f"{socket.gethostname()}:{os.getpid()}:{uuid4().hex[:12]}"
 
 
 @dataclass
 class UnitDescription:
-    """Description of a unit in a process without a monitor; references of the shaft change it."""
+    """Description of a unit in a replica; new shaft references replace the description."""
 
     unit: Unit
 

@@ -1,4 +1,4 @@
-"""Connections to JetStream, and creation of the stream."""
+"""Connection to NATS JetStream, and creation of the stream of a plant."""
 
 import asyncio
 import re
@@ -29,20 +29,20 @@ from service.settings.units import UnitSettings
 
 
 class StreamError(Exception):
-    """The servers do not answer or return an error; retrying later may succeed."""
+    """The NATS servers do not answer or return an error; a later attempt may succeed."""
 
 
 class StreamMisfitError(StreamError):
-    """Servers, stream and plant file do not match; the message states what to do."""
+    """NATS servers, stream and plant file do not match; the message states the remedy."""
 
 
 class StreamAnewError(Exception):
-    """The stream was replaced; positions on it are no longer valid."""
+    """The stream was replaced; stored positions on the old stream are no longer valid."""
 
 
 RETRY_S = 1.0
 MISFIT_RETRY_S = 5.0
-"""Pauses after a lost connection, and after a mismatch."""
+"""Delays before reconnecting after a `StreamError`, and after a `StreamMisfitError`."""
 
 NOT_REACHED = "the servers have not been reached yet"
 
@@ -50,12 +50,12 @@ ROOT = "padwatch"
 
 
 def plant_mark(plant: PlantFile) -> bytes:
-    """Return the fingerprint of a plant."""
+    """Return a hash of the name of a plant, which marks its stream and messages."""
     return fingerprint(ROOT, plant.plant.name)
 
 
 def stream_name(plant: PlantFile) -> str:
-    """Return the name of the plant's stream, readable and unique."""
+    """Return the name of the stream of a plant: configured, or derived from the plant's name."""
     if plant.stream is not None and plant.stream.name is not None:
         return plant.stream.name
     legible = re.sub(r"[^A-Za-z0-9]+", "-", plant.plant.name).strip("-")[:32]
@@ -63,38 +63,38 @@ def stream_name(plant: PlantFile) -> str:
 
 
 def subjects(plant: PlantFile) -> str:
-    """Return the subjects of all units of a plant."""
+    """Return the wildcard subject of all units of a plant."""
     return f"{ROOT}.{stream_name(plant)}.*"
 
 
 def subject(plant: PlantFile, unit: str) -> str:
-    """Return the subject of a unit, without dots in its id, which separate tokens."""
+    """Return the subject of a unit; dots in its id, which would separate tokens, are replaced."""
     return f"{ROOT}.{stream_name(plant)}.{unit.replace('.', '=')}"
 
 
 def consumer_name(unit: str) -> str:
-    """Return the name of a unit's consumer on the servers."""
+    """Return the name of the durable JetStream consumer of a unit."""
     return f"analyse-{unit.replace('.', '=')}"
 
 
 def message_id(identity: UnitIdentity, block: SampleBlock) -> str:
-    """Return a unique id of a block, the same for every attempt.
+    """Return the unique message id of a block, the same for every attempt.
 
-    It contains the time because a device may restart its indices.
+    The id includes the time of the block because a device may restart its sample index.
     """
     place = f"{block.epoch}.{block.first_index}.{block.start_ns}"
     return f"{identity.plant.hex()[:8]}.{block.unit}.{place}"
 
 
 def identity_of(plant: PlantFile, unit: UnitSettings) -> UnitIdentity:
-    """Return the identity that the messages of a unit must carry."""
+    """Return the identity of a unit for its messages."""
     channels = [(channel.id, str(channel.measurand)) for channel in unit.channel]
     make = fingerprint(unit.id, unit.sampling_hz, unit.source.kind, channels)
     return UnitIdentity(unit.id, plant_mark(plant), make)
 
 
 OLDEST_SERVER = (2, 10)
-"""First version with all the features of streams and consumers that padwatch uses."""
+"""Oldest supported version of the NATS server (major, minor)."""
 
 CONNECT_S = 3
 PING_S = 5
@@ -102,12 +102,12 @@ PING_S = 5
 
 @asynccontextmanager
 async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStreamContext]:
-    """Connect to the servers; the body is cancelled when the connection is lost.
+    """Connect to the NATS servers; the body is cancelled when the connection is lost.
 
     Raises
     ------
     StreamError
-        If the connection fails or is lost, or if the body raises an error of the library.
+        If the connection fails or is lost, or if the body raises an error of the NATS client.
     """
     lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
     client = await _connected(settings, name, lost)
@@ -116,7 +116,11 @@ async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStrea
             watching = tasks.create_task(_ended(lost, settings), name="stream watch")
             yield client.jetstream(timeout=settings.ack_timeout_s)
             watching.cancel()
-    except* (StreamError, Error, OSError) as group:  # two clauses would raise a group again
+    except* (
+        StreamError,
+        Error,
+        OSError,
+    ) as group:  # two except* clauses would raise an exception group
         raise _most_specific(group, settings) from None
     finally:
         await _closed(client)
@@ -169,10 +173,10 @@ async def _ended(lost: asyncio.Future[None], settings: StreamSettings) -> None:
 
 
 async def _closed(client: Client) -> None:
-    """Close without waiting for a server that does not answer."""
+    """Close a client; do not wait longer than `CONNECT_S` for a server that does not answer."""
     with suppress(Error, OSError, TimeoutError):
         await asyncio.wait_for(client.close(), CONNECT_S)
-    # the library leaves the socket open if the server disconnects while data is being sent
+    # the NATS client leaves the socket open if the server disconnects while data is being sent
     transport = client._transport  # noqa: SLF001
     if transport is not None:
         transport.close()  # type: ignore[no-untyped-call]
@@ -205,7 +209,7 @@ def _renamed(error: BaseException, settings: StreamSettings) -> StreamError:
 def _most_specific(
     group: BaseExceptionGroup[BaseException], settings: StreamSettings
 ) -> StreamError:
-    """Return the most informative of several errors; the loss of a connection causes many."""
+    """Return the most specific of several errors; a lost connection causes many errors."""
     found = sorted(_leaves(group), key=lambda error: not isinstance(error, StreamMisfitError))
     own = [error for error in found if isinstance(error, StreamError)]
     return own[0] if own else _renamed(found[0], settings)
@@ -244,14 +248,14 @@ BYTES_PER_GB = 1e9
 S_PER_H = 3600.0
 
 PLANT, FORMAT = "padwatch-plant", "padwatch-format"
-"""Metadata of the stream that identify its plant and format."""
+"""Metadata keys of the stream for its plant and format."""
 
 
 def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
-    """Return the configuration of the stream.
+    """Return the JetStream configuration of the stream.
 
-    A full stream refuses new blocks, which then wait at the devices with an alarm. The other
-    policy would drop old blocks before they are analysed.
+    A full stream refuses new blocks; samples then wait at the devices, and an alarm is raised. The
+    alternative policy would drop old blocks before they are analysed.
     """
     return StreamConfig(
         name=stream_name(plant),
@@ -270,10 +274,10 @@ def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
 
 
 async def ensure(stream: JetStreamContext, plant: PlantFile, settings: StreamSettings) -> None:
-    """Create the stream, or apply the limits of the plant file to it.
+    """Create the stream, or update its limits to those of the plant file.
 
-    Raises `StreamMisfitError` if JetStream is off, or the stream belongs to another plant or cannot
-    be configured.
+    Raises `StreamMisfitError` if JetStream is disabled, or if the stream belongs to another plant
+    or cannot be configured.
     """
     config, found = wanted(plant, settings), await _info(stream, plant)
     if found is None:
@@ -283,10 +287,10 @@ async def ensure(stream: JetStreamContext, plant: PlantFile, settings: StreamSet
 
 
 async def require(stream: JetStreamContext, plant: PlantFile) -> str:
-    """Return the name of the stream with its time of creation.
+    """Return the identifier of the stream: its name and time of creation.
 
-    Raises `StreamError` if it does not exist yet. Raises `StreamMisfitError` if JetStream is off,
-    or the stream belongs to another plant.
+    Raises `StreamError` if the stream does not exist yet, and `StreamMisfitError` if JetStream is
+    disabled or the stream belongs to another plant.
     """
     name, found = stream_name(plant), await _info(stream, plant)
     if found is None:
@@ -305,7 +309,7 @@ NO_ANSWER = (NoStreamResponseError, ServiceUnavailableError, nats.errors.NoRespo
 
 
 async def _info(stream: JetStreamContext, plant: PlantFile) -> StreamInfo | None:
-    """Return the plant's stream; None if it does not exist."""
+    """Return the state of the stream of a plant; None if the stream does not exist."""
     name = stream_name(plant)
     try:
         found = await stream.stream_info(name)

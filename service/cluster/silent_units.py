@@ -1,4 +1,4 @@
-"""Detection of units whose samples or analysis have stopped."""
+"""Detection of units from which no samples or no reports arrive."""
 
 import asyncio
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -26,17 +26,17 @@ from service.store.sharing import UnitBeat
 from service.store.store import Store
 
 SILENT_AFTER_S = 30.0
-"""Time without reports before the alarm. A standby takes over within seconds, a restart within
-ten."""
+"""Time without reports after which the alarm is raised. A standby process takes over within
+seconds; a restart takes up to ten seconds."""
 
 EVERY_S = 1.0
 
 
 class SilentUnits:
-    """Raises alarms about all units whose reports have stopped, while this process leads.
+    """Monitor that raises an alarm for each unit without reports, while this process leads.
 
     Ages are measured by the monotonic clock of this process from the arrival of a report, so that
-    the clocks of the hosts need not agree. Time in which reports cannot be read does not count.
+    the clocks of the hosts need not agree. Time in which reports are unreadable is not counted.
     """
 
     def __init__(
@@ -50,14 +50,14 @@ class SilentUnits:
         self._board: ReportedAlarms | None = None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Check while this process leads, until cancelled."""
+        """Check all units periodically until cancelled; then release the alarms."""
         try:
             await periodic(self.look, EVERY_S, self._clock, pulse)
         finally:
             self.leave()
 
     async def look(self) -> None:
-        """Read the reports once and update the alarms."""
+        """Read the reports of all units once and update the alarms."""
         try:
             if self._board is None:
                 self._board = self._kept(await asyncio.to_thread(self._store.alarms))
@@ -73,18 +73,18 @@ class SilentUnits:
         report_silence(self._board, silent, alive, SILENT_AFTER_S)
 
     def leave(self) -> None:
-        """Leave the alarms to the next leading process."""
+        """Remove the alarms from this process; the next leading process restores them."""
         if self._board is not None:
             self._alarms.remove_alarms(self._board)
         self._board = None
 
     @property
     def is_watching(self) -> bool:
-        """Whether this process is responsible for the alarms."""
+        """Whether this process currently evaluates the alarms."""
         return self._board is not None
 
     def _kept(self, stored: Iterable[Alarm]) -> ReportedAlarms:
-        """Take over the alarms and measure all ages anew."""
+        """Restore the stored alarms and restart the measurement of all ages."""
         board = gone_alarms(self._units)
         self._alarms.add_alarms(board, [alarm for alarm in stored if is_shared(alarm)])
         self._beats.clear()
@@ -104,20 +104,20 @@ class SilentUnits:
 log = structlog.get_logger()
 
 MIN_BLOCKS = 3
-"""Consecutive missing blocks before a unit is silent; a block of polls may take a minute."""
+"""Minimum silence of a unit in lengths of a block; a block of polled samples may take a minute."""
 
 
 def silences_s(units: Iterable[UnitSettings], least_s: float) -> dict[str, float]:
-    """Return the time without blocks after which each unit counts as not connected."""
+    """Return the time without blocks after which a unit counts as not connected, s, by unit."""
     return {
         unit.id: max(least_s, MIN_BLOCKS * unit.block_samples / unit.sampling_hz) for unit in units
     }
 
 
 class SilenceWatch:
-    """Marks units as not connected that have sent nothing for their longest silence.
+    """Watchdog that sets a unit to not connected if no blocks arrive for a time.
 
-    This includes units whose restored state says that samples arrive while the stream has not been
+    This includes units whose restored link state is connected although the stream has not been
     reached since the start.
     """
 
@@ -141,9 +141,9 @@ class SilenceWatch:
         begun
             Progress of the units whose position on the stream is known.
         trouble
-            Why no messages can arrive; None if unknown.
+            Reason why no messages can arrive; None if unknown.
         waiting
-            Units with messages that wait for the store; these are not silent.
+            Units with fetched messages that wait for the store; these units are not silent.
         """
         for unit, after_s in self._after_s.items():
             if unit in waiting:

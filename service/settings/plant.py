@@ -142,8 +142,8 @@ class DynamicModel(Settings):
     estimated, Hz."""
 
     max_relative_uncertainty: Annotated[float, Field(gt=0.0, le=1.0)] = 0.2
-    """Maximum relative standard uncertainty of a direct stiffness, random part; a result with a
-    larger uncertainty is not used."""
+    """Maximum relative standard uncertainty of a direct stiffness, random part; no stiffness is
+    returned above it."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -30,8 +30,7 @@ class AccessSettings(Settings):
     proxy must always log in. Requests that change state always require a login."""
 
     idle_min: Annotated[float, Field(ge=1.0, le=1440.0)] = 30.0
-    """Time without requests after which a login expires, minutes. An open dashboard sends
-    requests."""
+    """Time without use after which a login expires, minutes. An open dashboard counts as use."""
 
     longest_h: Annotated[float, Field(ge=0.25, le=168.0)] = 12.0
     """Maximum duration of a login, hours."""
