@@ -185,7 +185,7 @@ class Consumer:
             self._settled[unit] = _sequence(batch[-1])
 
     async def _stored(self, progress: UnitProgress) -> None:
-        """Wait until the results and the position of a unit are stored."""
+        """Wait until the results and the stream position of a unit are stored."""
         if progress.is_replaying:
             return
         position = progress.position()

@@ -76,7 +76,7 @@ MAGIC = b"PWSM"
 
 VERSION = 2
 READABLE = (2,)
-"""Format versions that a reader supports: current and previous, as readers are upgraded first."""
+"""Format versions that a reader accepts; readers are upgraded before writers."""
 
 MAX_HEAD_BYTES = 1 << 18
 MAX_SAMPLE_BYTES = 1 << 26

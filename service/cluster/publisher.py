@@ -80,7 +80,7 @@ class Outbound:
         return self._clock.monotonic_s() - self._last_s if self.n_waiting else 0.0
 
     async def put(self, unit: str, message: Outgoing) -> None:
-        """Queue a message; waits while the queue is full."""
+        """Queue a message; wait while the queue is full."""
         async with self._room:
             await self._room.wait_for(lambda: self._fits(message))
             self.add(unit, message)
@@ -164,7 +164,7 @@ class Publisher:
         return self._state.trouble
 
     async def publish(self, block: SampleBlock) -> None:
-        """Queue a block; waits while the queue is full."""
+        """Queue a sample block as a message; wait while the queue is full."""
         identity = self._identities[block.unit]
         message = encoded_block(block, identity, self._taken_ns(block))
         outgoing = Outgoing(message_id(identity, block), message)

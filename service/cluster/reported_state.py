@@ -154,7 +154,7 @@ Revision = tuple[str, int]
 
 @dataclass(frozen=True)
 class Report:
-    """Report on one unit as read from the database.
+    """Decoded report on one unit, as read from the database.
 
     Parameters
     ----------

@@ -84,13 +84,13 @@ class AlarmSettings(Settings):
     "ignored"."""
 
     max_clock_offset_s: Annotated[float, Field(gt=0.0, le=1e9)] = 2.0
-    """Offset of a device's time stamps from the host's clock, s, that raises an alarm if it is
-    exceeded for half a minute."""
+    """Offset of a device's time stamps from the host's clock above which an alarm is raised, s; the
+    offset must last for half a minute."""
 
     max_clock_drift_ppm: Annotated[float, Field(gt=0.0, le=1e6)] = 200.0
-    """Deviation of a device's sampling rate from its nominal rate, parts per million, that raises
-    an alarm if it is exceeded for a minute. The rate is measured by the host's clock; the deviation
-    must exceed the limit by more than the uncertainty."""
+    """Deviation of a device's sampling rate from its nominal rate above which an alarm is raised,
+    parts per million. The deviation is measured by the host's clock, is reduced by its uncertainty,
+    and must last for a minute."""
 
     chattering_activations: Annotated[int, Field(ge=2, le=100)] = 3
     """Number of activations within chattering_window_s that make an alarm chattering; ISA-18.2

@@ -131,7 +131,7 @@ class BearingSettings(Settings):
 
     watched_estimator: Estimator | None = None
     """Estimator whose stiffness is compared with its baseline; by default the first of preference,
-    or "ratio_order1" for a rack with amplitudes. Another estimator needs another baseline."""
+    or "ratio_order1" for a rack with amplitudes. A different estimator requires a new baseline."""
 
     alarms: BearingAlarmSettings = BearingAlarmSettings()
     """Alarm limits of the bearing; none by default."""

@@ -110,7 +110,7 @@ def calibration_of(settings: UnitSettings) -> UnitCalibration:
 
 
 def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
-    """Return the settings of segments, averaging and assessment."""
+    """Return the settings of segments, averaging and assessment as a value of core."""
     dynamic = settings.dynamic
     noise = dynamic.probe_noise_um2_per_hz
     return AnalysisSettings(

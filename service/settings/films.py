@@ -18,12 +18,12 @@ class ChangeLimitSettings(Settings):
     """Magnitude, significance and duration of a stiffness change that raises an alarm."""
 
     alert_change: Share = ChangeLimits.alert_change
-    """Stiffness change in either direction, as a natural logarithm (0.035 is 3.5 %); a change that
-    exceeds it by one standard uncertainty is an alert."""
+    """Limit of the stiffness change in either direction, as a natural logarithm (0.035 is 3.5 %); a
+    change that exceeds the limit by one standard uncertainty is an alert."""
 
     danger_change: Share = ChangeLimits.danger_change
-    """Stiffness change, as a natural logarithm; a change that exceeds it by three standard
-    uncertainties is a danger. Must be above alert_change; example: 0.15."""
+    """Limit of the stiffness change, as a natural logarithm; a change that exceeds the limit by
+    three standard uncertainties is a danger. Must be above alert_change; example: 0.15."""
 
     deadband: Share = ChangeLimits.deadband
     """Amount by which a change must fall below its limit to leave the level; example: 0.01."""

@@ -36,16 +36,13 @@ class RegionSettings(Settings):
     states: StateNames | None = None
 
     eccentricity_ratio: Annotated[Bounds, Field(examples=[[0.6, 0.7]])] | None = None
-    """Range of the eccentricity ratio, within 0 to 5; unlimited by default; example: [0.35,
-    0.4]."""
+    """Range of the eccentricity ratio, within 0 to 5; any by default; example: [0.35, 0.4]."""
 
     oil_temperature_c: Annotated[Bounds, Field(examples=[[45.0, 47.5]])] | None = None
-    """Range of the oil temperature, °C, within -50 to 200; unlimited by default; example: [45.0,
-    47.5]."""
+    """Range of oil temperature, °C, within -50 to 200; any by default; example: [45.0, 47.5]."""
 
     attitude_deg: Annotated[Bounds, Field(examples=[[0.0, 90.0]])] | None = None
-    """Range of the attitude angle, degrees, within 0 to 360; unlimited by default; example: [0.0,
-    90.0]."""
+    """Range of attitude angle, degrees, within 0 to 360; any by default; example: [0.0, 90.0]."""
 
     @model_validator(mode="after")
     def _check_region(self) -> Self:

@@ -168,7 +168,7 @@ class AnalysisModel(Settings):
     minutes."""
 
     max_frequency_hz: Annotated[float, Field(gt=0.0, le=10_000.0)] = 25.0
-    """Maximum frequency of the stored spectra, Hz."""
+    """Maximum frequency of the spectra, Hz."""
 
     vortex_order: Annotated[float, Field(ge=0.05, le=0.9)] = 0.25
     """Nominal frequency of the part-load vortex in multiples of the running speed."""
@@ -241,7 +241,7 @@ class PlantFile(Settings):
     """HTTP server and data folder of the running program."""
 
     access: AccessSettings = AccessSettings()
-    """Login of people and programs."""
+    """Requirement and duration of logins."""
 
     analysis: AnalysisModel = AnalysisModel()
     """Segments, averaging and estimation."""
@@ -259,7 +259,7 @@ class PlantFile(Settings):
     """Continuous recording of all samples."""
 
     evidence: EvidenceSettings = EvidenceSettings()
-    """Evidence of alarms, apart from captured samples."""
+    """Evidence of alarms: size, age and number."""
 
     spectra: SpectraSettings = SpectraSettings()
     """Number and interval of stored spectra."""

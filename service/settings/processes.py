@@ -122,7 +122,7 @@ class StreamSettings(Settings):
 
     max_gb: Annotated[float, Field(ge=0.001, le=100_000.0)] = 20.0
     """Maximum size of the stream on each server, GB. While the stream is full, publishing fails and
-    blocks wait at the devices; no stored block is dropped."""
+    samples wait at the devices; stored blocks are not dropped."""
 
     max_age_h: Annotated[float, Field(ge=0.1, le=8760.0)] = 6.0
     """Age above which blocks are removed, h; should exceed the longest outage of the analysis. A

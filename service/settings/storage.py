@@ -152,8 +152,8 @@ class EvidenceSettings(Settings):
     """Age up to which evidence is kept while the total size is below hard_max_gb, days."""
 
     max_per_alarm: Annotated[int, Field(ge=1, le=100_000)] = 200
-    """Maximum number of occurrences of one alarm with evidence; limits that of a chattering
-    alarm."""
+    """Maximum number of occurrences of one alarm for which evidence is kept; limits the evidence of
+    a chattering alarm."""
 
     trend_days: Annotated[float, Field(ge=0.1, le=366.0)] = 14.0
     """Length of the film trend in the evidence of an alarm, days."""

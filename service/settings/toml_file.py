@@ -23,7 +23,7 @@ KEY = re.compile(r"^\s*([A-Za-z0-9_.-]+)\s*=")
 
 
 def line_of(location: Location, text: str) -> int:
-    """Return the line number of a key, or of the innermost enclosing table that has a header."""
+    """Return the line number of a key, or of the innermost enclosing table with its own line."""
     lines = dict(_lines(text))
     starts = (location[:n] for n in range(len(location), 0, -1))
     return next((lines[start] for start in starts if start in lines), 1)
@@ -195,8 +195,7 @@ MAX_FILE_BYTES = 4_000_000
 """Maximum file size. Limits the memory if the path is wrong, such as a device or a recording."""
 
 FOLDER = "folder"
-"""Key of the validation context for the folder of the file; paths in the file are relative to
-it."""
+"""Key of the validation context: folder of the file, base of relative paths in the file."""
 
 TOO_DEEP = "nested too deeply"
 

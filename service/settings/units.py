@@ -173,7 +173,7 @@ class UnitSettings(Settings):
     "modbus_polled" (registers), "modbus_vector" (a rack with amplitudes), "can" or "simulated"."""
 
     slow_source: SlowDeviceSettings | None = None
-    """Second device from which slow channels are polled."""
+    """Second device, from which slow channels are polled; none by default."""
 
     channel: Annotated[tuple[ChannelSettings, ...], Field(min_length=1, max_length=32)]
     """Waveform channels in the order of the device, at most 32."""

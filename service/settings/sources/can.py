@@ -40,7 +40,7 @@ class CanSettings(Settings):
     """Settings of a measuring device on a CAN or CAN FD bus; padwatch only listens."""
 
     kind: Literal["can"]
-    """Always "can"."""
+    """Kind of the source, always "can"."""
 
     interface: Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
     """Name of the interface in python-can; example: "socketcan", "slcan", "pcan", "kvaser"."""

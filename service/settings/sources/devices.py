@@ -142,8 +142,8 @@ class ModbusVectorSettings(MappedDeviceSettings):
     above n_polls."""
 
     min_polls: Annotated[int, Field(ge=2, le=100_000)] = 4
-    """Number of polls with a changed vector below which a result is uncertain; not above
-    n_polls."""
+    """Minimum number of polls with a changed vector; a result of fewer polls is uncertain; not
+    above n_polls."""
 
     @model_validator(mode="after")
     def _check_polls(self) -> Self:

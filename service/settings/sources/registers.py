@@ -169,7 +169,7 @@ class ValueSettings(CellSettings):
     """Linear scale from a range of raw numbers to a range of values."""
 
     flag: Annotated[tuple[FlagSettings, ...], Field(max_length=8)] = ()
-    """Status registers of the value."""
+    """Status registers that state whether the value is good, bad or clipped."""
 
     invalid_values: Annotated[tuple[float, ...], Field(max_length=16)] = ()
     """Raw numbers of invalid values; NaN is always invalid. Example: [0x8000]."""

@@ -11,7 +11,7 @@ class SimulatedDamageSettings(Settings):
     """Damage to one bearing of a simulated machine."""
 
     bearing: Literal["UJB", "LJB", "TJB"]
-    """Damaged bearing."""
+    """Name of the damaged bearing in the rotor model."""
 
     kind: Literal[
         "stiffness_loss",
@@ -89,13 +89,13 @@ class SimulatedBearingSettings(Settings):
     """Mean position of the shaft centre in y, µm."""
 
     centre_wander_um_rms: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
-    """Slow wander of the shaft centre in each direction, µm rms."""
+    """Slow random variation of the shaft centre in each direction, µm rms."""
 
     oil_temperature_c: Annotated[float, Field(ge=0.0, le=120.0)] = 45.0
     """Mean oil temperature, °C."""
 
     oil_temperature_wander_c_rms: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
-    """Slow wander of the oil temperature, K rms."""
+    """Slow random variation of the oil temperature, K rms."""
 
 
 OF_A_LIFE = ("held_load", "damage")
@@ -121,13 +121,13 @@ class SimulationSettings(SimulatedLifeSettings):
     """Seed of the random signals; the same seed gives identical samples."""
 
     speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)] | None = None
-    """Running speed, r/min."""
+    """Running speed of the machine, r/min."""
 
     power_mw: Annotated[float, Field(ge=-2000.0, le=2000.0)] | None = None
-    """Active power, MW."""
+    """Mean active power of the machine, MW."""
 
     power_wander_mw_rms: Annotated[float, Field(ge=0.0, le=200.0)] = 0.0
-    """Slow wander of the active power, MW rms."""
+    """Slow random variation of the active power, MW rms."""
 
     unbalance_grade_mm_s: Annotated[float, Field(ge=0.0, le=40.0)] = 4.25
     """ISO balance grade G in mm/s; G4.25 is a rotating force of 75.6 kN at 92.3 r/min."""
@@ -142,16 +142,16 @@ class SimulationSettings(SimulatedLifeSettings):
     """Rotating force of the part-load vortex rope on the runner, N."""
 
     rope_order: Annotated[float, Field(ge=0.1, le=0.9)] = 0.25
-    """Mean frequency of the rope in multiples of the running speed."""
+    """Mean frequency of the vortex rope in multiples of the running speed."""
 
     gap_noise_um_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
     """White noise of the proximity probe channels, µm rms."""
 
     velocity_noise_mm_s_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    """White noise of velocity channels, mm/s rms."""
+    """White noise of the velocity channels, mm/s rms."""
 
     acceleration_noise_m_s2_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    """White noise of acceleration channels, m/s² rms."""
+    """White noise of the acceleration channels, m/s² rms."""
 
     samples_per_slot: Annotated[int, Field(ge=1, le=4096)] = 50
     """Number of samples per channel in a slot of the simulated DAQ's block ring."""
