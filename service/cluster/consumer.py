@@ -158,9 +158,8 @@ class Consumer:
     async def _offer(self, unit: str, message: Msg) -> None:
         sequence = message.metadata.sequence.stream
         self.n_pending[unit] = message.metadata.num_pending
-        if (
-            sequence <= self._fetched[unit]
-        ):  # redelivered: still queued, or its acknowledgement was lost
+        # a redelivered message is still queued, or its acknowledgement was lost
+        if sequence <= self._fetched[unit]:
             if sequence <= self._settled.get(unit, 0):
                 with suppress(Error):
                     await message.ack()
@@ -178,9 +177,7 @@ class Consumer:
             refused = [m for m in batch if not await progress.take(_sequence(m), m.data)]
             await self._stored(progress)
             for message in batch:
-                with suppress(
-                    Error
-                ):  # results are stored: an unacknowledged message is redelivered
+                with suppress(Error):  # an unacknowledged message is redelivered
                     await (message.term() if message in refused else message.ack())
             self._settled[unit] = _sequence(batch[-1])
 

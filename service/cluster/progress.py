@@ -206,7 +206,7 @@ class UnitProgress:
         return self._stored is not None and self.sequence <= self._stored.sequence
 
     def fall_silent(self, after_s: float, trouble: str | None = None) -> None:
-        """Set the unit to not connected if no valid message has arrived for ``after_s``.
+        """Set the unit to not connected if no valid message has arrived for ``after_s`` seconds.
 
         ``trouble`` is the reason, if known.
         """
@@ -297,9 +297,8 @@ class UnitProgress:
 
     def _refuse(self, sequence: int, error: WireError) -> None:
         self._why_refused = str(error)
-        if (
-            self._stored is None or sequence > self._stored.sequence
-        ):  # already reported before the restart
+        # a message up to the stored position was already reported before the restart
+        if self._stored is None or sequence > self._stored.sequence:
             self._analyser.refuse(self.unit, str(error))
         if not self.refused[error.kind]:
             log.error("a message is refused", unit=self.unit, reason=str(error))

@@ -76,7 +76,7 @@ class Outbound:
 
     @property
     def behind_s(self) -> float:
-        """Time since a message was last acknowledged while messages are queued, s."""
+        """Time for which queued messages have waited without any acknowledgement, s."""
         return self._clock.monotonic_s() - self._last_s if self.n_waiting else 0.0
 
     async def put(self, unit: str, message: Outgoing) -> None:

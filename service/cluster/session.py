@@ -116,11 +116,7 @@ async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStrea
             watching = tasks.create_task(_ended(lost, settings), name="stream watch")
             yield client.jetstream(timeout=settings.ack_timeout_s)
             watching.cancel()
-    except* (
-        StreamError,
-        Error,
-        OSError,
-    ) as group:  # two except* clauses would raise an exception group
+    except* (StreamError, Error, OSError) as group:  # two clauses would raise an exception group
         raise _most_specific(group, settings) from None
     finally:
         await _closed(client)
