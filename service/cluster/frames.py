@@ -51,12 +51,12 @@ FINGERPRINT_BYTES = 16
 
 @dataclass(frozen=True)
 class UnitIdentity:
-    """Identity of a unit, which every message of the unit carries.
+    """Identity of a unit, part of every message of the unit.
 
     Parameters
     ----------
     plant
-        Fingerprint of the name of the plant.
+        Hash of the name of the plant.
     make
         Fingerprint of unit id, rate, source and channels; with others, samples are misinterpreted.
     """

@@ -97,8 +97,8 @@ MAY_ARRIVE = (LinkState.CONNECTING, LinkState.CONNECTED)
 class UnitProgress:
     """Processor of the messages of one unit, in order and each once.
 
-    Messages up to the stored position are replayed without results, which restores the state of the
-    monitor. Later messages are processed as if the process had never stopped.
+    Messages up to the stored position are replayed without publishing results, which restores the
+    state of the monitor. Later messages are processed as if the process had never stopped.
 
     Parameters
     ----------
@@ -227,7 +227,8 @@ class UnitProgress:
     def _is_done(self, message: Taken | LinkNews) -> bool:
         """Return whether the results of a block are already stored; False from the first new block.
 
-        A second analysis on another grid of segments would store results twice.
+        After the first new block the result is always False. A second analysis, with differently
+        placed segments, would store results twice.
         """
         if self._done is None or isinstance(message, LinkNews):
             return False
@@ -287,9 +288,8 @@ class UnitProgress:
 
     def _refuse(self, sequence: int, error: WireError) -> None:
         self._why_refused = str(error)
-        if (
-            self._stored is None or sequence > self._stored.sequence
-        ):  # otherwise it was reported then
+        # a message up to the stored position was already reported before the restart
+        if self._stored is None or sequence > self._stored.sequence:
             self._analyser.refuse(self.unit, str(error))
         if not self.refused[error.kind]:
             log.error("a message is refused", unit=self.unit, reason=str(error))

@@ -56,8 +56,8 @@ class Outgoing:
 class Outbound:
     """Queue of messages to publish, for each unit, with a common capacity in bytes.
 
-    `put` waits while ``capacity`` bytes are queued. The ring of the device buffers samples
-    meanwhile, and if it overruns, the index of the next block shows the exact gap.
+    `put` waits while ``capacity`` bytes are queued. Meanwhile the ring of the device buffers
+    samples; if the ring overruns, the sample index of the next block shows the exact gap.
     """
 
     def __init__(self, units: Iterable[str], capacity: int, clock: Clock) -> None:
@@ -104,7 +104,7 @@ class Outbound:
         return self._waiting[unit][0]
 
     async def published(self, unit: str) -> None:
-        """Remove the oldest message of a unit, which the servers have confirmed."""
+        """Remove the oldest message of a unit after its acknowledgement by the servers."""
         message = self._waiting[unit].popleft()
         self.n_bytes -= len(message.payload)
         self.n_published += 1
@@ -128,7 +128,7 @@ MAX_UNCONFIRMED = 3
 """Number of consecutive unconfirmed attempts after which the connection is renewed."""
 
 STREAM_FULL = (10047, 10077, 10023)
-"""Error codes of the servers: no storage, maximum bytes exceeded, insufficient resources."""
+"""JetStream error codes: no storage, maximum bytes exceeded, insufficient resources."""
 
 BYTES_PER_MB = 1e6
 
@@ -137,7 +137,7 @@ class Publisher:
     """Publisher of the blocks and link states of all units on the stream.
 
     One message per unit is sent at a time, so that the messages of a unit arrive in order. A
-    message that was not confirmed is sent again with the same id.
+    message that is not acknowledged is sent again with the same id.
     """
 
     def __init__(

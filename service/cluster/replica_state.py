@@ -99,7 +99,7 @@ class ReplicaLive:
         self._latest[unit] = replace(latest, beat=beat, sent_s=sent_s, signs=signs, status=status)
 
     def set_results(self, unit: str, results: Mapping[str, BearingState]) -> None:
-        """Set the newest results of a unit."""
+        """Set the newest results of a unit, by bearing."""
         self.revision += 1
         found = {
             bearing: Assessment(unit, bearing, spectrum=NO_SPECTRUM, orbit=None, **vars(state))

@@ -67,7 +67,7 @@ class CommandClient:
             raise BaselineRefusedError(answer.words)
 
     async def refer_to(self, reference: VectorReference) -> None:
-        """Put a stored reference of 1× vectors in force."""
+        """Activate a stored reference of 1× vectors in the analysing process."""
         await self._send(reference.unit, ReferenceCommand(reference.unit), acting().actor)
 
     async def _send(self, unit: str, task: OperatorCommand, actor: str) -> Answer:
@@ -171,7 +171,7 @@ class CommandWorker:
         answer = self._why_not(found)
         if answer is None:
             if not await asyncio.to_thread(commands.take, command.id, self._process):
-                return  # withdrawn meanwhile
+                return  # the sender has withdrawn the command
             answer = await self._carry_out(command)
         await asyncio.to_thread(commands.answer, command.id, answer, self._clock.now_ns())
 

@@ -185,7 +185,7 @@ class Feed:
         self._trouble = TroubleLog("units cannot be read", "units can be read again")
 
     async def start(self) -> None:
-        """Read the stored alarms and the reports before the first request.
+        """Read the stored alarms and the reports, before the first request is served.
 
         Raises `StoreError` if the database cannot be read.
         """

@@ -33,7 +33,7 @@ class StreamError(Exception):
 
 
 class StreamMisfitError(StreamError):
-    """Servers, stream and plant file do not match; the message states what to do."""
+    """NATS servers, stream and plant file do not match; the message states the remedy."""
 
 
 class StreamAnewError(Exception):
@@ -172,7 +172,7 @@ async def _closed(client: Client) -> None:
     """Close a client within `CONNECT_S`, even if the server does not answer."""
     with suppress(Error, OSError, TimeoutError):
         await asyncio.wait_for(client.close(), CONNECT_S)
-    # the library leaves the socket open if the server disconnects while data is being sent
+    # the NATS client leaves the socket open if the server disconnects while data is being sent
     transport = client._transport  # noqa: SLF001
     if transport is not None:
         transport.close()  # type: ignore[no-untyped-call]
@@ -272,8 +272,8 @@ def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:
 async def ensure(stream: JetStreamContext, plant: PlantFile, settings: StreamSettings) -> None:
     """Create the stream of a plant, or update the limits of an existing stream.
 
-    Raises `StreamMisfitError` if JetStream is off, or the stream belongs to another plant or cannot
-    be configured.
+    Raises `StreamMisfitError` if JetStream is disabled, or if the stream belongs to another plant
+    or cannot be configured.
     """
     config, found = wanted(plant, settings), await _info(stream, plant)
     if found is None:

@@ -1,1 +1,1 @@
-"""The plant file: models with meaning, unit and limits of every key, and reading of the file."""
+"""Plant file: pydantic models that document and validate every key, and the TOML parser."""

@@ -1,4 +1,4 @@
-"""Conversion of source settings to values of the acquisition adapters."""
+"""Conversion of the source settings to settings of the acquisition adapters."""
 
 from pathlib import Path
 from typing import Any
@@ -63,7 +63,7 @@ def can_settings_of(unit: UnitSettings, source: settings.CanSettings) -> CanSett
 
 
 def can_link_of(source: settings.CanSettings) -> CanLinkSettings:
-    """Return the connection settings of a bus."""
+    """Return the connection settings of a CAN bus."""
     return CanLinkSettings(
         interface=source.interface,
         channel=source.channel,
@@ -77,7 +77,7 @@ def can_link_of(source: settings.CanSettings) -> CanLinkSettings:
 def can_shape_of(unit: UnitSettings, source: settings.CanSettings) -> CanShape:
     """Return the messages of the simulated CAN DAQ for the channels of a unit.
 
-    Raises `LookupError` if the source of the unit reads other messages.
+    Raises `LookupError` if the source of the unit reads CAN by a DBC file instead of a profile.
     """
     if source.profile is None:
         raise LookupError(
@@ -113,14 +113,14 @@ def can_daq_of(
     Parameters
     ----------
     clock
-        Clock that paces the device; without one it produces as fast as its reader reads.
+        Clock that paces the device; if None, the device produces samples as fast as they are read.
     patient
-        Whether the device waits for its reader.
+        Whether the device waits for a slow reader.
 
     Raises
     ------
     ConfigError, LookupError
-        If the source cannot read a simulated DAQ.
+        If the source cannot be connected to a simulated DAQ.
     """
     device = CanDevice(feed, can_shape_of(unit, source), unit.id, block_samples=unit.block_samples)
     waiting: dict[str, Any] = {"on_demand": clock is None, "patient": patient}
@@ -150,16 +150,16 @@ def _listed(signals: str | tuple[str, ...]) -> tuple[str, ...]:
 
 
 def require_dbc_fits(unit: UnitSettings) -> None:
-    """Check the DBC file of a unit that reads CAN, without opening a bus.
+    """Check the DBC file of a unit with a CAN source, without opening a bus.
 
-    Raises `ConfigError` if it does not fit the unit; the message names file and key.
+    Raises `ConfigError` if the DBC file does not match the unit; the message names file and key.
     """
     if isinstance(unit.source, settings.CanSettings):
         compile_plan(can_settings_of(unit, unit.source), calibration_of(unit))
 
 
 def recorded_unit(unit: UnitSettings) -> RecordedUnit:
-    """Return channels and calibration of a unit for the manifest of its recordings."""
+    """Return the channels and the calibration of a unit for the manifests of its recordings."""
     return RecordedUnit(
         unit=unit.id,
         rate_hz=unit.sampling_hz,
@@ -190,11 +190,11 @@ def identity_of(settings: IdentitySettings | None) -> Identity | None:
 
 
 RING_REQUESTS_IN_FLIGHT = 6
-"""Requests of one poll of 12 channels."""
+"""Default number of concurrent requests to a block ring: one poll of 12 channels."""
 
 
 def transport_of(source: ModbusLinkSettings) -> Transport:
-    """Return the transport of a Modbus device: network or serial line."""
+    """Return the transport of a Modbus device: TCP or serial line."""
     if source.host is not None:
         return TcpTransport(host=source.host, port=source.port)
     return SerialTransport(
@@ -206,7 +206,7 @@ def transport_of(source: ModbusLinkSettings) -> Transport:
 
 
 def link_fields(source: ModbusLinkSettings) -> dict[str, Any]:
-    """Return connection and identity of a device, which all Modbus settings share."""
+    """Return the connection and identity fields that the settings of all Modbus adapters share."""
     is_per_reply = isinstance(source, MappedDeviceSettings) and source.connection == "per_reply"
     return {
         "transport": transport_of(source),

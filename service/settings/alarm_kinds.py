@@ -1,4 +1,4 @@
-"""Table of all kinds of alarms: those of units and those about the service."""
+"""Table of all alarm kinds: kinds of the units and kinds of the service."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -9,10 +9,10 @@ from core.alarms.kinds import AlarmKind, kind_table
 
 STORE, SERVICE, CAPTURES, DISK = "store", "service", "captures", "disk"
 RECORDINGS, STREAM, UNIT = "recordings", "stream", "unit"
-"""Subjects of alarms about the service; an alarm has the name of a unit instead of `UNIT`."""
+"""Subjects of alarms of the service; the subject `UNIT` stands for the id of a unit."""
 
 SAMPLES_LOST, ANALYSIS_GONE, MESSAGES_REFUSED = "samples_lost", "analysis_gone", "messages_refused"
-"""Kinds with one alarm for each unit."""
+"""Kinds of the service with one alarm for each unit."""
 
 OVERLOAD_ADVICE = "This computer is overloaded; stop other programs on it."
 
@@ -78,11 +78,11 @@ SERVICE_KINDS = kind_table(
     AlarmKind("stream_away", "Stream does not answer", None, STREAM, "steady", "stream_trouble"),
     AlarmKind(ANALYSIS_GONE, "No process analyses this unit", None, UNIT, "at_once"),
 )
-"""The service's own kinds. `rule` is a field of `ServiceRules`, `reading` a key of
-`ServiceHealth.readings`: a value that is compared with limits, or the text of a fault."""
+"""Alarm kinds of the service. `rule` is a field of `ServiceRules`; `reading` is a key of
+`ServiceHealth.readings`, whose value is compared with limits or is the text of a fault."""
 
 DANGER_KINDS = frozenset(("stored_data_damaged", "stream_away"))
-"""Kinds whose fault is a danger; the fault of any other kind is an alert."""
+"""Kinds of the service whose fault is a danger; a fault of any other kind is an alert."""
 
 ALARM_KINDS: Mapping[str, AlarmKind] = MappingProxyType({**units.ALARM_KINDS, **SERVICE_KINDS})
 
@@ -95,22 +95,22 @@ if TYPE_CHECKING:
     AlarmKindName = str
 else:
     AlarmKindName = Literal[tuple(ALARM_KINDS)]
-"""Name of a kind, checked on input."""
+"""Name of an alarm kind, validated by pydantic."""
 
 
 def kind_label(kind: str) -> str:
-    """Return the label of a kind; the name in words if the kind is unknown."""
+    """Return the label of an alarm kind; for an unknown kind, the name with spaces."""
     found = ALARM_KINDS.get(kind)
     return kind.replace("_", " ") if found is None else found.label
 
 
 def kind_words(kind: str) -> str:
-    """Return the label for use within a sentence, such as "shaft vibration 1×, x"."""
+    """Return the label with a lower-case initial, such as "shaft vibration 1×, x"."""
     label = kind_label(kind)
     return label[:1].lower() + label[1:]
 
 
 def value_unit(kind: str) -> str | None:
-    """Return the unit of the values of a kind."""
+    """Return the unit of the values of an alarm kind; None if the kind has no value."""
     found = ALARM_KINDS.get(kind)
     return None if found is None else found.unit

@@ -1,4 +1,4 @@
-"""Alarms and captures in the plant file."""
+"""Settings of alarms and captures."""
 
 from typing import Annotated, Literal, Self
 
@@ -20,35 +20,35 @@ from service.settings.limits import (
 
 
 class BearingAlarmSettings(Settings):
-    """Limits of a bearing; a quantity without limits raises no alarm."""
+    """Alarm limits of a bearing; a quantity without limits raises no alarm."""
 
     shaft_order1_um_pk: AmplitudeLimitSettings | None = None
-    """Limits of the relative shaft vibration at 1×, in x and in y each."""
+    """Limits of the 1× amplitude of the relative shaft vibration, in x and in y each."""
 
     shaft_overall_um_pp: SpanLimitSettings | None = None
     """Limits of the relative shaft vibration, broad-band peak-to-peak, in x and in y each."""
 
     bearing_overall_mm_s_rms: VelocityLimitSettings | None = None
-    """Limits of the bearing's velocity, broad-band rms, in x and in y each."""
+    """Limits of the vibration velocity of the bearing, broad-band rms, in x and in y each."""
 
     eccentricity_ratio: EccentricityLimitSettings | None = None
-    """Limits of the shaft's eccentricity as a share of the clearance."""
+    """Limits of the eccentricity ratio: eccentricity of the shaft over radial clearance."""
 
     gap_um: GapLimitSettings | None = None
-    """Limits of the mean gap of each probe, above and below."""
+    """Upper and lower limits of the mean gap of each probe."""
 
     shaft_order1_change_um_pk: VectorChangeLimitSettings | None = None
-    """Limits of the distance of the shaft's 1× vector from its reference, in x and in y each."""
+    """Limits of the change of the shaft's 1× vector from its reference, in x and in y each."""
 
     bearing_order1_change_um_pk: VectorChangeLimitSettings | None = None
-    """Limits of the distance of the bearing's 1× vector from its reference, in x and in y each."""
+    """Limits of the change of the bearing's 1× vector from its reference, in x and in y each."""
 
     order1_reference: Annotated[tuple[VectorReferenceSettings, ...], Field(max_length=6)] = ()
-    """1× vectors of the healthy machine by operating state. A reference that an engineer has set on
-    the running machine takes precedence in its state."""
+    """Reference 1× vectors of the healthy machine, by operating state. A reference that an engineer
+    sets on the running machine takes precedence in its operating state."""
 
     zones: ZonesSettings = ZonesSettings()
-    """Evaluation zones after ISO 20816-5."""
+    """Evaluation zones according to ISO 20816-5."""
 
     oil_temperature_c: TemperatureLimitSettings | None = None
     """Limits of the oil temperature."""
@@ -64,13 +64,14 @@ class BearingAlarmSettings(Settings):
 
 
 class AlarmSettings(Settings):
-    """Delays and limits of the alarms of every unit."""
+    """Delays and limits of alarms that apply to all units."""
 
     channel_on_delay_s: DelayS = 0.5
-    """Time for which a channel must be bad, in seconds of the samples' time."""
+    """Time for which a channel must be bad to raise its alarm, s, in time of the samples."""
 
     slow_channel_on_delay_s: DelayS = 5.0
-    """Time for which a slow channel that a limit needs must be bad, s of the samples' time."""
+    """Time for which a slow channel that a limit depends on must be bad to raise its alarm, s, in
+    time of the samples."""
 
     channel_off_delay_s: DelayS = 10.0
     """Time for which a channel must be good again for the alarm to return, s."""
@@ -79,59 +80,66 @@ class AlarmSettings(Settings):
     """Time without samples after which the link to a device counts as lost, s."""
 
     clock: Literal["judged", "ignored"] = "judged"
-    """Whether the clocks of the devices are "judged" against that of this host or "ignored"."""
+    """Whether the clocks of the devices are "judged" against the clock of this host or
+    "ignored"."""
 
     max_clock_offset_s: Annotated[float, Field(gt=0.0, le=1e9)] = 2.0
-    """Maximum offset of a device's time stamps from the host's clock for half a minute, s."""
+    """Offset of a device's time stamps from the host's clock above which an alarm is raised, s; the
+    offset must last for half a minute."""
 
     max_clock_drift_ppm: Annotated[float, Field(gt=0.0, le=1e6)] = 200.0
-    """Maximum deviation of a device's sampling rate from its nominal rate for a minute, by the
-    host's clock and beyond the uncertainty, parts per million."""
+    """Deviation of a device's sampling rate from its nominal rate above which an alarm is raised,
+    parts per million. The deviation is measured by the host's clock, is reduced by its uncertainty,
+    and must last for a minute."""
 
     chattering_activations: Annotated[int, Field(ge=2, le=100)] = 3
     """Number of activations within chattering_window_s that make an alarm chattering; ISA-18.2
     defines 3 or more in a minute."""
 
     chattering_window_s: Annotated[float, Field(ge=1.0, le=3600.0)] = 60.0
-    """Window of these activations, s; an alarm that is active for less is fleeting."""
+    """Time window in which activations are counted, s; an alarm that is active for a shorter time
+    is fleeting."""
 
     store_failing_after_s: DelayS = 10.0
-    """Time for which results may wait for a failing store, s."""
+    """Time for which results wait for a failing store, above which an alarm is raised, s."""
 
     max_analysis_delay_s: Annotated[float, Field(gt=0.0, le=3600.0)] = 5.0
-    """Maximum delay of the analysis, s."""
+    """Time for which samples wait for the analysis, above which an alarm is raised, s."""
 
     max_waiting_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.5
-    """Maximum filled share of the queue from acquisition to analysis; above 0.9 it is a danger."""
+    """Filled share of the queue from acquisition to analysis above which an alert is raised; above
+    0.9 the alarm is a danger."""
 
     max_samples_lost_share: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.05
-    """Maximum share of a unit's samples lost or refused in ten minutes; 0.05 is half a minute."""
+    """Share of a unit's samples lost or refused in ten minutes above which an alarm is raised; 0.05
+    is half a minute."""
 
     max_shelf_h: Annotated[float, Field(gt=0.0, le=8760.0)] = 24.0
-    """Longest time for which an alarm can be shelved, hours."""
+    """Maximum time for which an alarm can be shelved, hours."""
 
 
 class CaptureSettings(Settings):
-    """Captures: recordings of the samples around an alarm, in the data folder."""
+    """Settings of captures: recordings of the samples around an alarm, in the data folder."""
 
     samples: Literal["kept", "not_kept"] = "kept"
     """Whether samples are "kept" or "not_kept" when an alarm of a channel, an amplitude or a
     temperature is raised."""
 
     pre_s: Annotated[float, Field(ge=0.0, le=600.0)] = 60.0
-    """Time before the alarm, s. Samples of this length are held in memory for every unit: 12
-    channels at 600 Hz take 1.7 MB a minute. With monitored films the time is at least one averaging
-    window, as far as max_s allows, because their alarms depend on all of it."""
+    """Recorded time before the alarm, s. The samples of this time are held in memory for every
+    unit: 12 channels at 600 Hz take 1.7 MB a minute. If films are monitored, the time is at least
+    one averaging window, as far as max_s allows, because a film alarm depends on the whole
+    window."""
 
     post_s: Annotated[float, Field(ge=1.0, le=3600.0)] = 120.0
-    """Time after the alarm, s."""
+    """Recorded time after the alarm, s."""
 
     max_s: Annotated[float, Field(ge=1.0, le=7200.0)] = 600.0
-    """Longest recording, s; further alarms prolong a recording up to this length."""
+    """Maximum length of a capture, s; further alarms prolong a capture up to this length."""
 
     max_gb: Annotated[float, Field(gt=0.0, le=100_000.0)] = 10.0
-    """Total size, GB (10^9 bytes); above it the oldest are removed, and those that evidence refers
-    to last."""
+    """Maximum total size of the captures, GB (10^9 bytes); above it the oldest captures are
+    removed. Captures that evidence refers to are removed last."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -1,4 +1,4 @@
-"""Base class of settings, errors and shared checks."""
+"""Base class of the settings models, their validation errors, and shared checks."""
 
 import re
 from collections.abc import Iterable
@@ -7,16 +7,16 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, StringConstraints, field_validator
 
 CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f-\x9f]")
-"""Control characters except the tab, which may separate columns of an imported file."""
+"""Control characters except the tab, which is a valid column delimiter of an imported file."""
 
 
 class MisfitError(ValueError):
-    """A value that contradicts other values of the file.
+    """Validation error: a value is wrong, or contradicts other values of the file.
 
     Parameters
     ----------
     at
-        Location of the value relative to the model that refuses it: keys and element numbers.
+        Location of the value relative to the model that raises the error: keys and array indices.
     """
 
     def __init__(self, message: str, *at: int | str) -> None:
@@ -25,19 +25,19 @@ class MisfitError(ValueError):
 
 
 class MissingError(MisfitError):
-    """A key that other keys of the file require."""
+    """Validation error: a key is missing that other keys of the file require."""
 
 
 class SecretMisfitError(MisfitError):
-    """A wrong value that may contain a secret and is not shown."""
+    """Validation error whose message omits the value, because the value may contain a secret."""
 
 
 Identifier = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
-"""Letters, digits, dot, dash and underscore; at most 32 characters."""
+"""Identifier of letters, digits, dot, dash and underscore; at most 32 characters."""
 
 
 class Settings(BaseModel):
-    """Base of all settings: frozen, no unknown keys, no NaN or infinity; fields have docstrings."""
+    """Base class of all settings: frozen; unknown keys, NaN and infinity are errors."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", allow_inf_nan=False, use_attribute_docstrings=True
@@ -46,14 +46,14 @@ class Settings(BaseModel):
     @field_validator("*")
     @classmethod
     def _has_no_control_characters(cls, value: Any) -> Any:
-        """Refuse control characters in names, which are printed, and NUL in paths."""
+        """Refuse control characters: names are printed, and paths must not contain NUL."""
         if isinstance(value, str) and CONTROL.search(value):
             raise SecretMisfitError("must not have control characters")
         return value
 
 
 def refuse_twice(entries: Iterable[tuple[int | str, ...]]) -> None:
-    """Refuse duplicate values; each entry is the location of a value and the value."""
+    """Refuse duplicate values; each entry is the location of a value, followed by the value."""
     seen: set[int | str] = set()
     for *at, value in entries:
         if value in seen:
@@ -62,7 +62,7 @@ def refuse_twice(entries: Iterable[tuple[int | str, ...]]) -> None:
 
 
 def refuse_unknown_units(units: Iterable[str], known: Iterable[str], *at: int | str) -> None:
-    """Refuse a unit that the plant does not have."""
+    """Refuse the id of a unit that is not in the plant file."""
     for n, unit in enumerate(units):
         if unit not in known:
             raise MisfitError(f"is no unit of this plant, it has {', '.join(known)}", *at, n)

@@ -1,4 +1,4 @@
-"""A guide bearing in the plant file."""
+"""Settings of a guide bearing."""
 
 from typing import Annotated, Self
 
@@ -13,24 +13,25 @@ MicrometrePair = tuple[
 ]
 
 CHANNEL_KEYS = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
-"""The keys of a bearing that name waveform channels."""
+"""Required keys of a bearing whose values are ids of waveform channels."""
 
 OPTIONAL_CHANNEL_KEYS = ("opposite_x", "opposite_y")
-"""Optional keys that name waveform channels."""
+"""Optional keys of a bearing whose values are ids of waveform channels."""
 
 GAP_KEYS = ("gap_x", "gap_y", "opposite_gap_x", "opposite_gap_y")
-"""The keys that name slow channels of gaps."""
+"""Keys of a bearing whose values are ids of slow channels of gaps."""
 
 
 class BearingSettings(Settings):
-    """A guide bearing: bracket, clearance and channels."""
+    """Settings of a guide bearing: bracket, clearance, channels and alarm limits."""
 
     id: Identifier
-    """Unique within the unit: "UJB", "LJB", "TJB" for upper, lower and turbine journal bearing."""
+    """Id of the bearing, unique within the unit; example: "UJB", "LJB", "TJB" for upper, lower and
+    turbine journal bearing."""
 
     bracket_stiffness_n_per_m: Annotated[float, Field(ge=1e7, le=1e12)]
     """Radial stiffness of the bracket in N/m, between 1e7 and 1e12; example: 1.18e9. Every result
-    of equation (5) is proportional to it."""
+    of equation (5) is proportional to the bracket stiffness."""
 
     clearance_um: Annotated[float, Field(ge=20.0, le=5000.0)]
     """Radial clearance in operation in µm, 20 to 5000; example: 200.0."""
@@ -51,28 +52,28 @@ class BearingSettings(Settings):
     """Channel of the bearing's absolute vibration in y."""
 
     oil_temperature: Identifier | None = None
-    """Slow channel (degC) of the oil temperature, if measured."""
+    """Slow channel (degC) of the oil temperature; none by default."""
 
     gap_x: Identifier | None = None
-    """Slow channel (mm) of the x gap; without it the mean of a proximity probe is the gap;
-    example: "ujb_gap_x"."""
+    """Slow channel (mm) of the gap in x; by default the gap is the mean of the proximity probe
+    shaft_x. Example: "ujb_gap_x"."""
 
     gap_y: Identifier | None = None
-    """Slow channel (mm) of the y gap; example: "ujb_gap_y"."""
+    """Slow channel (mm) of the gap in y; example: "ujb_gap_y"."""
 
     opposite_x: Identifier | None = None
-    """Proximity probe opposite to shaft_x, which separates shaft motion from thermal growth;
-    example: "ujb_shaft_minus_x"."""
+    """Channel of the proximity probe opposite to shaft_x. The two probes together separate shaft
+    position from thermal growth. Example: "ujb_shaft_minus_x"."""
 
     opposite_y: Identifier | None = None
-    """Proximity probe opposite to shaft_y; example: "ujb_shaft_minus_y"."""
+    """Channel of the proximity probe opposite to shaft_y; example: "ujb_shaft_minus_y"."""
 
     opposite_gap_x: Identifier | None = None
-    """Slow channel (mm) of the gap opposite x; without it the mean of opposite_x is the gap;
-    example: "ujb_gap_minus_x"."""
+    """Slow channel (mm) of the gap opposite to x; by default the gap is the mean of opposite_x.
+    Example: "ujb_gap_minus_x"."""
 
     opposite_gap_y: Identifier | None = None
-    """Slow channel (mm) of the gap opposite y; example: "ujb_gap_minus_y"."""
+    """Slow channel (mm) of the gap opposite to y; example: "ujb_gap_minus_y"."""
 
     opposite_reference_um: MicrometrePair | None = None
     """Gaps [x, y] in µm of the opposite probes with the shaft centred; example:
@@ -82,11 +83,12 @@ class BearingSettings(Settings):
     """Half-width of the error of the reference gaps, µm."""
 
     thermal_growth_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 50.0
-    """Half-width of the common thermal growth of all gaps since the reference, µm; used without
-    opposite probes."""
+    """Half-width of the common thermal growth of all gaps since the reference gaps were measured,
+    µm; used without opposite probes."""
 
     thermal_growth_change_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 20.0
-    """Half-width of the change of growth since opposite probes last measured it, µm."""
+    """Half-width of the change of thermal growth since the last measurement with opposite probes,
+    µm."""
 
     clearance_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.05
     """Half-width of the relative error of the clearance."""
@@ -95,8 +97,9 @@ class BearingSettings(Settings):
     """Half-width of the relative error of the bracket's stiffness; example: 0.10."""
 
     bracket_mass_kg: Annotated[float, Field(gt=0.0, le=1e7)] | None = None
-    """Effective mass of bracket and bearing, kg; by default the estimator "dynamic" fits it with
-    the film, with a larger uncertainty. Equation (5) does not use it. Example: 45.0e3."""
+    """Effective mass of bracket and bearing, kg; by default the estimator "dynamic" fits the mass
+    together with the film coefficients, with a larger uncertainty. Equation (5) does not use the
+    mass. Example: 45.0e3."""
 
     bracket_mass_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.2
     """Half-width of the relative error of bracket_mass_kg; example: 0.2."""
@@ -109,28 +112,29 @@ class BearingSettings(Settings):
     0.02."""
 
     cross_coupling_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.3
-    """Half-width of the ratio of cross-coupled to direct film stiffness, which transfer and
-    equation (5) neglect; example: 0.3."""
+    """Half-width of the ratio of cross-coupled to direct film stiffness. The transfer estimators
+    and equation (5) neglect the cross-coupled stiffness. Example: 0.3."""
 
     delay_uncertainty_s: Annotated[float, Field(ge=0.0, le=0.1)] = 2e-4
-    """Half-width of the unknown delay of the bearing channels against the shaft channels, s; known
-    delays are set by delay_s of a channel. Example: 0.0002."""
+    """Half-width of the unknown delay of the bearing channels relative to the shaft channels, s;
+    known delays are set by delay_s of a channel. Example: 0.0002."""
 
     runout_um_pk: Annotated[float, Field(ge=0.0, le=1000.0)] = 6.0
-    """Largest runout of the shaft's surface at 1×, µm zero-to-peak. It increases the uncertainty of
-    1×; a shaft motion below four times the runout gives no stiffness. Example: 10.0."""
+    """Maximum runout of the shaft surface at 1×, µm zero-to-peak. The runout increases the
+    uncertainty of the 1× vector; no stiffness is computed from shaft motion below four times the
+    runout. Example: 10.0."""
 
     preference: Annotated[tuple[Estimator, ...], Field(min_length=1, max_length=5)] = PREFERENCE
-    """Estimators of the stiffness for trends and alarms, best first; the first with the best
-    quality is used. "dynamic", "transfer_vortex", "transfer_order1", "ratio_vortex",
-    "ratio_order1"."""
+    """Order of preference of the stiffness estimators for trends and alarms: "dynamic",
+    "transfer_vortex", "transfer_order1", "ratio_vortex", "ratio_order1". Of the estimators with the
+    best quality, the first is used."""
 
     watched_estimator: Estimator | None = None
     """Estimator whose stiffness is compared with its baseline; by default the first of preference,
-    or "ratio_order1" for a rack with amplitudes. Another estimator needs another baseline."""
+    or "ratio_order1" for a rack with amplitudes. A different estimator requires a new baseline."""
 
     alarms: BearingAlarmSettings = BearingAlarmSettings()
-    """Limits of alarms; none by default."""
+    """Alarm limits of the bearing; none by default."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -1,4 +1,4 @@
-"""Waveform and slow channels of a unit, and the slow-roll runout of a channel."""
+"""Settings of the waveform and slow channels of a unit, and of the slow-roll runout."""
 
 import cmath
 import math
@@ -14,29 +14,30 @@ from service.settings.base import Identifier, MisfitError, MissingError, Setting
 from service.settings.transducers import ResponseSettings
 
 ProbeName = Annotated[str, StringConstraints(min_length=1, max_length=80)]
-"""Serial number or another unique mark of a probe."""
+"""Serial number or other unique mark of a probe."""
 
 
 class SlowRollSettings(Settings):
-    """Slow-roll vector: reading of a probe at 1× at a speed too low for vibration."""
+    """Slow-roll vector: 1× reading of a probe at a speed that is too low for vibration."""
 
     um_pk: Annotated[float, Field(ge=0.0, le=1000.0)]
     """Amplitude, µm zero-to-peak; example: 8.0."""
 
     phase_deg: Annotated[float, Field(ge=-360.0, le=360.0)]
-    """Phase of the displacement along the bearing's axis when the mark passes the key-phase
-    pick-up, degrees, positive where it leads. An instrument that shows phase lag, from the pulse to
-    the next positive peak (API 670), gives this with the other sign. Example: 30.0."""
+    """Phase of the displacement along the bearing axis relative to the key-phase pulse, degrees,
+    positive for lead. An instrument that shows phase lag, from the pulse to the next positive peak
+    (API 670), shows this phase with the opposite sign. Example: 30.0."""
 
     speed_rpm: Annotated[float, Field(gt=0.0, le=1500.0)]
-    """Speed of the measurement, r/min, at most a quarter of the rated speed to be used; example:
-    8.0."""
+    """Speed of the measurement, r/min. The vector is used only if this speed is at most a quarter
+    of the rated speed. Example: 8.0."""
 
     taken: AwareDatetime
-    """Time of the measurement, with offset; example: 2026-03-01T10:00:00Z."""
+    """Time of the measurement, with time zone; example: 2026-03-01T10:00:00Z."""
 
     probe: ProbeName
-    """Probe of the measurement; the vector is not used with another probe. Example: "SN123"."""
+    """Serial number or mark of the measured probe; the vector is not used for other probes.
+    Example: "SN123"."""
 
     def vector(self, channel: str) -> SlowRollVector:
         """Return the vector as a value of core."""
@@ -92,7 +93,7 @@ V_PER_ENGINEERING_UNIT = {
     SensitivityUnit.MV_PER_M_S2: 1e-3,
     SensitivityUnit.MV_PER_G: 1e-3 / STANDARD_GRAVITY_M_S2,
 }
-"""Volts per µm, mm/s or m/s² of a sensitivity of one."""
+"""Factors from a sensitivity in each unit to volts per µm, mm/s or m/s²."""
 
 PLAUSIBLE_V_PER_UNIT = {
     Transducer.PROXIMITY_PROBE: (0.5e-3, 50e-3),
@@ -100,7 +101,8 @@ PLAUSIBLE_V_PER_UNIT = {
     Transducer.VELOCITY: (0.5e-3, 2.0),
     Transducer.ACCELEROMETER: (0.5e-3, 2.0),
 }
-"""Range of the sensitivities of available transducers; others are mistakes of unit."""
+"""Ranges of plausible sensitivities, V per µm, mm/s or m/s²; a value outside its range indicates a
+wrong unit."""
 
 LINE_FLOORS = {
     Transducer.PROXIMITY_PROBE: 0.1,
@@ -109,10 +111,10 @@ LINE_FLOORS = {
     Transducer.ACCELEROMETER: 2e-5,
     Transducer.KEY_PHASE: 0.0,
 }
-"""Amplitude of the noise of a transducer in a line, 0-to-peak in µm, mm/s or m/s²."""
+"""Noise amplitude of each transducer in a spectral line, zero-to-peak in µm, mm/s or m/s²."""
 
 SHAFT_TRANSDUCERS = (Transducer.PROXIMITY_PROBE, Transducer.DISPLACEMENT)
-"""Transducers that measure the shaft, including its runout."""
+"""Transducers that measure shaft motion and therefore also runout."""
 
 SCALE_KEYS_V = ("full_scale_v", "ok_min_v", "ok_max_v")
 SCALE_KEYS_COUNTS = ("unit_per_count", "ok_min", "ok_max")
@@ -121,75 +123,80 @@ NO_KEY_PHASE_KEYS = (
     *("sensitivity", "sensitivity_unit", "response", "delay_s", "line_floor", "probe"),
     "slow_roll",
 )
-"""Keys that do not apply to pulses, whose height has no meaning."""
+"""Keys that do not apply to a key_phase channel, because the height of its pulses has no
+meaning."""
 
 
 class ChannelSettings(Settings):
-    """A waveform channel; the order of the channels is their order on the wire."""
+    """Settings of a waveform channel; channels are listed in the order of the device."""
 
     id: Identifier
-    """Unique within the unit; example: "ujb_shaft_x"."""
+    """Id of the channel, unique within the unit; example: "ujb_shaft_x"."""
 
     transducer: Transducer
-    """"proximity_probe" (DC-coupled gap), "displacement", "velocity", "accelerometer" or
-    "key_phase" (one pulse a turn)."""
+    """Kind of the transducer: "proximity_probe" (DC-coupled gap), "displacement", "velocity",
+    "accelerometer" or "key_phase" (one pulse per turn)."""
 
     sensitivity: float | None = None
     """Sensitivity in ``sensitivity_unit``, negative if the voltage falls while the measured
     quantity increases; required except for a key_phase; example: 4.0."""
 
     sensitivity_unit: SensitivityUnit | None = None
-    """"V/mm" or "mV/um" for probes and displacement, "mV/(mm/s)" for velocity, "mV/g" or
-    "mV/(m/s2)" for accelerometers."""
+    """Unit of the sensitivity: "V/mm" or "mV/um" for probes and displacement, "mV/(mm/s)" for
+    velocity, "mV/g" or "mV/(m/s2)" for accelerometers."""
 
     full_scale_v: Annotated[float, Field(gt=0.0, le=100.0)] | None = None
-    """Converter input in volts at 32768 counts; example: 12.0."""
+    """Input voltage of the converter at 32768 counts, V; example: 12.0."""
 
     ok_min_v: Annotated[float, Field(ge=-100.0, le=100.0)] | None = None
-    """Lowest mean voltage of a healthy transducer (gap OK limit); example: 1.0."""
+    """Minimum mean voltage of a healthy transducer (gap OK limit), V; example: 1.0."""
 
     ok_max_v: Annotated[float, Field(ge=-100.0, le=100.0)] | None = None
-    """Highest mean voltage of a healthy transducer (gap OK limit); example: 11.0."""
+    """Maximum mean voltage of a healthy transducer (gap OK limit), V; example: 11.0."""
 
     unit_per_count: float | None = None
     """Scale of a device with scaled counts, instead of the sensitivity and all keys in volts: µm,
-    mm/s or m/s² per count (V for a key_phase), negative if counts fall; example: 0.0625."""
+    mm/s or m/s² per count (V for a key_phase), negative if the counts fall while the measured
+    quantity increases; example: 0.0625."""
 
     ok_min: float | None = None
-    """With unit_per_count: lowest mean of a healthy transducer, in µm, mm/s, m/s² or V; example:
+    """Minimum mean of a healthy transducer with unit_per_count, in µm, mm/s, m/s² or V; example:
     250.0."""
 
     ok_max: float | None = None
-    """With unit_per_count: highest mean of a healthy transducer; example: 2750.0."""
+    """Maximum mean of a healthy transducer with unit_per_count, in µm, mm/s, m/s² or V; example:
+    2750.0."""
 
     gain_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.05
-    """Half-width of the relative error of the sensitivity, by the class of the transducer; example:
-    0.05."""
+    """Half-width of the relative error of the sensitivity, from the accuracy class of the
+    transducer; example: 0.05."""
 
     response: Annotated[tuple[ResponseSettings, ...], Field(max_length=8)] = ()
-    """Frequency response of the transducer as a chain of parts; flat by default. Example:
-    [{ kind = "high_pass", corner_hz = 0.5 }]."""
+    """Frequency response of the transducer as a chain of elements; flat by default. Example: [{
+    kind = "high_pass", corner_hz = 0.5 }]."""
 
     delay_s: Annotated[float, Field(ge=-1.0, le=1.0)] = 0.0
-    """Delay of the channel against the others, s, from sequential sampling or from a filter that
-    other channels do not have; example: 0.00167."""
+    """Delay of the channel relative to the other channels, s, due to sequential sampling or to a
+    filter that other channels do not have; example: 0.00167."""
 
     line_floor: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
-    """Amplitude of a line, 0-to-peak in µm, mm/s or m/s², below which it may be noise of the
-    transducer and gives no stiffness. Default: 2e-5 m/s² for an accelerometer, which is 5 µg/√Hz in
-    a line of 0.07 Hz, 0.001 mm/s for a velocity transducer, 0.1 µm for others."""
+    """Amplitude of a spectral line, zero-to-peak in µm, mm/s or m/s², below which the line may be
+    noise of the transducer and no stiffness is computed from it. Default: 2e-5 m/s² for an
+    accelerometer, which is 5 µg/√Hz in a line of 0.07 Hz, 0.001 mm/s for a velocity transducer, 0.1
+    µm for others."""
 
     direction: Literal[1, -1] | None = None
-    """+1 if an increasing reading is motion along the positive bearing axis, -1 if against it.
-    Default: -1 for a proximity probe, which is on the positive axis; otherwise +1. For a key_phase,
-    -1 if its pulses are negative."""
+    """Sign of the channel: +1 if the reading increases with motion along the positive bearing axis,
+    -1 if it decreases. Default: -1 for a proximity probe, which is mounted on the positive axis;
+    otherwise +1. For a key_phase, -1 if the pulses are negative."""
 
     probe: ProbeName | None = None
-    """Serial number or mark of the installed shaft probe, as in its slow_roll; example: "SN123"."""
+    """Serial number or mark of the installed shaft probe, the same as in slow_roll; example:
+    "SN123"."""
 
     slow_roll: SlowRollSettings | None = None
-    """Runout of the shaft under this probe, subtracted from 1× while a key-phase gives the angle of
-    the shaft. Example: { um_pk = 8.0, phase_deg = 30.0, speed_rpm = 8.0, taken =
+    """Runout of the shaft at this probe. The runout is subtracted from the 1× vector while a
+    key-phase is available. Example: { um_pk = 8.0, phase_deg = 30.0, speed_rpm = 8.0, taken =
     2026-03-01T10:00:00Z, probe = "SN123" }."""
 
     @model_validator(mode="after")
@@ -204,7 +211,7 @@ class ChannelSettings(Settings):
         return self
 
     def _check_scale(self) -> None:
-        """Check that the scale is either in volts or in scaled counts."""
+        """Check that the scale keys are either all in volts or all in scaled counts."""
         in_counts = self.unit_per_count is not None
         keys, others = (
             (SCALE_KEYS_COUNTS, SCALE_KEYS_V) if in_counts else (SCALE_KEYS_V, SCALE_KEYS_COUNTS)
@@ -252,12 +259,12 @@ class ChannelSettings(Settings):
 
     @property
     def measurand(self) -> Measurand:
-        """Measured quantity in engineering units."""
+        """Measured quantity and its engineering unit."""
         return MEASURANDS[self.transducer]
 
     @property
     def unit_per_v(self) -> float:
-        """Engineering units per volt, or per count if scaled in counts; 1 for pulses."""
+        """Engineering units per volt, or per count; 1 for a key_phase in volts."""
         if self.unit_per_count is not None:
             return self.unit_per_count
         if self.sensitivity is None or self.sensitivity_unit is None:
@@ -266,7 +273,7 @@ class ChannelSettings(Settings):
 
     @property
     def scale(self) -> dict[str, float]:
-        """Full scale, units per volt and OK limits; scaled counts are treated as volts."""
+        """Full scale, engineering units per volt, and OK limits; scaled counts count as volts."""
         full_scale, low, high = (getattr(self, key) for key in SCALE_KEYS_V)
         if self.unit_per_count is not None:
             limits = (
@@ -282,31 +289,31 @@ class ChannelSettings(Settings):
 
     @property
     def floor(self) -> float:
-        """Line floor, or its default."""
+        """Noise amplitude of a line: `line_floor`, or the default of the transducer."""
         return LINE_FLOORS[self.transducer] if self.line_floor is None else self.line_floor
 
     @property
     def sign(self) -> int:
-        """Direction, or its default."""
+        """Sign of the channel, +1 or -1: `direction`, or the default of the transducer."""
         if self.direction is not None:
             return self.direction
         return -1 if self.transducer is Transducer.PROXIMITY_PROBE else 1
 
 
 class SlowChannelSettings(Settings):
-    """A slowly changing reading; the order of the channels is their order on the wire."""
+    """Settings of a slow channel; slow channels are listed in the order of the device."""
 
     id: Identifier
-    """Unique within the unit; example: "ujb_oil_temperature"."""
+    """Id of the slow channel, unique within the unit; example: "ujb_oil_temperature"."""
 
     unit: Literal["r/min", "MW", "degC", "mm"]
-    """Unit of the values of the device: "r/min", "MW", "degC" or "mm"."""
+    """Unit of the values that the device sends: "r/min", "MW", "degC" or "mm"."""
 
     minimum: float
-    """Readings below are refused as out of range; example: -10.0."""
+    """Lower limit of valid values; lower values are rejected as out of range. Example: -10.0."""
 
     maximum: float
-    """Readings above are refused as out of range; example: 120.0."""
+    """Upper limit of valid values; higher values are rejected as out of range. Example: 120.0."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -1,4 +1,4 @@
-"""Configuration: the settings of the plant file without secrets, identified by their hash."""
+"""Configuration document: settings of the plant file without secrets, identified by a hash."""
 
 import hashlib
 import json
@@ -14,30 +14,30 @@ FORMAT = "padwatch-configuration"
 LEFT_OUT = "left out"
 
 SECRETS = ("secret", "authorization", "password", "username")
-"""Keys of secret values in any table."""
+"""Keys whose values are secret, in any table."""
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """A configuration and its version, the SHA-256 of its text."""
+    """Configuration document; its version is the SHA-256 hash of its text."""
 
     text: bytes
 
     @property
     def version(self) -> str:
-        """SHA-256 of the text."""
+        """SHA-256 hash of the text, hexadecimal."""
         return hashlib.sha256(self.text).hexdigest()
 
 
 def configuration_of(plant: PlantFile, program: str, commit: str | None) -> Configuration:
-    """Return the configuration of a plant file without its secrets."""
+    """Return the configuration document of a plant file, without secrets."""
     settings = without_secrets(plant.model_dump(mode="json"))
     document = {"format": FORMAT, "version": 1, "padwatch": program, "commit": commit}
     return Configuration(canonical(document | {"settings": settings}))
 
 
 def canonical(document: object) -> bytes:
-    """Return the canonical text of a document."""
+    """Return a document as canonical JSON: sorted keys, no spaces, UTF-8."""
     text = json.dumps(
         document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False
     )
@@ -45,7 +45,7 @@ def canonical(document: object) -> bytes:
 
 
 def without_secrets(value: Any) -> Any:
-    """Return the settings without secrets."""
+    """Return a copy of the settings in which secrets are replaced by `LEFT_OUT`."""
     if isinstance(value, dict):
         return {key: _shown(key, each) for key, each in value.items()}
     if isinstance(value, list | tuple):
@@ -54,7 +54,7 @@ def without_secrets(value: Any) -> Any:
 
 
 def built_from() -> str | None:
-    """Return the commit that padwatch was installed from, if known."""
+    """Return the Git commit from which padwatch was installed; None if unknown."""
     try:
         text = distribution("padwatch").read_text("direct_url.json")
     except PackageNotFoundError:
@@ -67,6 +67,6 @@ def _shown(key: str, value: Any) -> Any:
     if key in SECRETS and value is not None:
         return LEFT_OUT
     if key == "url" and isinstance(value, str):
-        parts = urlsplit(value)  # its path may contain a token
+        parts = urlsplit(value)  # the path may contain a token
         return f"{parts.scheme}://{parts.hostname}/ ({LEFT_OUT})"
     return without_secrets(value)

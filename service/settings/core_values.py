@@ -1,4 +1,4 @@
-"""Conversion of settings to values of core: machine, calibration, analysis and rules."""
+"""Conversion of settings to values of core: machine, calibration, analysis and alarm rules."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -34,7 +34,7 @@ from service.settings.units import UnitSettings
 
 
 def machine_of(settings: UnitSettings) -> Unit:
-    """Return the unit as a value of core."""
+    """Return the generating unit as a value of core."""
     return Unit(
         id=settings.id,
         rated_speed_rpm=settings.rated_speed_rpm,
@@ -86,7 +86,7 @@ def _gap_accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> GapAc
 
 
 def _accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> BearingAccuracy:
-    """Return the accuracy of both directions, by the less accurate transducer."""
+    """Return the accuracy of a bearing; the less accurate transducer of x and y determines it."""
     return BearingAccuracy(
         shaft_gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
         bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),
@@ -99,7 +99,7 @@ def _accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> BearingAc
 
 
 def calibration_of(settings: UnitSettings) -> UnitCalibration:
-    """Return the calibration from the device's counts to engineering units."""
+    """Return the calibration of a unit, from counts of the device to engineering units."""
     return UnitCalibration(
         unit=settings.id,
         rate_hz=settings.rate_hz,
@@ -110,7 +110,7 @@ def calibration_of(settings: UnitSettings) -> UnitCalibration:
 
 
 def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
-    """Return the settings of segments, averaging and assessment."""
+    """Return the settings of segments, averaging and assessment as a value of core."""
     dynamic = settings.dynamic
     noise = dynamic.probe_noise_um2_per_hz
     return AnalysisSettings(
@@ -131,11 +131,11 @@ def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
 
 
 ZONE_DEADBAND = 0.05
-"""Default deadband as a share of the boundary between A and B."""
+"""Default deadband of zone boundaries, as a share of the boundary between zones A and B."""
 
 
 def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitRules:
-    """Return the alarm rules of a unit; a replay has no rules of link and clock."""
+    """Return the alarm rules of a unit; without link and clock rules for a replay."""
     is_live = origin is Origin.LIVE
     is_judged = is_live and alarms.clock == "judged"
     return UnitRules(
@@ -150,12 +150,12 @@ def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitR
 
 
 def chatter_rule_of(alarms: AlarmSettings) -> ChatterRule:
-    """Return the rule of chattering alarms."""
+    """Return the rule that classifies alarms as chattering."""
     return ChatterRule(alarms.chattering_activations, ns_from_s(alarms.chattering_window_s))
 
 
 def references_of(unit: UnitSettings) -> list[VectorReference]:
-    """Return the 1× reference vectors of the plant file."""
+    """Return the 1× reference vectors of a unit in the plant file, by bearing and state."""
     return [
         VectorReference(unit.id, bearing.id, state, vectors)
         for bearing in unit.bearing
@@ -215,12 +215,12 @@ def _table(table: ZoneTableSettings) -> ZoneLimits:
 
 
 def _clock_limit(limit: float, delay_s: float) -> LimitRule:
-    """Return a limit of the clock with a deadband of a tenth."""
+    """Return a limit rule of the device clock, with a deadband of a tenth of the limit."""
     return LimitRule(Limits(limit, deadband=limit / 10), rule_of(delay_s, delay_s))
 
 
 def film_rules_of(unit: UnitSettings, settings: FilmAlarmSettings) -> FilmRules | str:
-    """Return the film rules of a unit, or why its films cannot be watched."""
+    """Return the film rules of a unit, or the reason why its films cannot be monitored."""
     if unit.power_channel is None or unit.rated_power_mw is None:
         return "operating states need power_channel and rated_power_mw"
     estimators = {
@@ -241,9 +241,9 @@ def film_rules_of(unit: UnitSettings, settings: FilmAlarmSettings) -> FilmRules 
 
 
 def watched_estimator(unit: UnitSettings, bearing: BearingSettings) -> Estimator:
-    """Return the estimator whose stiffness is compared with its baseline."""
+    """Return the estimator whose stiffness is compared with the baseline of a bearing."""
     if bearing.watched_estimator is not None:
         return bearing.watched_estimator
     if isinstance(unit.source, ModbusVectorSettings):
-        return Estimator.RATIO_ORDER1  # the only estimator from amplitudes alone
+        return Estimator.RATIO_ORDER1  # the only estimator that requires no phase
     return bearing.preference[0]

@@ -1,4 +1,4 @@
-"""Monitoring of film stiffness: conditions, baselines and limits of change."""
+"""Settings of film monitoring: operating states, baselines and limits of stiffness change."""
 
 from typing import Annotated, Literal, Self
 
@@ -11,36 +11,37 @@ from core.condition.operating_state import OperatingLimits
 from service.settings.base import MisfitError, Settings
 
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
-"""Between 0 and 1, both excluded."""
+"""Fraction between 0 and 1, both excluded."""
 
 
 class ChangeLimitSettings(Settings):
-    """Magnitude, significance and duration of a change of stiffness that raise an alarm."""
+    """Magnitude, significance and duration of a stiffness change that raises an alarm."""
 
     alert_change: Share = ChangeLimits.alert_change
-    """Change of stiffness in either direction that is an alert when exceeded by one standard
-    uncertainty; a natural logarithm: 0.035 is 3.5 %."""
+    """Limit of the stiffness change in either direction, as a natural logarithm (0.035 is 3.5 %); a
+    change that exceeds the limit by one standard uncertainty is an alert."""
 
     danger_change: Share = ChangeLimits.danger_change
-    """Change that is a danger when exceeded by three; must be above alert_change; example: 0.15."""
+    """Limit of the stiffness change, as a natural logarithm; a change that exceeds the limit by
+    three standard uncertainties is a danger. Must be above alert_change; example: 0.15."""
 
     deadband: Share = ChangeLimits.deadband
-    """How far below its limit a change must fall to leave a level; example: 0.01."""
+    """Amount by which a change must fall below its limit to leave the level; example: 0.01."""
 
     significance: Annotated[float, Field(gt=0.0, le=100.0)] = ChangeLimits.significance
-    """Minimum ratio of the mean change over four hours to its standard uncertainty."""
+    """Minimum ratio of the mean change to its standard uncertainty, for a mean over four hours."""
 
     significance_fall: Annotated[float, Field(gt=0.0, le=10.0)] = ChangeLimits.significance_fall
-    """Reduction of that ratio for each fourfold averaging time."""
+    """Reduction of the ratio `significance` for each fourfold increase of the averaging time."""
 
     min_evidence_h: Annotated[float, Field(gt=0.0, le=1000.0)] = ChangeLimits.min_evidence_h
-    """Running hours with a baseline before a film counts as normal."""
+    """Running hours with a baseline after which a film can be classified as normal."""
 
     on_delay_h: Annotated[float, Field(gt=0.0, le=1000.0)] = ChangeLimits.on_delay_h
-    """Running hours that a change must last to raise an alarm."""
+    """Running hours for which a change must last to raise an alarm."""
 
     off_delay_h: Annotated[float, Field(gt=0.0, le=1000.0)] = ChangeLimits.off_delay_h
-    """Running hours without the change after which the alarm returns."""
+    """Running hours without a change after which the alarm returns."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -51,37 +52,38 @@ class ChangeLimitSettings(Settings):
         return self
 
     def limits(self) -> ChangeLimits:
-        """Return the limits of core's decision; latching belongs to the alarm."""
+        """Return the change limits as a value of core; latching is a setting of the alarm."""
         return ChangeLimits(**self.model_dump())
 
 
 class BaselineModel(Settings):
-    """Requirements for learning a baseline."""
+    """Condition cells, and requirements for learning a baseline."""
 
     eccentricity_width: Annotated[float, Field(ge=0.005, le=0.5)] = CellGrid.eccentricity_width
-    """Width of a cell in eccentricity ratio; example: 0.05."""
+    """Width of a condition cell in eccentricity ratio; example: 0.05."""
 
     temperature_width_c: Annotated[float, Field(ge=0.1, le=50.0)] = CellGrid.temperature_width_c
-    """Width of a cell in oil temperature, K; example: 2.5."""
+    """Width of a condition cell in oil temperature, K; example: 2.5."""
 
     attitude_width_deg: Annotated[float, Field(ge=1.0, le=360.0)] | None = None
-    """Width of a cell in attitude angle, degrees, a divisor of 360; without it cells do not depend
-    on the attitude; example: 45.0."""
+    """Width of a condition cell in attitude angle, degrees, a divisor of 360; by default cells do
+    not depend on the attitude angle; example: 45.0."""
 
     uses_attitude: bool = BaselineSettings.uses_attitude
     """Whether the baseline depends on the attitude angle."""
 
     min_readings: Annotated[int, Field(ge=1, le=100_000)] = BaselineSettings.min_readings
-    """Minimum number of readings of a cell with a baseline of its own."""
+    """Minimum number of readings for a cell to have its own support in the baseline."""
 
     min_days: Annotated[int, Field(ge=1, le=1000)] = BaselineSettings.min_days
-    """Minimum number of days with readings of such a cell."""
+    """Minimum number of days with readings for a cell to have its own support in the baseline."""
 
     min_learning_days: Annotated[int, Field(ge=1, le=3650)] = BaselineSettings.min_learning_days
     """Minimum number of days with readings before the first baseline."""
 
     max_surface_std: Annotated[float, Field(gt=0.0, le=1.0)] = BaselineSettings.max_surface_std
-    """Uncertainty of the expected stiffness, a logarithm, above which a condition is unknown."""
+    """Standard uncertainty of the expected stiffness, as a natural logarithm, above which a
+    condition is not supported by the baseline."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -91,30 +93,30 @@ class BaselineModel(Settings):
         return self
 
     def settings(self, reading_h: float = BaselineSettings.reading_h) -> BaselineSettings:
-        """Return the settings of core's learning, for readings of this many running hours."""
+        """Return the baseline settings as a value of core, for readings of `reading_h` each."""
         rest = self.model_dump(exclude=set(GRID_KEYS))
         grid = CellGrid(*(getattr(self, key) for key in GRID_KEYS))
         return BaselineSettings(grid=grid, reading_h=reading_h, **rest)
 
 
 GRID_KEYS = ("eccentricity_width", "temperature_width_c", "attitude_width_deg")
-"""Keys that shape the cells, in the order of `CellGrid`."""
+"""Keys of the widths of a condition cell, in the order of the fields of `CellGrid`."""
 
 
 class OperatingModel(Settings):
     """Limits of the operating states, as shares of rated speed and power."""
 
     standing_below: Share = OperatingLimits.standing_below
-    """Share of the rated speed below which a unit is stopped."""
+    """Share of the rated speed below which a unit is at standstill."""
 
     at_speed_above: Share = OperatingLimits.at_speed_above
-    """Share of the rated speed above which it is at speed."""
+    """Share of the rated speed above which a unit is at speed."""
 
     loaded_above: Share = OperatingLimits.loaded_above
-    """Share of the rated power above which it is at part load."""
+    """Share of the rated power above which a unit is at part load."""
 
     full_load_above: Share = OperatingLimits.full_load_above
-    """Share of the rated power above which it is at full load."""
+    """Share of the rated power above which a unit is at full load."""
 
     speed_hysteresis: Share = OperatingLimits.speed_hysteresis
     """Hysteresis of the speed limits, as a share of the rated speed."""
@@ -123,22 +125,23 @@ class OperatingModel(Settings):
     """Hysteresis of the power limits, as a share of the rated power."""
 
     settling_s: Annotated[float, Field(gt=0.0, le=86_400.0)] = OperatingLimits.settling_s
-    """Time in one state before films are compared, s."""
+    """Time in one operating state before films are compared with their baselines, s."""
 
     oil_band_c: Annotated[float, Field(gt=0.0, le=50.0)] = OperatingLimits.oil_band_c
-    """After a start, a bearing is warm once its oil has stayed within a band of this width for
-    `oil_settling_s` at speed, K; example: 0.5. At least the resolution of the sensor."""
+    """Width of a temperature band, K, at least the resolution of the sensor. After a start, a
+    bearing is warm once its oil temperature has stayed within such a band for `oil_settling_s` at
+    speed. Example: 0.5."""
 
     oil_settling_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.oil_settling_s
-    """Time for which the oil must stay within this band, s: after a start clearances decrease for
-    hours, longer than the oil warms; example: 7200."""
+    """Time for which the oil temperature must stay within `oil_band_c`, s. After a start clearances
+    decrease for hours, longer than the oil temperature rises; example: 7200."""
 
     warm_up_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.warm_up_s
-    """Time at speed after which films are compared even if the oil temperature changes, s; example:
-    21600."""
+    """Time at speed after which films are compared with their baselines even if the oil temperature
+    changes, s; example: 21600."""
 
     longest_gap_s: Annotated[float, Field(gt=0.0, le=604_800.0)] = OperatingLimits.longest_gap_s
-    """Time without results after which the operating state counts as unknown, s."""
+    """Time without results after which the operating state is unknown, s."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -150,7 +153,7 @@ class OperatingModel(Settings):
         return self
 
     def limits(self, rated_speed_rpm: float, rated_power_mw: float) -> OperatingLimits:
-        """Return the operating limits of a machine."""
+        """Return the operating limits of a machine as a value of core."""
         return OperatingLimits(rated_speed_rpm, rated_power_mw, **self.model_dump())
 
 
@@ -161,36 +164,37 @@ BANDS = (
 
 
 class FilmAlarmSettings(Settings):
-    """Baselines of stiffness by operating condition, and alarms of its change."""
+    """Settings of stiffness baselines by condition, and of alarms of stiffness change."""
 
     reading_period_s: Annotated[float, Field(ge=1.0, le=3600.0)] = 600.0
-    """Interval of readings, s; at least one averaging time, so that readings are independent."""
+    """Interval between film readings, s; at least one averaging time, so that readings are
+    independent."""
 
     time_lapse: Annotated[float, Field(ge=1.0, le=1000.0)] = 1.0
-    """Acceleration of running hours for the decision, for demonstrations only."""
+    """Factor by which running hours are accelerated, for demonstrations only."""
 
     learning_days: Annotated[float, Field(ge=1.0, le=3650.0)] = 365.0
-    """Time for which a baseline is learned after the first reading or a machine event, days. It
-    should include all seasons. Then the baseline is fixed until an engineer renews it."""
+    """Learning period of a baseline after the first reading or a machine event, days. The period
+    should include all seasons. Afterwards the baseline is fixed until an engineer renews it."""
 
     learn_every_days: Annotated[float, Field(ge=0.01, le=365.0)] = 7.0
-    """Interval of learning in that time, days."""
+    """Interval of learning within the learning period, days."""
 
     acceptance: Literal["automatic", "by_engineer"] = "automatic"
-    """Whether a learned baseline is put in force by padwatch ("automatic") if it agrees with the
-    first accepted baseline and the film did not drift, or only "by_engineer"."""
+    """Acceptance of a learned baseline: "automatic" if the baseline agrees with the first accepted
+    baseline and the film has not drifted, or only "by_engineer"."""
 
     latching: bool = False
-    """Whether an alarm stays active after its change has gone, until it is reset."""
+    """Whether an alarm stays active after the stiffness change has ended, until it is reset."""
 
     change: ChangeLimitSettings = ChangeLimitSettings()
-    """Limits of change."""
+    """Limits of stiffness change."""
 
     baseline: BaselineModel = BaselineModel()
-    """Requirements for learning."""
+    """Condition cells and learning of the baselines."""
 
     operating: OperatingModel = OperatingModel()
-    """Operating states."""
+    """Limits of the operating states."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -1,4 +1,4 @@
-"""Limits of alarms: alert and danger levels, tables by condition, ISO 20816-5 zones."""
+"""Alarm limits: alert and danger limits, limit tables by condition, ISO 20816-5 zones."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from core.condition.operating_state import OperatingState
 from service.settings.base import MisfitError, Settings, refuse_twice
 
 DelayS = Annotated[float, Field(ge=0.0, le=86_400.0)]
-"""Seconds, at most a day."""
+"""Delay in seconds, at most a day."""
 
 StateName = Literal["standstill", "run_up", "speed_no_load", "part_load", "full_load", "run_down"]
 
@@ -23,7 +23,7 @@ StateNames = Annotated[tuple[StateName, ...], Field(min_length=1, max_length=6)]
 
 
 def states_of(names: tuple[StateName, ...]) -> States:
-    """Return operating states by their names."""
+    """Return the operating states with these names."""
     return frozenset(OperatingState[name.upper()] for name in names)
 
 
@@ -31,18 +31,18 @@ Bounds = tuple[float, float]
 
 
 class RegionSettings(Settings):
-    """Part of the operating conditions, such as a condition cell; ranges are [from, up to]."""
+    """Region of the operating conditions, such as a condition cell; ranges are [from, up to)."""
 
     states: StateNames | None = None
 
     eccentricity_ratio: Annotated[Bounds, Field(examples=[[0.6, 0.7]])] | None = None
-    """Eccentricity ratios, 0 to 5; any without it; example: [0.35, 0.4]."""
+    """Range of the eccentricity ratio, within 0 to 5; any by default; example: [0.35, 0.4]."""
 
     oil_temperature_c: Annotated[Bounds, Field(examples=[[45.0, 47.5]])] | None = None
-    """Oil temperatures, °C, -50 to 200; any without it; example: [45.0, 47.5]."""
+    """Range of oil temperature, °C, within -50 to 200; any by default; example: [45.0, 47.5]."""
 
     attitude_deg: Annotated[Bounds, Field(examples=[[0.0, 90.0]])] | None = None
-    """Attitude angles, degrees, 0 to 360; any without it; example: [0.0, 90.0]."""
+    """Range of attitude angle, degrees, within 0 to 360; any by default; example: [0.0, 90.0]."""
 
     @model_validator(mode="after")
     def _check_region(self) -> Self:
@@ -54,7 +54,7 @@ class RegionSettings(Settings):
         return self
 
     def region(self, states: StateNames) -> Region:
-        """Return the region in core's terms; these states apply if it names none."""
+        """Return the region as a value of core; ``states`` apply if the region has no states."""
         return Region(states_of(self.states or states), *(getattr(self, key) for key in RANGES))
 
 
@@ -63,11 +63,11 @@ RANGES = {
     "oil_temperature_c": (-50.0, 200.0),
     "attitude_deg": (0.0, 360.0),
 }
-"""Ranges of a region with their bounds, in the order of `Region`."""
+"""Range keys of a region and their allowed bounds, in the order of the fields of `Region`."""
 
 
 def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None:
-    """Refuse overlapping tables; a table without states holds in these."""
+    """Refuse overlapping tables; a table without states applies in ``states``."""
     regions = [table.region(states) for table in tables]
     for n, m in combinations(range(len(tables)), 2):
         if regions[n].overlaps(regions[m]):
@@ -75,46 +75,46 @@ def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None
 
 
 class WatchSettings(Settings):
-    """How an alarm of a measurement behaves."""
+    """Delays and latching of the alarm of a measurement."""
 
     on_delay_s: DelayS = 10.0
-    """Time for which the limit must be exceeded, in seconds of the samples' time; results come once
-    per refresh."""
+    """Time for which the limit must be exceeded to raise the alarm, s, in time of the samples;
+    results are computed once per refresh."""
 
     off_delay_s: DelayS = 30.0
     """Time for which the value must be within the limit again for the alarm to return, s."""
 
     latching: bool = False
-    """Whether the alarm stays active after its condition has gone, until it is reset."""
+    """Whether the alarm stays active after its condition has ended, until it is reset."""
 
 
 class LimitTableSettings(RegionSettings):
-    """Limits in a part of the operating conditions; missing limits are those of the whole."""
+    """Limits in a region of the operating conditions; a missing value is that of the main limit."""
 
     states: StateNames | None = None
-    """Operating states in which these limits hold; those of the limit unless given."""
+    """Operating states in which these limits apply; by default the states of the limit."""
 
     alert: float | None = None
-    """See `alert` of the limit."""
+    """Alert limit in this region; see `alert` of the limit."""
 
     danger: float | None = None
-    """See `danger` of the limit."""
+    """Danger limit in this region; see `danger` of the limit."""
 
     alert_below: float | None = None
-    """See `alert_below` of the limit, if it has one."""
+    """Lower alert limit in this region, for gaps only; see `alert_below` of the limit."""
 
     danger_below: float | None = None
-    """See `danger_below` of the limit, if it has one."""
+    """Lower danger limit in this region, for gaps only; see `danger_below` of the limit."""
 
     deadband: float | None = None
-    """See `deadband` of the limit."""
+    """Deadband in this region; see `deadband` of the limit."""
 
 
 LIMITS = ("alert", "danger", "alert_below", "danger_below", "deadband")
 
 
 class LimitSettings(WatchSettings):
-    """Limits of a measured value; alert, danger or both must be given."""
+    """Alarm limits of a measured value; alert, danger or both must be given."""
 
     alert: float | None
     danger: float | None
@@ -122,12 +122,12 @@ class LimitSettings(WatchSettings):
 
     states: StateNames = AT_SPEED
     """Operating states in which the limit applies: "standstill", "run_up", "speed_no_load",
-    "part_load", "full_load", "run_down". In other states its alarm is suppressed by design. The
+    "part_load", "full_load", "run_down". In other states the alarm is suppressed by design. The
     limit also applies while the state is unknown."""
 
     table: Annotated[tuple[LimitTableSettings, ...], Field(max_length=100)] = ()
-    """Other limits in some operating states or condition cells; at most 100. While the condition is
-    unknown, all limits that may apply do."""
+    """Different limits for individual operating states or condition cells; at most 100 tables.
+    While the condition is unknown, all tables that may apply are evaluated."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -146,7 +146,7 @@ class LimitSettings(WatchSettings):
         return self
 
     def within(self, table: LimitTableSettings) -> Self:
-        """Return the limits in the region of a table; missing ones are taken from here."""
+        """Return the limits in the region of a table, completed by the values of the main limit."""
         own = {key: getattr(self, key) for key in LIMITS if hasattr(self, key)}
         given = {key: getattr(table, key) for key in LIMITS if getattr(table, key) is not None}
         return type(self).model_validate(own | given)
@@ -163,107 +163,110 @@ class LimitSettings(WatchSettings):
 
 
 class AmplitudeLimitSettings(LimitSettings):
-    """Limits of a shaft's vibration at 1×. padwatch is not a protection system: these inform."""
+    """Limits of the 1× amplitude of a shaft; for information, padwatch is no protection system."""
 
     alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
     """Value above which the alarm is an alert, µm zero-to-peak; example: 150.0."""
 
     danger: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
-    """Value above which it is a danger, µm zero-to-peak; must be above alert; example: 250.0."""
+    """Value above which the alarm is a danger, µm zero-to-peak; must be above alert; example:
+    250.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=5000.0)] = 5.0
-    """How far below a limit the amplitude must fall for the alarm to return, µm."""
+    """Amount by which the amplitude must fall below a limit for the alarm to return, µm."""
 
 
 class SpanLimitSettings(LimitSettings):
-    """Limits of a shaft's broad-band vibration, peak-to-peak."""
+    """Limits of the broad-band relative vibration of a shaft, peak-to-peak."""
 
     alert: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
     """Value above which the alarm is an alert, µm peak-to-peak; example: 300.0."""
 
     danger: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
-    """Value above which it is a danger, µm peak-to-peak; must be above alert; example: 500.0."""
+    """Value above which the alarm is a danger, µm peak-to-peak; must be above alert; example:
+    500.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] = 10.0
-    """How far below a limit the value must fall for the alarm to return, µm."""
+    """Amount by which the value must fall below a limit for the alarm to return, µm."""
 
 
 class VelocityLimitSettings(LimitSettings):
-    """Limits of a bearing's broad-band velocity."""
+    """Limits of the broad-band vibration velocity of a bearing."""
 
     alert: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
     """Value above which the alarm is an alert, mm/s rms; example: 2.0."""
 
     danger: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
-    """Value above which it is a danger, mm/s rms; must be above alert; example: 4.0."""
+    """Value above which the alarm is a danger, mm/s rms; must be above alert; example: 4.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.1
-    """How far below a limit the velocity must fall for the alarm to return, mm/s."""
+    """Amount by which the velocity must fall below a limit for the alarm to return, mm/s."""
 
 
 class EccentricityLimitSettings(LimitSettings):
-    """Limits of the eccentricity ratio, the used share of the clearance."""
+    """Limits of the eccentricity ratio: eccentricity of the shaft over radial clearance."""
 
     alert: Annotated[float, Field(gt=0.0, le=5.0)] | None = None
     """Value above which the alarm is an alert; example: 0.7."""
 
     danger: Annotated[float, Field(gt=0.0, le=5.0)] | None = None
-    """Value above which it is a danger; must be above alert; example: 0.9."""
+    """Value above which the alarm is a danger; must be above alert; example: 0.9."""
 
     deadband: Annotated[float, Field(ge=0.0, le=5.0)] = 0.02
-    """How far below a limit the ratio must fall for the alarm to return."""
+    """Amount by which the ratio must fall below a limit for the alarm to return."""
 
 
 class VectorChangeLimitSettings(LimitSettings):
-    """Limits of the distance of a 1× vector from its reference; without phase, of its length."""
+    """Limits of the change of a 1× vector from its reference; without a phase, of its amplitude."""
 
     alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
     """Value above which the alarm is an alert, µm zero-to-peak; example: 30.0."""
 
     danger: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
-    """Value above which it is a danger, µm zero-to-peak; must be above alert; example: 60.0."""
+    """Value above which the alarm is a danger, µm zero-to-peak; must be above alert; example:
+    60.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=5000.0)] = 2.0
-    """How far below a limit the distance must fall for the alarm to return, µm."""
+    """Amount by which the change must fall below a limit for the alarm to return, µm."""
 
 
 class TemperatureLimitSettings(LimitSettings):
-    """Limits of an oil temperature; the bearing must name its slow channel."""
+    """Limits of an oil temperature; the bearing must set its slow channel, oil_temperature."""
 
     alert: Annotated[float, Field(gt=0.0, le=200.0)] | None = None
     """Value above which the alarm is an alert, °C; example: 65.0."""
 
     danger: Annotated[float, Field(gt=0.0, le=200.0)] | None = None
-    """Value above which it is a danger, °C; must be above alert; example: 75.0."""
+    """Value above which the alarm is a danger, °C; must be above alert; example: 75.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=100.0)] = 1.0
-    """How far below a limit the temperature must fall for the alarm to return, K."""
+    """Amount by which the temperature must fall below a limit for the alarm to return, K."""
 
     states: StateNames = EVERY_STATE
-    """Operating states in which the limit applies; all unless given, as oil may also be too hot at
-    standstill."""
+    """Operating states in which the limit applies; all states by default, because oil may also be
+    too hot at standstill."""
 
 
 GapUm = Annotated[float, Field(gt=0.0, le=10_000.0)]
 
 
 class GapLimitSettings(LimitSettings):
-    """Limits of the mean gap of each probe: the shaft may leave the range of a probe."""
+    """Upper and lower limits of the mean gap of each probe, within the range of the probe."""
 
     alert: GapUm | None = None
-    """Above this gap, µm, the alarm is an alert; example: 2400.0."""
+    """Gap above which the alarm is an alert, µm; example: 2400.0."""
 
     danger: GapUm | None = None
-    """Above this gap, µm, it is a danger; must be above alert; example: 2600.0."""
+    """Gap above which the alarm is a danger, µm; must be above alert; example: 2600.0."""
 
     alert_below: GapUm | None = None
-    """Below this gap, µm, the alarm is an alert; example: 600.0."""
+    """Gap below which the alarm is an alert, µm; example: 600.0."""
 
     danger_below: GapUm | None = None
-    """Below this gap, µm, it is a danger; must be below alert_below; example: 400.0."""
+    """Gap below which the alarm is a danger, µm; must be below alert_below; example: 400.0."""
 
     deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] = 10.0
-    """How far inside a limit the gap must be for the alarm to return, µm."""
+    """Amount by which the gap must be within a limit for the alarm to return, µm."""
 
     def _check_limits(self) -> None:
         named = ("danger_below", "alert_below", "alert", "danger")
@@ -287,23 +290,24 @@ Boundary = Annotated[float, Field(gt=0.0, le=10_000.0)]
 
 
 class ZoneTableSettings(RegionSettings):
-    """Boundaries of the zones in some operating states or condition cells."""
+    """Zone boundaries for a region of the operating conditions."""
 
     states: StateNames = AT_SPEED
-    """Operating states in which they apply. In a condition without a table the alarm is suppressed
-    by design; while the condition is unknown, the strictest table that may apply does."""
+    """Operating states in which the boundaries apply. In a condition without a table the alarm is
+    suppressed by design; while the condition is unknown, the strictest of the tables that may apply
+    is used."""
 
     a_b: Boundary
     """Boundary between zones A and B, in the unit of the measurement."""
 
     b_c: Boundary
-    """Boundary between B and C, above a_b; beyond it the alarm is an alert."""
+    """Boundary between zones B and C, above a_b; above this boundary the alarm is an alert."""
 
     c_d: Boundary
-    """Boundary between C and D, above b_c; beyond it the alarm is a danger."""
+    """Boundary between zones C and D, above b_c; above this boundary the alarm is a danger."""
 
     deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] | None = None
-    """How far below a boundary the value must fall to leave the zone; a twentieth of a_b by
+    """Amount by which the value must fall below a boundary to leave the zone; a twentieth of a_b by
     default; example: 5.0."""
 
     @model_validator(mode="after")
@@ -318,10 +322,11 @@ class ZoneTableSettings(RegionSettings):
 
 
 class ZoneSettings(WatchSettings):
-    """Zones of one measurement."""
+    """Evaluation zones of one measured quantity."""
 
     table: Annotated[tuple[ZoneTableSettings, ...], Field(min_length=1, max_length=100)]
-    """A table for each group of operating states or condition cells; at most 100."""
+    """Tables of zone boundaries, one for each group of operating states or condition cells; at most
+    100."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -330,43 +335,45 @@ class ZoneSettings(WatchSettings):
 
 
 class ZonesSettings(Settings):
-    """Evaluation zones by measurement; padwatch does not include the values of the standard."""
+    """Evaluation zones by measured quantity; the values of ISO 20816-5 are not included."""
 
     shaft_um_pp: ZoneSettings | None = None
-    """Relative shaft displacement, peak-to-peak, µm, in x and in y each."""
+    """Zones of the relative shaft displacement, µm peak-to-peak, in x and in y each."""
 
     shaft_max_um_pk: ZoneSettings | None = None
-    """Largest excursion of the shaft from its mean position in any direction, µm zero-to-peak."""
+    """Zones of the maximum shaft displacement from its mean position in any direction, µm
+    zero-to-peak."""
 
     bearing_mm_s_rms: ZoneSettings | None = None
-    """Velocity of the bearing housing, mm/s rms, in x and in y each."""
+    """Zones of the vibration velocity of the bearing housing, mm/s rms, in x and in y each."""
 
 
 MAX_UM_PK, FULL_TURN_DEG = 5000.0, 360.0
 
 Vector = Annotated[tuple[float, ...], Field(min_length=1, max_length=2)]
-"""[amplitude] or [amplitude, phase]: µm zero-to-peak, degrees by which it leads the key-phase."""
+"""1× vector, [amplitude] or [amplitude, phase]: µm zero-to-peak, degrees of lead to the
+key-phase."""
 
 PLACES = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
 
 
 class VectorReferenceSettings(Settings):
-    """1× vectors of a healthy bearing: [µm 0-pk] or [µm 0-pk, degrees]."""
+    """Reference 1× vectors of a healthy bearing, each [amplitude] or [amplitude, phase]."""
 
     states: StateNames = AT_SPEED
-    """Operating states in which they apply."""
+    """Operating states in which the reference applies."""
 
     shaft_x: Vector | None = None
-    """Vector of the shaft in x; example: [60.0, 135.0]."""
+    """1× vector of the shaft in x; example: [60.0, 135.0]."""
 
     shaft_y: Vector | None = None
-    """Vector of the shaft in y."""
+    """1× vector of the shaft in y."""
 
     bearing_x: Vector | None = None
-    """Vector of the bearing in x; example: [12.0, 135.0]."""
+    """1× vector of the bearing in x; example: [12.0, 135.0]."""
 
     bearing_y: Vector | None = None
-    """Vector of the bearing in y; example: [11.0, 45.0]."""
+    """1× vector of the bearing in y; example: [11.0, 45.0]."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -382,6 +389,6 @@ class VectorReferenceSettings(Settings):
         return self
 
     def vectors(self) -> dict[str, Vector]:
-        """Return the given vectors by place."""
+        """Return the configured vectors by measuring point: shaft or bearing, x or y."""
         found = {place: getattr(self, place) for place in PLACES}
         return {place: vector for place, vector in found.items() if vector is not None}

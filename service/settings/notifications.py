@@ -1,4 +1,4 @@
-"""Receivers of notifications in the plant file: webhooks and mail servers."""
+"""Settings of the receivers of notifications: webhooks and mail servers."""
 
 import re
 from datetime import datetime, time
@@ -19,7 +19,7 @@ from service.settings.base import (
 )
 
 TimeOfDay = Annotated[str, StringConstraints(pattern=r"^([01][0-9]|2[0-3]):[0-5][0-9]$")]
-"""Hours and minutes, such as "22:00"."""
+"""Time of day in hours and minutes, such as "22:00"."""
 
 MailAddress = Annotated[
     str,
@@ -27,7 +27,7 @@ MailAddress = Annotated[
         pattern=r"^[A-Za-z0-9.!#$%&'*+/=?^_`{|}~-]{1,64}@[A-Za-z0-9]([A-Za-z0-9.-]{0,252})$"
     ),
 ]
-"""A plain address, without a name."""
+"""Mail address without a display name."""
 
 HostName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_.:-]{1,253}$")]
 
@@ -44,10 +44,11 @@ DEFAULT_CHANGES = (
 
 
 class SecretSettings(Settings):
-    """Place of a secret outside the plant file."""
+    """Location of a secret outside the plant file: a file or an environment variable."""
 
     file: Annotated[str, StringConstraints(min_length=1)] | None = None
-    """File with the secret only, read before each message; example: "/etc/padwatch/webhook.key"."""
+    """File that contains only the secret, read before each message; example:
+    "/etc/padwatch/webhook.key"."""
 
     env: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = None
     """Environment variable with the secret; example: "PADWATCH_WEBHOOK_KEY"."""
@@ -60,16 +61,16 @@ class SecretSettings(Settings):
 
 
 class QuietSettings(Settings):
-    """Daily quiet hours, in which only danger is sent; they may span midnight."""
+    """Daily quiet hours, in which only danger alarms are sent; they may span midnight."""
 
     start: TimeOfDay
-    """When they begin; example: "22:00"."""
+    """Start of the quiet hours; example: "22:00"."""
 
     end: TimeOfDay
-    """When they end; example: "06:00"."""
+    """End of the quiet hours; example: "06:00"."""
 
     time_zone: Annotated[str, StringConstraints(min_length=1, max_length=64)]
-    """IANA name of the time zone of the hours; example: "America/Asuncion"."""
+    """IANA name of the time zone of start and end; example: "America/Asuncion"."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -82,73 +83,75 @@ class QuietSettings(Settings):
         return self
 
     def include(self, time_ns: int) -> bool:
-        """Return whether a time lies within the quiet hours."""
+        """Return whether a time, UTC nanoseconds since 1970, is within the quiet hours."""
         moment = datetime.fromtimestamp(time_ns // NS_PER_S, ZoneInfo(self.time_zone)).time()
         start, end = time.fromisoformat(self.start), time.fromisoformat(self.end)
         return start <= moment < end if start < end else moment >= start or moment < end
 
 
 class ReceiverSettings(Settings):
-    """Settings that all receivers share; a subclass adds its ``kind`` and its address."""
+    """Settings common to all receivers; each subclass adds its ``kind`` and its address."""
 
     id: Identifier
-    """Name of the receiver and of its queue."""
+    """Id of the receiver, unique in the plant file, and name of its queue."""
 
     units: tuple[str, ...] | None = None
-    """Units whose alarms it receives; all unless given; example: ["U1"]."""
+    """Ids of the units whose alarms are sent; all units by default; example: ["U1"]."""
 
     kinds: tuple[AlarmKindName, ...] | None = None
-    """Kinds of alarms that it receives; all unless given. Example: ["link_lost"]."""
+    """Alarm kinds that are sent; all kinds by default. Example: ["link_lost"]."""
 
     changes: Annotated[tuple[AlarmChange, ...], Field(min_length=1)] = DEFAULT_CHANGES
-    """Changes of an alarm that are sent."""
+    """Alarm changes that are sent."""
 
     lowest_priority: Literal["alert", "danger"] = "alert"
-    """"alert" sends all alarms, "danger" only alarms that are, or were, a danger."""
+    """Lowest priority that is sent: "alert" sends all alarms, "danger" only alarms that are, or
+    were, a danger."""
 
     quiet: QuietSettings | None = None
-    """Quiet hours, in which only danger is sent."""
+    """Quiet hours, in which only danger alarms are sent; none by default."""
 
     connect_timeout_s: TimeoutS = 10.0
-    """Longest time to resolve the name and connect, s."""
+    """Time limit for resolving the host name and connecting, s."""
 
     answer_timeout_s: TimeoutS = 30.0
-    """Longest wait for an answer, s."""
+    """Time limit for a response of the receiver, s."""
 
     total_timeout_s: TimeoutS = 60.0
-    """Longest duration of one attempt, s."""
+    """Time limit for one delivery attempt, s."""
 
     max_retry_s: Annotated[float, Field(ge=1.0, le=86_400.0)] = 900.0
-    """Longest wait between two attempts, s; the first is after about one second, then twice as long
-    each time. A longer wait requested by the receiver is ignored."""
+    """Maximum delay between two delivery attempts, s. The delay is about one second after the first
+    attempt and doubles after each attempt. A longer delay requested by the receiver is ignored."""
 
     max_age_h: Annotated[float, Field(ge=0.1, le=8760.0)] = 72.0
-    """Age of a message above which a failed attempt is the last, hours."""
+    """Age of a message above which delivery is not retried, hours."""
 
     ca_file: Annotated[str, StringConstraints(min_length=1)] | None = None
-    """Certificates (PEM) to trust instead of the system's; for a plant with a CA of its own;
-    example: "/etc/padwatch/plant-ca.pem"."""
+    """File with the trusted CA certificates (PEM), instead of those of the system; for a plant with
+    a private CA; example: "/etc/padwatch/plant-ca.pem"."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the receivers in the outbox, one for each queue."""
+        """Names of the queues of this receiver in the outbox: its id."""
         return (self.id,)
 
 
 class WebhookSettings(ReceiverSettings):
-    """A web server that takes each event as a POST of JSON."""
+    """Settings of a webhook: a web server that receives each event as a JSON POST request."""
 
     kind: Literal["webhook"]
-    """"webhook": an HTTP address that takes JSON."""
+    """Kind of the receiver, always "webhook"."""
 
     url: Annotated[str, StringConstraints(min_length=1, max_length=2000)]
-    """URL; redirects are not followed. Example: "https://alarms.example/padwatch"."""
+    """URL of the webhook; redirects are not followed. Example:
+    "https://alarms.example/padwatch"."""
 
     secret: SecretSettings | None = None
-    """Key that signs each message (HMAC-SHA-256); unsigned without."""
+    """Key that signs each message (HMAC-SHA-256); messages are unsigned by default."""
 
     authorization: SecretSettings | None = None
-    """Value of the Authorization header, such as "Bearer …"; none without."""
+    """Value of the Authorization header, such as "Bearer …"; no header by default."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -161,31 +164,33 @@ class WebhookSettings(ReceiverSettings):
 
 
 class SmtpSettings(ReceiverSettings):
-    """A mail server that takes each event as a mail to every recipient."""
+    """Settings of a mail server, by which each event is sent as a mail to every recipient."""
 
     kind: Literal["smtp"]
-    """"smtp": a mail server."""
+    """Kind of the receiver, always "smtp"."""
 
     host: HostName
-    """Mail server; example: "mail.plant.example"."""
+    """Host name of the mail server; example: "mail.plant.example"."""
 
     port: Annotated[int, Field(ge=1, le=65535)] = 587
-    """Its port: 587 for STARTTLS, 465 for TLS from the start, 25 between servers."""
+    """TCP port of the mail server: 587 for STARTTLS, 465 for implicit TLS, 25 between servers."""
 
     tls: Literal["starttls", "implicit", "none"] = "starttls"
-    """"starttls" (refused if the server does not offer it), "implicit" from the start, "none"."""
+    """Encryption: "starttls" (mails are not sent if the server does not offer STARTTLS), "implicit"
+    (TLS from the start of the connection) or "none"."""
 
     username: Annotated[str, StringConstraints(min_length=1, max_length=200)] | None = None
-    """Name for the login; no login unless given."""
+    """User name for the login; no login by default."""
 
     password: SecretSettings | None = None
-    """Password for the login."""
+    """Password for the login; required with username."""
 
     sender: MailAddress
-    """Sender of the mails; example: "padwatch@plant.example"."""
+    """Mail address of the sender; example: "padwatch@plant.example"."""
 
     recipients: Annotated[tuple[MailAddress, ...], Field(min_length=1, max_length=50)]
-    """Recipients; each has its own queue, so that no mailbox delays another."""
+    """Mail addresses of the recipients. Each recipient has a separate queue, so that an unavailable
+    mailbox does not delay the mails to other recipients."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -198,31 +203,31 @@ class SmtpSettings(ReceiverSettings):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the receivers in the outbox, one for each recipient."""
+        """Names of the queues of this receiver in the outbox, one for each recipient."""
         return tuple(f"{self.id}:{recipient}" for recipient in self.recipients)
 
 
 AnyReceiver = WebhookSettings | SmtpSettings
-"""Receivers of all channels."""
+"""Settings of any kind of receiver."""
 
 if TYPE_CHECKING:
     ChannelKind = str
 else:
     ChannelKind = Literal[tuple(t.model_fields["kind"].annotation for t in get_args(AnyReceiver))]
-"""Name of a channel."""
+"""Kind of a receiver."""
 
 
 class DeliverySettings(Settings):
-    """Receivers of notifications."""
+    """Settings of the delivery of notifications."""
 
     dashboard_url: Annotated[str, StringConstraints(max_length=2000)] | None = None
-    """URL of the dashboard for the link in each message; the service's own host and port unless
-    given. Example: "https://padwatch.plant.example/"."""
+    """URL of the dashboard for the link in each message; by default built from host and port of the
+    service. Example: "https://padwatch.plant.example/"."""
 
     receiver: Annotated[
         tuple[Annotated[AnyReceiver, Field(discriminator="kind")], ...], Field(max_length=50)
     ] = ()
-    """Receivers."""
+    """Receivers of notifications, at most 50."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -234,7 +239,7 @@ class DeliverySettings(Settings):
 
 
 def url_fault(url: str) -> str | None:
-    """Return why an address cannot be used, or None."""
+    """Return the reason why a URL is invalid; None if it is valid."""
     try:
         parts = urlsplit(url)
         port = parts.port

@@ -1,4 +1,4 @@
-"""The plant file as a whole: plant, service, analysis and spectra."""
+"""Model of the whole plant file, and its tables plant, service, analysis and spectra."""
 
 import math
 from typing import Annotated, Self
@@ -33,25 +33,26 @@ Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 class SpectraSettings(Settings):
-    """Number of spectra kept of each bearing: the newest ones densely, older ones sparsely.
+    """Spectra stored for each bearing: recent spectra at short intervals, older at long intervals.
 
-    A spectrum up to 25 Hz at the default settings takes 4 kB of disk.
+    A spectrum up to 25 Hz at the default settings takes 4 kB of disk space.
     """
 
     dense_every_s: EveryS = 60.0
-    """Interval of the dense spectra, s."""
+    """Interval between recent (dense) spectra, s."""
 
     n_dense: Count = 1440
-    """Number of dense spectra kept of each bearing; 1440 are a day."""
+    """Number of dense spectra stored for each bearing; 1440 at 60 s are one day."""
 
     sparse_every_s: EveryS = 600.0
-    """Interval of the sparse spectra, s; at least dense_every_s."""
+    """Interval between older (sparse) spectra, s; at least dense_every_s."""
 
     n_sparse: Count = 52_560
-    """Number of sparse spectra kept of each bearing; 52560 are a year and take 0.2 GB."""
+    """Number of sparse spectra stored for each bearing; 52560 at 600 s are one year and take 0.2
+    GB."""
 
     n_lines: Annotated[int, Field(ge=8, le=20_000)] = 1000
-    """Maximum number of lines kept of a spectrum, from the lowest frequency."""
+    """Maximum number of stored lines of a spectrum, from the lowest frequency."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -62,48 +63,48 @@ class SpectraSettings(Settings):
 
 
 MIN_SEGMENT_TURNS = 8
-"""A Hann taper spreads a line over two bins to each side; the vortex at a quarter of the running
-speed must lie outside that range around zero."""
+"""Minimum number of turns in a segment. The Hann taper spreads a line over two bins to each side;
+the vortex at a quarter of the running speed must be more than two bins above zero frequency."""
 
 MIN_SPECTRUM_ORDERS = 2
-"""The spectrum must include the 1× line with its surroundings."""
+"""Minimum range of a spectrum in orders, so that it includes the 1× line and its neighbourhood."""
 
 
 class PlantSettings(Settings):
-    """Name of the plant."""
+    """Settings of the plant."""
 
     name: Annotated[str, StringConstraints(min_length=1, max_length=80)]
-    """Shown on every page; example: "Itaipu"."""
+    """Name of the plant, shown on every page of the dashboard; example: "Itaipu"."""
 
 
 class ServiceSettings(Settings):
-    """The running program."""
+    """Settings of the running program: HTTP server and data folder."""
 
     host: Annotated[str, StringConstraints(min_length=1)] = "127.0.0.1"
-    """Address of the HTTP server. An address other than loopback requires [service.tls] and an
-    account (padwatch users add)."""
+    """IP address or host name of the HTTP server. An address other than loopback requires
+    [service.tls] and an account (padwatch users add)."""
 
     port: Annotated[int, Field(ge=0, le=65535)] = 8080
-    """TCP port of the HTTP server; 0 takes a free one and prints it."""
+    """TCP port of the HTTP server; with 0 a free port is used and printed."""
 
     socket: Annotated[str, StringConstraints(pattern=r"^/[^\x00]{1,99}$")] | None = None
     """Unix socket to listen on instead of host and port, for a proxy on this computer; example:
-    "/run/padwatch/http.sock". Only there padwatch trusts the client addresses that the proxy
-    adds."""
+    "/run/padwatch/http.sock". Client addresses that a proxy adds are trusted only on this
+    socket."""
 
     tls: TlsSettings | None = None
-    """Certificate of the HTTP server; without it HTTP is unencrypted."""
+    """Certificate and key of the HTTP server; without this table HTTP is unencrypted."""
 
     data_folder: Annotated[str, StringConstraints(min_length=1)] = "var"
-    """Folder of the database, relative to the working directory."""
+    """Folder of the database and other stored data, relative to the working directory."""
 
     hosts: Annotated[tuple[HostName, ...], Field(max_length=32)] = ()
-    """Host names that requests may have besides loopback, the configured address and the host of
-    dashboard_url; needed behind a proxy that forwards the name; example:
+    """Allowed host names of requests besides loopback, the configured host and the host of
+    dashboard_url; required behind a proxy that forwards the host name; example:
     ["padwatch.plant.example"]."""
 
     limits: HttpLimitSettings = HttpLimitSettings()
-    """Limits of the requests of one client."""
+    """Limits of HTTP requests and connections."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -122,24 +123,27 @@ class ServiceSettings(Settings):
 
 
 class DynamicModel(Settings):
-    """Estimation of all eight film coefficients between the harmonics of the running speed."""
+    """Settings of the estimator of all eight film coefficients, between the harmonics of 1×."""
 
     band_hz: tuple[float, float] = (0.6, 12.0)
-    """Frequency band of the lines [low, high], Hz."""
+    """Frequency band [low, high] of the spectral lines in the fit, Hz."""
 
     guard_bins: Annotated[float, Field(ge=1.0, le=50.0)] = 3.0
-    """Distance from each harmonic, in bins, within which lines are excluded because of runout."""
+    """Distance from each harmonic of 1×, in spectral bins, within which lines are excluded because
+    of runout."""
 
     probe_noise_um2_per_hz: Annotated[float, Field(ge=0.0, le=1e3)] | None = None
-    """Known one-sided noise density of the shaft probes, µm²/Hz; estimated in the quiet band by
-    default; example: 0.0048, which is white noise of 1.2 µm rms up to 300 Hz."""
+    """Known one-sided noise density of the shaft probes, µm²/Hz; by default the density is
+    estimated in the quiet band. Example: 0.0048, which is white noise of 1.2 µm rms up to 300
+    Hz."""
 
     quiet_band_hz: tuple[float, float] = (15.0, 25.0)
-    """Band [low, high] in Hz without shaft motion, in which the noise of the probes is measured."""
+    """Frequency band [low, high] without shaft motion, in which the noise of the probes is
+    estimated, Hz."""
 
     max_relative_uncertainty: Annotated[float, Field(gt=0.0, le=1.0)] = 0.2
-    """Maximum random standard uncertainty of a direct stiffness, as a share; otherwise there is no
-    result."""
+    """Maximum relative standard uncertainty of a direct stiffness, random part; no stiffness is
+    returned above it."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -151,60 +155,65 @@ class DynamicModel(Settings):
 
 
 class AnalysisModel(Settings):
-    """Segments and averaging; the defaults are those of Brito et al., section 3.1."""
+    """Settings of segments and averaging; the defaults are those of Brito et al., section 3.1."""
 
     segment_samples: Annotated[int, Field(ge=256, le=1_048_576)] = 8192
-    """Points of one Hann-tapered segment."""
+    """Number of samples in one Hann-tapered segment."""
 
     overlap: Annotated[float, Field(ge=0.0, le=0.9)] = 0.125
-    """Overlap of consecutive segments, as a share, 0 to 0.9."""
+    """Overlap of consecutive segments, as a fraction of a segment, 0 to 0.9."""
 
     n_segments: Annotated[int, Field(ge=1, le=1000)] = 24
-    """Number of averaged segments; 24 of 8192 points at 600 Hz are about five minutes."""
+    """Number of averaged segments; 24 segments of 8192 samples at 600 Hz take about five
+    minutes."""
 
     max_frequency_hz: Annotated[float, Field(gt=0.0, le=10_000.0)] = 25.0
-    """Spectra are kept up to this frequency."""
+    """Maximum frequency of the spectra, Hz."""
 
     vortex_order: Annotated[float, Field(ge=0.05, le=0.9)] = 0.25
     """Nominal frequency of the part-load vortex in multiples of the running speed."""
 
     vortex_band: tuple[float, float] = (0.2, 0.4)
-    """Range of orders in which the vortex peak is searched."""
+    """Range of orders [low, high] in which the vortex peak is searched."""
 
     min_segments: Annotated[int, Field(ge=2, le=1000)] = 4
-    """Number of segments below which a result is uncertain."""
+    """Number of averaged segments below which a result is uncertain."""
 
     min_coherence: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.9
-    """Squared coherence of shaft and bearing motion below which no stiffness is given."""
+    """Squared coherence of shaft and bearing motion below which no stiffness is computed."""
 
     min_line_to_floor: Annotated[float, Field(ge=1.0, le=1e6)] = 10.0
-    """Ratio of the power of a line to its surroundings that counts as excitation while there are
-    too few segments for a coherence."""
+    """Minimum ratio of the power of a spectral line to the median power of its neighbourhood for
+    the line to count as excited while there are too few segments for a coherence."""
 
     min_coverage: Annotated[float, Field(ge=0.0, le=1.0)] = 0.5
-    """Share of the possible segments below which a result is uncertain."""
+    """Fraction of the possible segments in the averaging window below which a result is
+    uncertain."""
 
     dynamic: DynamicModel = DynamicModel()
-    """Estimation of all eight film coefficients."""
+    """Settings of the estimator of all eight film coefficients."""
 
     min_speed_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.2
-    """Share of the rated speed below which the machine counts as stopped."""
+    """Fraction of the rated speed below which the machine counts as stopped."""
 
     speed_tolerance: Annotated[float, Field(ge=0.0005, le=0.05)] = 0.002
-    """Difference of the measured speed and the 1× line, as a share, above which results are
-    uncertain (speed_implausible), since an amplitude beside its line is too low. Raise it for a
-    coarser speed channel; example: 0.005 for one in whole r/min at 200 r/min."""
+    """Relative difference between the measured speed and the speed of the 1× line above which
+    results are uncertain (speed_implausible), since an amplitude beside the line is too low.
+    Increase the tolerance for a coarse speed channel; example: 0.005 for whole r/min at 200
+    r/min."""
 
     max_power_change: Annotated[float, Field(gt=0.0, le=1.0)] = 0.05
-    """Change of power within the averaging time, as a share of rated_power_mw or else of the
-    present power, above which results are uncertain (non_stationary); example: 0.05, 35 MW of
-    700."""
+    """Change of active power within the averaging time above which results are uncertain
+    (non_stationary), as a fraction of rated_power_mw, or of the present power if rated_power_mw is
+    not set; example: 0.05, which is 35 MW of 700."""
 
     velocity_low_order: Annotated[float, Field(ge=0.05, le=20.0)] = 0.25
-    """Lower limit of the broad-band velocity of bearings, as a multiple of the rated speed."""
+    """Lower frequency limit of the broad-band velocity of bearings, as a multiple of the rated
+    speed."""
 
     velocity_high_hz: Annotated[float, Field(gt=0.0, le=100_000.0)] = 1000.0
-    """Upper limit of the broad-band velocity of bearings, if the sampling rate allows it."""
+    """Upper frequency limit of the broad-band velocity of bearings, Hz; at most half the sampling
+    rate."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -223,22 +232,22 @@ class AnalysisModel(Settings):
 
 
 class PlantFile(Settings):
-    """A plant file: the plant, the program, the analysis and the units."""
+    """Model of a plant file: plant, program, analysis and units."""
 
     plant: PlantSettings
-    """The plant."""
+    """Name of the plant."""
 
     service: ServiceSettings = ServiceSettings()
     """HTTP server and data folder of the running program."""
 
     access: AccessSettings = AccessSettings()
-    """Logins of people and programs."""
+    """Requirement and duration of logins."""
 
     analysis: AnalysisModel = AnalysisModel()
-    """Segments and averaging."""
+    """Segments, averaging and estimation."""
 
     alarms: AlarmSettings = AlarmSettings()
-    """Delays and limits of the alarms of all units."""
+    """Delays and limits of alarms that apply to all units."""
 
     films: FilmAlarmSettings = FilmAlarmSettings()
     """Monitoring of film stiffness against its baseline."""
@@ -250,10 +259,10 @@ class PlantFile(Settings):
     """Continuous recording of all samples."""
 
     evidence: EvidenceSettings = EvidenceSettings()
-    """Evidence of alarms beside their samples."""
+    """Evidence of alarms: size, age and number."""
 
     spectra: SpectraSettings = SpectraSettings()
-    """History of spectra."""
+    """Number and interval of stored spectra."""
 
     store: StoreSettings = StoreSettings()
     """Database of results."""
@@ -262,10 +271,10 @@ class PlantFile(Settings):
     """Free disk space below which an alarm is raised."""
 
     retention: RetentionSettings = RetentionSettings()
-    """Retention of results by resolution."""
+    """Retention of results and roll-ups."""
 
     stream: StreamSettings | None = None
-    """Stream of blocks from `padwatch acquire` to `padwatch analyse`; not used by `padwatch
+    """Stream of sample blocks from `padwatch acquire` to `padwatch analyse`; not used by `padwatch
     run`."""
 
     delivery: DeliverySettings = DeliverySettings()

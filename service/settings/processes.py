@@ -1,4 +1,4 @@
-"""Processes: HTTP server, access, TLS, and the stream between processes."""
+"""Settings of the HTTP server, logins and TLS, and of the stream between processes."""
 
 from ipaddress import ip_address
 from typing import Annotated, Literal
@@ -11,84 +11,87 @@ FilePath = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
 
 
 class TlsSettings(Settings):
-    """TLS (1.2 or newer) of the HTTP server; not needed behind a proxy with TLS."""
+    """TLS (1.2 or newer) of the HTTP server; not required behind a proxy with TLS."""
 
     certificate: FilePath
-    """File of the certificate with its chain (PEM), relative to the working directory; example:
+    """File with the certificate and its chain (PEM), relative to the working directory; example:
     "/etc/padwatch/padwatch.crt"."""
 
     key: FilePath
-    """File of its private key (PEM, without a passphrase), readable by padwatch's user alone."""
+    """File with the private key of the certificate (PEM, without a passphrase), readable only by
+    padwatch's user."""
 
 
 class AccessSettings(Settings):
-    """Logins: requirement and duration."""
+    """Requirement and duration of logins."""
 
     login: bool = False
     """Whether clients on this computer must log in to read. Clients on other computers or behind a
-    proxy must always log in, and so must all clients that change anything."""
+    proxy must always log in. Requests that change state always require a login."""
 
     idle_min: Annotated[float, Field(ge=1.0, le=1440.0)] = 30.0
-    """Minutes without use after which a login ends. An open dashboard counts as use."""
+    """Time without use after which a login expires, minutes. An open dashboard counts as use."""
 
     longest_h: Annotated[float, Field(ge=0.25, le=168.0)] = 12.0
-    """Hours after which a login ends in any case."""
+    """Maximum duration of a login, hours."""
 
 
 DeadlineS = Annotated[float, Field(ge=0.5, le=60.0)]
-"""Seconds."""
+"""Time limit in seconds."""
 
 HostName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9:][A-Za-z0-9.:-]{0,252}$")]
-"""A host name or address without port."""
+"""Host name or IP address, without a port."""
 
 
 class HttpLimitSettings(Settings):
     """Limits of the HTTP server; an incomplete request is closed within head_s + body_s."""
 
     head_s: DeadlineS = 4.0
-    """Time in which the request line and headers must arrive, s, from the connection or from the
-    first byte."""
+    """Time limit for receiving the request line and headers, s, from the start of the connection or
+    from the first byte of the request."""
 
     body_s: DeadlineS = 4.0
-    """Time in which the body of a request must arrive after its headers, s."""
+    """Time limit for receiving the body of a request after its headers, s."""
 
     unsent_s: DeadlineS = 8.0
-    """Time after which a client is closed that reads nothing of a response, or less than 48 KiB of
-    a long one, s."""
+    """Time after which the connection of a slow client is closed, s. A client is slow if it
+    receives no bytes of a response in this time, or less than 48 KiB of a long response."""
 
     keep_alive_s: DeadlineS = 8.0
-    """Time after which a connection without a request is closed, s."""
+    """Time after which an idle connection is closed, s."""
 
     answer_s: Annotated[float, Field(ge=1.0, le=600.0)] = 20.0
-    """Time after which a response that has not begun is cancelled, s: 503."""
+    """Time limit for the start of a response, s; otherwise the request is cancelled with status
+    503."""
 
     max_head_kb: Annotated[int, Field(ge=1, le=1024)] = 16
-    """Maximum size of the request line and headers, KiB; otherwise 431."""
+    """Maximum size of the request line and headers, KiB; a larger request gets status 431."""
 
     max_target_kb: Annotated[int, Field(ge=1, le=1024)] = 8
-    """Maximum size of path and query, KiB; otherwise 414."""
+    """Maximum size of path and query, KiB; a longer target gets status 414."""
 
     max_body_kb: Annotated[int, Field(ge=1, le=16_384)] = 64
-    """Maximum size of a request body, KiB; otherwise 413."""
+    """Maximum size of a request body, KiB; a larger body gets status 413."""
 
     max_json_depth: Annotated[int, Field(ge=1, le=200)] = 16
-    """Maximum nesting of lists and objects in a body; otherwise 400."""
+    """Maximum nesting depth of arrays and objects in a JSON body; a deeper body gets status 400."""
 
     max_connections: Annotated[int, Field(ge=2, le=100_000)] = 640
-    """Maximum number of connections. Above it the connection is closed that has waited longest
-    without a complete request. The process needs as many open files and about 100 more."""
+    """Maximum number of connections. Above this number the server closes the connection that has
+    waited longest without a complete request. The process requires as many open files, and about
+    100 more."""
 
     max_connections_per_peer: Annotated[int, Field(ge=1, le=100_000)] = 320
-    """Maximum number of connections from one address; a proxy counts as one."""
+    """Maximum number of connections from one IP address; a proxy counts as one address."""
 
     max_requests: Annotated[int, Field(ge=1, le=10_000)] = 64
-    """Maximum number of concurrent requests; otherwise 503 with Retry-After."""
+    """Maximum number of concurrent requests; further requests get status 503 with Retry-After."""
 
 
 ServerUrl = Annotated[
     str, StringConstraints(pattern=r"^(nats|tls)://[A-Za-z0-9_.:\[\]-]{1,253}$", max_length=260)
 ]
-"""Address of a server, without a name or password, which are read from files."""
+"""URL of a NATS server, without user name and password; credentials are read from files."""
 
 CredentialPath = Annotated[str, StringConstraints(min_length=1, max_length=1000)]
 
@@ -99,57 +102,57 @@ class StreamSettings(Settings):
     servers: Annotated[tuple[ServerUrl, ...], Field(min_length=1, max_length=16)] = (
         "nats://127.0.0.1:4222",
     )
-    """Servers of one cluster, tls:// if they use certificates; example:
+    """NATS servers of one cluster, with tls:// if the servers use certificates; example:
     ["nats://10.0.0.1:4222", "nats://10.0.0.2:4222", "nats://10.0.0.3:4222"]."""
 
     credentials_file: CredentialPath | None = None
-    """File with the credentials of an account (.creds), if the servers require them."""
+    """File with the credentials of a NATS account (.creds), if the servers require credentials."""
 
     token_file: CredentialPath | None = None
-    """File with a token only, if the servers require one."""
+    """File that contains only a token, if the servers require a token."""
 
     ca_file: CredentialPath | None = None
-    """Certificate authorities (PEM) to trust instead of the system's."""
+    """File with the trusted certificate authorities (PEM), instead of those of the system."""
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,64}$")] | None = None
     """Name of the stream, unique for each plant; derived from the plant's name by default."""
 
     replicas: Literal[1, 3, 5] = 1
-    """Number of servers that store each block; 3 in a cluster of three."""
+    """Number of replicas of each block, on different servers; 3 in a cluster of three."""
 
     max_gb: Annotated[float, Field(ge=0.001, le=100_000.0)] = 20.0
     """Maximum size of the stream on each server, GB. While the stream is full, publishing fails and
-    blocks wait at the devices; no stored block is dropped."""
+    samples wait at the devices; stored blocks are not dropped."""
 
     max_age_h: Annotated[float, Field(ge=0.1, le=8760.0)] = 6.0
-    """Age above which blocks are removed, h; must exceed the longest outage of the analysis. A unit
-    of 16 channels at 600 Hz takes 0.19 GB in an hour."""
+    """Age above which blocks are removed, h; should exceed the longest outage of the analysis. A
+    unit of 16 channels at 600 Hz takes 0.19 GB an hour."""
 
     duplicate_window_s: Annotated[float, Field(ge=10.0, le=3600.0)] = 120.0
-    """Time in which the servers detect a block that is published twice, s."""
+    """Time window in which the servers detect a duplicate of a published block, s."""
 
     ack_timeout_s: Annotated[float, Field(ge=0.5, le=120.0)] = 5.0
-    """Time without confirmation after which a block is published again, s."""
+    """Time without acknowledgement after which a block is published again, s."""
 
     buffer_mb: Annotated[float, Field(ge=1.0, le=10_000.0)] = 64.0
-    """Maximum memory for blocks that wait for the servers, MB; further blocks wait at the devices
-    until their rings overrun."""
+    """Maximum memory for blocks that wait for the servers, MB; further samples wait in the rings of
+    the devices, until a ring overruns."""
 
     silent_after_s: Annotated[float, Field(ge=2.0, le=3600.0)] = 5.0
-    """Time without a block after which a unit counts as not connected, s; at least the length of
-    three blocks."""
+    """Time without a block after which a unit counts as not connected, s; the length of three
+    blocks applies if it is longer."""
 
     acquire_port: Annotated[int, Field(ge=0, le=65535)] = 8091
-    """Port of the health page of padwatch acquire, on this computer only; 0 takes a free one."""
+    """TCP port of the health page of `padwatch acquire`, on loopback only; 0 uses a free port."""
 
     analyse_port: Annotated[int, Field(ge=0, le=65535)] = 8092
-    """Port of the health page of padwatch analyse, on this computer only; 0 takes a free one."""
+    """TCP port of the health page of `padwatch analyse`, on loopback only; 0 uses a free port."""
 
 
 def is_loopback(host: str) -> bool:
-    """Return whether an address is reachable from its own host only.
+    """Return whether an address is a loopback address.
 
-    Of names only `localhost` counts; padwatch does not resolve others.
+    `localhost` is the only name that counts as loopback; names are not resolved.
     """
     if host == "localhost":
         return True
@@ -163,9 +166,9 @@ def is_loopback(host: str) -> bool:
 def why_closed(
     host: str, *, is_unix_socket: bool = False, has_tls: bool = False, has_account: bool = False
 ) -> str | None:
-    """Return why the service must not listen on an address, or None.
+    """Return the reason why the service must not listen on an address; None if it may.
 
-    A Unix socket is reachable only for a proxy on the same host.
+    A Unix socket is reachable only by a proxy on the same host.
     """
     if is_unix_socket or is_loopback(host):
         return None

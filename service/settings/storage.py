@@ -1,4 +1,4 @@
-"""Stored data: database, retention, recordings, evidence, disk limits, origin."""
+"""Settings of stored data: database, retention, recordings, evidence and disk space."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -13,15 +13,16 @@ Conninfo = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
 
 
 class StoreSettings(Settings):
-    """Database of results; by default a SQLite file in the data folder."""
+    """Settings of the results database; by default a SQLite file in the data folder."""
 
     postgresql: Conninfo | None = None
-    """PostgreSQL database to use instead, as libpq keywords or URI without a password; example:
+    """PostgreSQL database instead of SQLite, as libpq keywords or URI without a password; example:
     "host=db.plant.example dbname=padwatch user=padwatch sslmode=verify-full"."""
 
     password_file: FilePath | None = None
-    """File with the password of the PostgreSQL role only, readable by padwatch's user alone (chmod
-    600); example: "/etc/padwatch/postgresql.password". Without it libpq reads `~/.pgpass`."""
+    """File that contains only the password of the PostgreSQL role, readable only by padwatch's user
+    (chmod 600); example: "/etc/padwatch/postgresql.password". By default libpq reads
+    `~/.pgpass`."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -41,7 +42,7 @@ class StoreSettings(Settings):
 
     @property
     def password_path(self) -> Path | None:
-        """The file with the password, if there is one."""
+        """Path of the password file; None if not set."""
         return None if self.password_file is None else Path(self.password_file)
 
 
@@ -51,7 +52,7 @@ def _keywords(conninfo: str) -> dict[str, Any]:
 
     try:
         return conninfo_to_dict(conninfo)
-    except ProgrammingError:  # its message may contain the password
+    except ProgrammingError:  # the message of the error may contain the password
         raise SecretMisfitError(
             'is not a libpq connection string such as "host=db.plant.example dbname=padwatch"',
             "postgresql",
@@ -66,28 +67,31 @@ FINER = (
 
 
 class RetentionSettings(Settings):
-    """Retention: ages in days above which results are kept in coarser form only; 0 for no limit.
+    """Retention: ages in days above which only coarser roll-ups of results are kept; 0: no limit.
 
-    One bearing takes 3 GB a year as single results, 2.2 GB as minutes, 0.25 GB as ten minutes and
-    0.05 GB as hours, at the default refresh of 12 s. Never removed: hours with minimum, maximum,
-    mean, count and worst quality; alarms and their history; baselines, references, the audit trail.
+    One bearing takes 3 GB a year as single results, and as roll-ups 2.2 GB (minutes), 0.25 GB (ten
+    minutes) and 0.05 GB (hours), at the default refresh of 12 s. Never removed: hourly roll-ups
+    with minimum, maximum, mean, count and worst quality; alarms and their history; baselines,
+    references and the audit trail.
     """
 
     readings_days: Days = 400.0
-    """Single results of bearings; the default of 13 months allows comparing seasons."""
+    """Retention of single results of bearings; the default of 13 months allows comparing
+    seasons."""
 
     minutes_days: Days = 400.0
-    """Results by the minute; not below readings_days."""
+    """Retention of one-minute roll-ups; not below readings_days."""
 
     ten_minutes_days: Days = 3660.0
-    """Results by ten minutes; not below minutes_days."""
+    """Retention of ten-minute roll-ups; not below minutes_days."""
 
     films_days: Days = 0.0
-    """Readings of films, which baselines are learned from, 0.8 GB a year for each bearing."""
+    """Retention of film readings, from which baselines are learned; 0.8 GB a year for each
+    bearing."""
 
     messages_days: Days = 400.0
-    """Delivered, rejected and expired notifications. Waiting ones, and the last one of each alarm,
-    are kept."""
+    """Retention of delivered, rejected and expired notifications. Waiting notifications, and the
+    last notification of each alarm, are kept."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -100,33 +104,33 @@ class RetentionSettings(Settings):
 
 
 class RecordingSettings(Settings):
-    """Continuous recording of all samples of units."""
+    """Settings of the continuous recording of all samples."""
 
     samples: Literal["kept", "not_kept"] = "not_kept"
-    """Whether all samples are "kept" or "not_kept"; captures around alarms are independent of it,
-    see [capture]."""
+    """Whether all samples are "kept" or "not_kept"; captures around alarms do not depend on this
+    key, see [capture]."""
 
     units: Annotated[tuple[Identifier, ...], Field(max_length=200)] = ()
-    """Units to record; all if empty. Example: ["U1", "U3"]."""
+    """Ids of the units to record; all units if empty. Example: ["U1", "U3"]."""
 
     folder: Annotated[str, StringConstraints(min_length=1)] | None = None
     """Folder of the recordings, relative to the working directory; "recordings" in the data folder
     by default. A separate disk is recommended; example: "/srv/padwatch/recordings"."""
 
     length_min: Annotated[int, Field(ge=1, le=60)] = 10
-    """Length of each recording, minutes; a new one begins at every full multiple of it, UTC."""
+    """Length of each recording, minutes; recordings begin at full multiples of this length, UTC."""
 
     sync_s: Annotated[float, Field(ge=1.0, le=60.0)] = 30.0
-    """Interval of syncs to the disk, s. A power cut loses at most the samples of this time, and up
-    to 20 s that wait for a slow disk."""
+    """Interval of syncs to the disk, s. A power cut loses at most the samples of this interval,
+    plus up to 20 s of samples that wait for a slow disk."""
 
     max_gb: Annotated[float, Field(gt=0.0, le=1_000_000.0)] = 100.0
-    """Total size, GB (10^9 bytes); above it the oldest are removed. Twelve channels at 600 Hz take
-    about half a GB a day."""
+    """Maximum total size of the recordings, GB (10^9 bytes); above it the oldest recordings are
+    removed. Twelve channels at 600 Hz take about half a GB a day."""
 
     max_days: Annotated[float, Field(gt=0.0, le=36_500.0)] = 30.0
-    """Age above which recordings are removed, days. It applies once a day of recordings of the unit
-    exists, so that a wrong clock removes nothing."""
+    """Age above which recordings are removed, days. The limit applies once a day of recordings of
+    the unit exists, so that a wrong clock does not remove recordings."""
 
     def keeps(self, unit: str) -> bool:
         """Return whether all samples of a unit are recorded."""
@@ -134,22 +138,25 @@ class RecordingSettings(Settings):
 
 
 class EvidenceSettings(Settings):
-    """Evidence: the state of the plant when an alarm was raised, in the data folder."""
+    """Settings of evidence: state of the plant when an alarm was raised, in the data folder."""
 
     max_gb: Annotated[float, Field(gt=0.0, le=10_000.0)] = 2.0
-    """Total size, GB (10^9 bytes); above it the oldest evidence older than keep_days is removed."""
+    """Maximum total size, GB (10^9 bytes), above which the oldest evidence is removed, if it is
+    older than keep_days."""
 
     hard_max_gb: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
-    """Size above which the oldest is removed at any age, GB; must not be below max_gb."""
+    """Maximum total size, GB, above which the oldest evidence is removed at any age; must not be
+    below max_gb."""
 
     keep_days: Annotated[float, Field(ge=0.0, le=36_500.0)] = 30.0
-    """Age up to which evidence is kept below hard_max_gb, days."""
+    """Age up to which evidence is kept while the total size is below hard_max_gb, days."""
 
     max_per_alarm: Annotated[int, Field(ge=1, le=100_000)] = 200
-    """Number of occurrences kept of one alarm; limits the evidence of a chattering alarm."""
+    """Maximum number of occurrences of one alarm for which evidence is kept; limits the evidence of
+    a chattering alarm."""
 
     trend_days: Annotated[float, Field(ge=0.1, le=366.0)] = 14.0
-    """Length of the film history that is kept with an alarm, days."""
+    """Length of the film trend in the evidence of an alarm, days."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -163,7 +170,7 @@ Gigabytes = Annotated[float, Field(gt=0.0, le=1_000_000.0)]
 
 
 class SpaceSettings(Settings):
-    """Free disk space below which the alarm disk_nearly_full is raised.
+    """Limits of free disk space below which the alarm disk_nearly_full is raised.
 
     The limit that is reached first applies, the share of the disk or the gigabytes.
     """
@@ -172,14 +179,15 @@ class SpaceSettings(Settings):
     """Free share of a disk below which the alarm is an alert."""
 
     danger_free_share: Share = 0.05
-    """Free share below which it is a danger; must be below alert_free_share."""
+    """Free share of a disk below which the alarm is a danger; must be below alert_free_share."""
 
     alert_free_gb: Gigabytes = 2.0
-    """Free GB (10^9 bytes) below which the alarm is an alert, at most a quarter of the disk."""
+    """Free space, GB (10^9 bytes), below which the alarm is an alert, at most a quarter of the
+    disk."""
 
     danger_free_gb: Gigabytes = 1.0
-    """Free GB below which it is a danger, at most an eighth of the disk; must be below
-    alert_free_gb."""
+    """Free space, GB, below which the alarm is a danger, at most an eighth of the disk; must be
+    below alert_free_gb."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -192,7 +200,7 @@ class SpaceSettings(Settings):
 
 
 class Origin(StrEnum):
-    """Origin of samples; a replay never shares a database with the live plant."""
+    """Origin of samples: live plant or replay; a replay never shares a database with the plant."""
 
     LIVE = "live"
     REPLAY = "replay"

@@ -1,4 +1,4 @@
-"""TOML files: parsing, validation, and one message with its line for each mistake."""
+"""TOML files: parsing, validation, and an error message with a line number for each mistake."""
 
 import json
 import re
@@ -16,21 +16,21 @@ from acquisition.delivery.small_file import read_small_file
 from service.settings.base import MisfitError, MissingError, SecretMisfitError, Settings
 
 Location: TypeAlias = tuple[int | str, ...]
-"""Keys, and after each array the number of the element."""
+"""Location of a value in a TOML file: keys, and after an array the index of the element."""
 
 HEADER = re.compile(r"^\s*(\[\[?)\s*([A-Za-z0-9_.\"-]+?)\s*\]\]?\s*(?:#.*)?$")
 KEY = re.compile(r"^\s*([A-Za-z0-9_.-]+)\s*=")
 
 
 def line_of(location: Location, text: str) -> int:
-    """Return the line of a key, or of the innermost table around it with its own line."""
+    """Return the line number of a key, or of the innermost enclosing table with its own line."""
     lines = dict(_lines(text))
     starts = (location[:n] for n in range(len(location), 0, -1))
     return next((lines[start] for start in starts if start in lines), 1)
 
 
 def _lines(text: str) -> Iterator[tuple[Location, int]]:
-    """Yield the line numbers of the tables and keys at the start of a line."""
+    """Yield location and line number of each table header, and of each key that begins a line."""
     table: Location = ()
     counts: dict[Location, int] = {}
     for number, line in enumerate(text.split("\n"), start=1):
@@ -44,7 +44,7 @@ def _lines(text: str) -> Iterator[tuple[Location, int]]:
 
 
 def _table_location(names: list[str], is_array: bool, counts: dict[Location, int]) -> Location:
-    """Return the location of a header: names, and the element number after array tables."""
+    """Return the location of a table header: key names, and an index after each array of tables."""
     location: Location = ()
     for position, name in enumerate(names):
         location = (*location, name.strip('"'))
@@ -56,17 +56,17 @@ def _table_location(names: list[str], is_array: bool, counts: dict[Location, int
 
 
 Schema: TypeAlias = dict[str, Any]
-"""JSON schema, or a part of it."""
+"""JSON schema, or a subschema."""
 
 
 @cache
 def schema_of(model: type[Settings]) -> Schema:
-    """Return the JSON schema of a file, with meaning, limits and defaults of every key."""
+    """Return the JSON schema of a model, with description, limits and default of every key."""
     return model.model_json_schema()
 
 
 def description(schema: Schema, location: Location) -> str:
-    """Return the meaning of a key in one line; empty if the key is unknown."""
+    """Return the description of a key in one line; an empty string if the key is unknown."""
     node, text = schema, ""
     for part in location:
         step = _step(schema, node, part)
@@ -78,7 +78,7 @@ def description(schema: Schema, location: Location) -> str:
 
 
 def known_keys(schema: Schema, location: Location) -> list[str]:
-    """Return the keys that a table may have."""
+    """Return the valid keys of a table, sorted."""
     node: Schema | None = schema
     for part in location:
         node = _step(schema, node, part) if node is not None else None
@@ -99,7 +99,7 @@ def _step(schema: Schema, node: Schema, part: int | str) -> Schema | None:
 
 
 def _options(schema: Schema, node: Schema) -> list[Schema]:
-    """Resolve references and alternatives to the schemas behind them."""
+    """Return the alternative schemas of a node, with references resolved."""
     if "$ref" in node:
         name = str(node["$ref"]).rsplit("/", 1)[-1]
         return _options(schema, schema["$defs"][name])
@@ -110,18 +110,21 @@ def _options(schema: Schema, node: Schema) -> list[Schema]:
 
 
 MAX_SHOWN = 60
-"""Characters of a wrong value that are shown."""
+"""Maximum number of characters of a wrong value in an error message."""
 
 UNION_ERRORS = ("union_tag_invalid", "union_tag_not_found")
 
 
 def is_echo(error: ErrorDetails) -> bool:
-    """Return whether a list is too short only because its elements are reported as wrong."""
+    """Return whether a list is too short only because its invalid elements were removed.
+
+    Errors about these elements are reported separately.
+    """
     return error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]
 
 
 def located(error: ErrorDetails, data: Mapping[str, Any]) -> Location:
-    """Return the place of a mistake in the file."""
+    """Return the location of an error in the file."""
     location = _without_tags(error["loc"], data)
     reason = error.get("ctx", {}).get("error")
     if isinstance(reason, MisfitError):
@@ -132,7 +135,7 @@ def located(error: ErrorDetails, data: Mapping[str, Any]) -> Location:
 def sentence(
     schema: Schema, error: ErrorDetails, location: Location, data: Mapping[str, Any]
 ) -> str:
-    """Return the message of a mistake."""
+    """Return the message of an error: key, value, problem and description of the key."""
     key = "".join(_entry(part) for part in location).lstrip(".")
     found, value = _value(data, location)
     holds_tables = isinstance(value, list) and any(isinstance(each, dict) for each in value)
@@ -155,7 +158,7 @@ def sentence(
 
 
 def _entry(part: int | str) -> str:
-    """Format one step of a place on one line; a key may be any text."""
+    """Format a key or an index of a location; a key with unprintable characters is escaped."""
     if isinstance(part, int):
         return f"[{part + 1}]"
     return f".{part}" if part.isprintable() else f".{part!r}"
@@ -168,7 +171,7 @@ def _shown(value: Any) -> str:
 
 
 def _value(data: Any, location: Location) -> tuple[bool, Any]:
-    """Return whether the file has a value at a place, and the value."""
+    """Return whether the file has a value at a location, and the value."""
     for part in location:
         inside = isinstance(data, dict) and part in data
         listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
@@ -179,7 +182,7 @@ def _value(data: Any, location: Location) -> tuple[bool, Any]:
 
 
 def _without_tags(location: Location, data: Any) -> Location:
-    """Remove the union tags that pydantic adds to the keys of the file."""
+    """Return a location without the union tags that pydantic inserts between the keys."""
     kept: Location = ()
     for part in location:
         _, table = _value(data, kept)
@@ -189,10 +192,10 @@ def _without_tags(location: Location, data: Any) -> Location:
 
 
 MAX_FILE_BYTES = 4_000_000
-"""Limits memory if the path is wrong (a device, a recording); far above the size of any file."""
+"""Maximum file size. Limits the memory if the path is wrong, such as a device or a recording."""
 
 FOLDER = "folder"
-"""Key of the validation context: the folder of the file, to which paths in it are relative."""
+"""Key of the validation context: folder of the file, base of relative paths in the file."""
 
 TOO_DEEP = "nested too deeply"
 
@@ -202,22 +205,22 @@ Model = TypeVar("Model", bound=Settings)
 
 
 class TomlFileError(Exception):
-    """A file cannot be used; the message has one line for each mistake."""
+    """A TOML file is unreadable or invalid; the message has one line for each mistake."""
 
 
 def load_toml(path: Path, model: type[Model]) -> Model:
-    """Read and validate a file.
+    """Read and validate a TOML file.
 
-    Raises `TomlFileError` if the file cannot be read or is wrong; the message names every mistake.
+    Raises `TomlFileError` if the file is unreadable or invalid; the message lists every mistake.
     """
     text = _read(path)
     data = _parsed(path, text)
     try:
-        # only in JSON does strict mode (no text or boolean for a number) accept a list as a tuple
+        # strict mode (no text or boolean for a number) accepts a list as a tuple only in JSON
         return model.model_validate_json(
             json.dumps(data, default=str), strict=True, context={FOLDER: path.parent}
         )
-    except RecursionError as error:  # from dotted keys, which TOML parses without recursion
+    except RecursionError as error:  # by dotted keys: the TOML parser does not recurse
         raise TomlFileError(f"{path}: {TOO_DEEP}") from error
     except ValidationError as error:
         if error.errors()[0]["type"] == "json_invalid":

@@ -1,4 +1,4 @@
-"""Frequency response of a transducer: a model, or a calibration sheet in CSV."""
+"""Settings of the frequency response of a transducer: analytic elements or a CSV calibration."""
 
 import csv
 import math
@@ -25,16 +25,16 @@ MAX_SHEET_BYTES = 1_000_000
 
 
 class SheetError(Exception):
-    """A calibration sheet cannot be used; the message has file, line and fault."""
+    """A calibration sheet is unreadable or invalid; the message states file, line and fault."""
 
 
 def read_calibration_sheet(path: Path) -> ResponseTable:
-    """Read a sheet: a line with the names of the columns, then one line per point.
+    """Read a CSV calibration sheet: a header line with the column names, then one line per point.
 
     Lines that begin with # and empty lines at the end are ignored.
 
-    Raises `SheetError` if the file cannot be read, a column or a value is missing, a value is not a
-    finite number, frequencies do not increase from above zero, or a magnitude is not above zero.
+    Raises `SheetError` if the file is unreadable, a column or value is missing, a value is not a
+    finite number, a frequency or magnitude is not above zero, or frequencies do not increase.
     """
     rows = _rows(path, _read(path))
     number, header = next(rows, (1, []))
@@ -68,7 +68,7 @@ def _read(path: Path) -> str:
 
 
 def _rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
-    """Yield line numbers and cells."""
+    """Yield the line number and the CSV fields of each line that is not a comment."""
     for number, line in enumerate(text.splitlines(), start=1):
         if line.startswith("#"):
             continue
@@ -99,52 +99,54 @@ def _check(place: str, point: tuple[float, ...], before: list[tuple[float, ...]]
 
 
 class HighPassSettings(Settings):
-    """A lower frequency limit: of an accelerometer, a charge amplifier or a velocity pickup."""
+    """High-pass response of an accelerometer, charge amplifier or velocity pickup."""
 
     kind: Literal["high_pass"]
-    """Always "high_pass"."""
+    """Kind of the element, always "high_pass"."""
 
     corner_hz: Annotated[float, Field(ge=0.001, le=100.0)]
-    """The -3 dB frequency of order 1, the natural frequency of order 2, Hz; example: 0.5."""
+    """Corner frequency, Hz: -3 dB frequency for order 1, natural frequency for order 2; example:
+    0.5."""
 
     order: Literal[1, 2] = 1
-    """1 for a single time constant, 2 for a seismic mass or a double time constant."""
+    """Order of the high-pass: 1 for a single time constant, 2 for a seismic mass or a double time
+    constant."""
 
     damping: Annotated[float, Field(ge=0.05, le=5.0)] = BUTTERWORTH_DAMPING
-    """Share of critical damping, for order 2; default: -3 dB at the natural frequency."""
+    """Damping ratio for order 2; default: -3 dB at the natural frequency."""
 
     def response(self) -> Response:
-        """Return the part in core's terms."""
+        """Return the response as a value of core."""
         return HighPass(self.corner_hz, self.order, self.damping)
 
 
 class ResonanceSettings(Settings):
-    """A mounted resonance, or any upper limit of second order."""
+    """Mounted resonance of a transducer, or another second-order low-pass response."""
 
     kind: Literal["resonance"]
-    """Always "resonance"."""
+    """Kind of the element, always "resonance"."""
 
     natural_hz: Annotated[float, Field(ge=1.0, le=1e6)]
-    """Natural frequency, Hz; example: 2500.0."""
+    """Natural frequency of the resonance, Hz; example: 2500.0."""
 
     damping: Annotated[float, Field(ge=0.001, le=5.0)]
-    """Share of critical damping; example: 0.02."""
+    """Damping ratio of the resonance; example: 0.02."""
 
     def response(self) -> Response:
-        """Return the part in core's terms."""
+        """Return the response as a value of core."""
         return Resonance(self.natural_hz, self.damping)
 
 
 class SheetSettings(Settings):
-    """A response measured by a calibration laboratory."""
+    """Frequency response measured by a calibration laboratory."""
 
     kind: Literal["sheet"]
-    """Always "sheet"."""
+    """Kind of the element, always "sheet"."""
 
     file: Annotated[str, Field(min_length=1, max_length=1000)]
-    """CSV with columns frequency_hz, magnitude and phase_deg, relative to the folder of the plant
-    file. The magnitude is 1 if the nominal sensitivity is exact; the phase is positive if the
-    reading leads the motion. Example: "ujb_bearing_x.csv"."""
+    """CSV file with columns frequency_hz, magnitude and phase_deg; the path is relative to the
+    folder of the plant file. The magnitude is 1 where the nominal sensitivity is exact; the phase
+    is positive where the reading leads the motion. Example: "ujb_bearing_x.csv"."""
 
     _table: ResponseTable = PrivateAttr()
 
@@ -158,18 +160,18 @@ class SheetSettings(Settings):
         return self
 
     def response(self) -> Response:
-        """Return the part in core's terms."""
+        """Return the response as a value of core."""
         return self._table
 
 
 ResponseSettings: TypeAlias = Annotated[
     HighPassSettings | ResonanceSettings | SheetSettings, Field(discriminator="kind")
 ]
-"""One part of a response."""
+"""Element of a frequency response."""
 
 
 def response_of(parts: Sequence[ResponseSettings]) -> Response | None:
-    """Return all parts in core's terms; an empty tuple is a flat response."""
+    """Return the response of a chain of elements as a value of core; None for a flat response."""
     if not parts:
         return None
     return ResponseChain(tuple(part.response() for part in parts))

@@ -1,4 +1,4 @@
-"""A generating unit, and checks that its source, channels and alarms are consistent."""
+"""Settings of a generating unit; checks that source, channels and alarms are consistent."""
 
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Literal, Self
@@ -29,7 +29,10 @@ def require_source_fit(
     channels: Sequence[str],
     slow: Sequence[str],
 ) -> None:
-    """Refuse a source, or a second device beside it, that does not fit the ids of the channels."""
+    """Refuse a source or a second device that does not match the ids of the channels.
+
+    Raises `MisfitError`. ``beside`` is the second device, which reads slow channels.
+    """
     if beside is not None:
         beside.require_fit(slow)
     own = [id_ for id_ in slow if beside is None or id_ not in beside.mapped_channels]
@@ -43,7 +46,10 @@ def require_source_fit(
 
 
 def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]]) -> None:
-    """Refuse a serial line of two devices (location, settings): a line has one master."""
+    """Refuse two devices on one serial line, as a line has one master.
+
+    ``readers`` are pairs of location and device settings.
+    """
     taken: dict[str, tuple[int | str, ...]] = {}
     for at, device in readers:
         if not isinstance(device, ModbusLinkSettings) or device.device in (None, "pty"):
@@ -61,7 +67,7 @@ def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]])
 
 
 FROM_WAVEFORMS = ("shaft_overall_um_pp", "bearing_overall_mm_s_rms")
-"""Limits of quantities that a vector rack does not measure."""
+"""Limit keys of broad-band quantities, which a vector rack does not measure."""
 
 ZONES = ("shaft_um_pp", "shaft_max_um_pk", "bearing_mm_s_rms")
 
@@ -73,7 +79,7 @@ def require_alarm_fit(
     channels: Iterable[ChannelSettings],
     bearings: Sequence[BearingSettings],
 ) -> None:
-    """Refuse limits of quantities that are not measured."""
+    """Refuse alarm limits of quantities that the unit does not measure."""
     if unit == PLANT:
         raise MisfitError("is reserved for alarms of the whole plant; choose another", "id")
     is_rack = isinstance(source, ModbusVectorSettings)
@@ -118,70 +124,72 @@ def _require_phase(
 
 
 class UnitSettings(Settings):
-    """A generating unit."""
+    """Settings of a generating unit."""
 
     id: Identifier
-    """Unique within the plant; example: "U07"."""
+    """Id of the unit, unique within the plant; example: "U07"."""
 
     name: Annotated[str, StringConstraints(min_length=1, max_length=80)]
-    """Display name; example: "Unit 7"."""
+    """Display name of the unit; example: "Unit 7"."""
 
     rated_speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)]
     """Rated running speed in r/min, 20 to 1500; example: 92.3."""
 
     rated_power_mw: Annotated[float, Field(gt=0.0, le=2000.0)] | None = None
-    """Rated active power in MW, at most 2000; needed with power_channel for operating states and
-    for monitoring films, and as the reference of load changes; example: 700.0."""
+    """Rated active power in MW, at most 2000; required with power_channel for operating states and
+    film monitoring, and the reference of load changes; example: 700.0."""
 
     rate_hz: Annotated[float, Field(ge=20.0, le=100_000.0)] = 600.0
-    """Samples per second and channel; example: 600.0. No effect on polled registers, whose rate is
-    one over poll_period_s."""
+    """Sampling rate of each channel, Hz; example: 600.0. Has no effect on polled registers, whose
+    rate is 1 / poll_period_s."""
 
     block_samples: Annotated[int, Field(ge=1, le=10_000)] = BLOCK_SAMPLES
-    """Samples of each channel in a block, which has one quality per channel and one set of slow
-    values; should equal the slot length of the DAQ. Example: 50, 1/12 s at 600 Hz."""
+    """Number of samples per channel in a block. A block has one quality per channel and one set of
+    slow values. Should equal the slot length of the DAQ. Example: 50, 1/12 s at 600 Hz."""
 
     turbine: Literal["francis", "kaplan"] = "francis"
-    """"francis" or "kaplan"; the order of the part-load vortex is evaluated for Francis only."""
+    """Type of the turbine, "francis" or "kaplan"; the part-load vortex is evaluated for Francis
+    only."""
 
     rotation: Literal["x_to_y", "y_to_x"] = "x_to_y"
     """Direction of rotation in the axes of the bearings: "x_to_y" or "y_to_x". An orbit in the
-    other direction may show exchanged transducers."""
+    opposite direction may indicate exchanged transducers."""
 
     speed_channel: Identifier | None = None
-    """Slow channel (r/min) of the running speed; without it and a key-phase, the 1× line
-    is used."""
+    """Slow channel (r/min) of the running speed; without a speed channel and a key-phase, the speed
+    is that of the 1× line."""
 
     key_phase: Identifier | None = None
-    """Waveform channel with one pulse a turn (transducer "key_phase"): it gives the running speed,
-    and the shaft's angle that slow_roll needs; example: "kp"."""
+    """Waveform channel with one pulse per turn (transducer "key_phase"): source of the running
+    speed, and of the angle of the shaft that slow_roll requires; example: "kp"."""
 
     power_channel: Identifier | None = None
-    """Slow channel (MW) of the active power. Results are uncertain while it has no value
-    (power_unknown); without the channel, only the speed decides whether a unit is steady."""
+    """Slow channel (MW) of the active power. Results are uncertain (power_unknown) while the
+    channel has no value; without a power channel, only the speed decides whether a unit is
+    steady."""
 
     source: SourceSettings
-    """Source of the samples, by kind: "modbus_ring" (a streaming DAQ), "modbus_fifo" (queues),
+    """Source of the samples, of kind "modbus_ring" (a streaming DAQ), "modbus_fifo" (FIFO queues),
     "modbus_polled" (registers), "modbus_vector" (a rack with amplitudes), "can" or "simulated"."""
 
     slow_source: SlowDeviceSettings | None = None
-    """Second device from which slow channels are polled."""
+    """Second device, from which slow channels are polled; none by default."""
 
     channel: Annotated[tuple[ChannelSettings, ...], Field(min_length=1, max_length=32)]
-    """Waveform channels in wire order, at most 32."""
+    """Waveform channels in the order of the device, at most 32."""
 
     slow_channel: Annotated[tuple[SlowChannelSettings, ...], Field(max_length=50)] = ()
-    """Slow channels in wire order, at most 50."""
+    """Slow channels in the order of the device, at most 50."""
 
     bearing: Annotated[tuple[BearingSettings, ...], Field(min_length=1, max_length=8)]
-    """Guide bearings."""
+    """Guide bearings, at most 8."""
 
     simulation: SimulationSettings | None = None
-    """The simulated machine behind a simulated DAQ or source; no effect on a real one."""
+    """Simulated machine of a simulated DAQ or source; has no effect on real devices."""
 
     @property
     def sampling_hz(self) -> float:
-        """Samples of each channel per second; polls per second for polled registers."""
+        """Sampling rate of each channel, Hz; for polled registers, polls per second."""
         if isinstance(self.source, ModbusPolledSettings | ModbusVectorSettings):
             return self.source.rate_hz
         return self.rate_hz

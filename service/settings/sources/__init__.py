@@ -1,1 +1,1 @@
-"""Settings of sources: measuring devices, simulated machines and imported files."""
+"""Settings of sample sources: measuring devices, simulated machines and imported files."""

@@ -1,4 +1,4 @@
-"""A measuring device on a CAN bus, in the plant file."""
+"""Settings of a CAN or CAN FD source."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,10 +12,10 @@ from service.settings.toml_file import FOLDER
 DBC_NAME = "[A-Za-z_][A-Za-z0-9_]{0,127}"
 
 SignalPath = Annotated[str, StringConstraints(pattern=rf"^{DBC_NAME}\.{DBC_NAME}$")]
-"""Signal of the DBC file, as "Message.Signal"."""
+"""Signal of the DBC file, written as "Message.Signal"."""
 
 SampleSignals = SignalPath | Annotated[tuple[SignalPath, ...], Field(min_length=1, max_length=64)]
-"""One signal, or one for each sample of a frame, the oldest first."""
+"""Signal of a channel, or one signal for each sample in a frame, the oldest sample first."""
 
 OF_A_DBC = (
     "signals",
@@ -27,20 +27,20 @@ OF_A_DBC = (
     "seconds",
     "microseconds",
 )
-"""Keys with names of signals; not used with a profile."""
+"""Keys that refer to signals of a DBC file; not allowed with a profile."""
 
 LISTENING_IS_SET = ("socketcan",)
-"""Interfaces whose bit rates are set in the operating system."""
+"""Interfaces of python-can whose bit rates are set in the operating system."""
 
 WITHOUT_STAMPS = ("slcan",)
-"""Interfaces without time stamps of frames."""
+"""Interfaces of python-can without time stamps of frames."""
 
 
 class CanSettings(Settings):
-    """A measuring device on a CAN or CAN FD bus; padwatch only listens."""
+    """Settings of a measuring device on a CAN or CAN FD bus; padwatch only listens."""
 
     kind: Literal["can"]
-    """Always "can"."""
+    """Kind of the source, always "can"."""
 
     interface: Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,31}$")]
     """Name of the interface in python-can; example: "socketcan", "slcan", "pcan", "kvaser"."""
@@ -50,75 +50,76 @@ class CanSettings(Settings):
     "PCAN_USBBUS1"."""
 
     bitrate: Annotated[int, Field(ge=5_000, le=1_000_000)] | None = None
-    """Bits per second of the bus; not for socketcan, whose rate is set in the operating system.
+    """Bit rate of the bus, bit/s; not for socketcan, whose bit rate is set in the operating system.
     Example: 500000."""
 
     fd: bool = False
     """Whether the bus carries CAN FD frames."""
 
     data_bitrate: Annotated[int, Field(ge=100_000, le=15_000_000)] | None = None
-    """Bits per second of the data phase of CAN FD frames; example: 2000000."""
+    """Bit rate of the data phase of CAN FD frames, bit/s; example: 2000000."""
 
     options: dict[Identifier, str | int | float | bool] = Field(default={}, max_length=32)
-    """Further arguments of python-can's interface; example: { tty_baudrate = 2000000 }."""
+    """Additional arguments of the python-can interface; example: { tty_baudrate = 2000000 }."""
 
     dbc: Annotated[str, StringConstraints(min_length=1, max_length=1000)] | None = None
     """DBC file of the frames, relative to the folder of the plant file; example: "unit7.dbc"."""
 
     profile: Literal["padwatch_int16", "padwatch_float32"] | None = None
-    """Messages of padwatch's simulated DAQ for the channels of the unit, as counts or as
-    engineering units, instead of dbc and signals."""
+    """Message set of padwatch's simulated DAQ, instead of dbc and signals: samples as counts
+    ("padwatch_int16") or in engineering units ("padwatch_float32")."""
 
     signals: dict[Identifier, SampleSignals] = Field(default={}, max_length=32)
-    """Signal of each waveform channel, "Message.Signal", or a list if a frame has several samples;
-    example: { ujb_shaft_x = "WAVE_0.ujb_shaft_x" }."""
+    """Signal of each waveform channel, "Message.Signal", or a list of signals if a frame has
+    several samples; example: { ujb_shaft_x = "WAVE_0.ujb_shaft_x" }."""
 
     slow: dict[Identifier, SignalPath] = Field(default={}, max_length=50)
     """Signal of each slow channel; example: { speed = "STATUS.speed" }."""
 
     counters: Annotated[tuple[SignalPath, ...], Field(max_length=128)] = ()
-    """Counter signals, at most one for each message; all waveform messages have one, or none.
-    Without them frames are counted, and losses are detected by the clock."""
+    """Counter signals, at most one for each message; either all waveform messages have a counter or
+    none has. Without counters, frames are counted and losses are detected by the clock."""
 
     counter_counts: Literal["samples", "frames"] = "samples"
-    """Whether these counters count "samples" or "frames"."""
+    """Unit of the counters: "samples" or "frames"."""
 
     frame_samples: Annotated[tuple[SignalPath, ...], Field(max_length=32)] = ()
-    """Signals with the number of samples in a frame, if it varies."""
+    """Signals with the number of samples in a frame, for messages in which the number varies."""
 
     epoch: SignalPath | None = None
     """Signal that changes when the device restarts its counters."""
 
     ok_bits: SignalPath | None = None
-    """Signal whose bit c, the lowest first, is set while waveform channel c is healthy."""
+    """Signal whose bit c, counted from the least significant bit, is set while waveform channel c
+    is healthy."""
 
     seconds: SignalPath | None = None
-    """Signal with the UTC seconds since 1970 of the sample of its message."""
+    """Signal with the sample time as whole seconds since 1970, UTC."""
 
     microseconds: SignalPath | None = None
-    """Signal with the microseconds of that time; required with seconds."""
+    """Signal with the microseconds of the sample time; required with seconds."""
 
     hold_samples: Annotated[int, Field(ge=1, le=1_000_000)] | SignalPath = 50
     """Number of samples for which a message without waveforms is valid, from the sample of its
-    counter: a number, or the signal with it."""
+    counter: a constant, or the signal with the number."""
 
     hold_s: Annotated[float, Field(ge=0.01, le=3600.0)] = 5.0
-    """Seconds for which a message without waveforms and without counter is valid."""
+    """Time for which a message without waveforms and without counter is valid, s."""
 
     stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 1.0
     """Time without a complete new sample after which the bus counts as not connected, s; at least
     three samples, or three frames with several samples."""
 
     stamps: Literal["host", "interface"] = "host"
-    """Clock of the time stamps: that of the "host", or that of the "interface" synchronized with
-    it, which is more accurate if the host is busy."""
+    """Clock of the time stamps: the clock of the "host", or the clock of the "interface",
+    synchronized with the host, which is more accurate if the host is busy."""
 
     receive_buffer: Annotated[int, Field(ge=100, le=10_000_000)] = 65_536
-    """Maximum number of frames waiting to be decoded; example: 65536, half a minute of 12
+    """Maximum number of frames that wait for decoding; example: 65536, half a minute of 12
     channels."""
 
     when_full: Literal["drop", "wait"] = "drop"
-    """Action when the buffer is full: "drop" and count new frames, or "wait" for a device that can
+    """Action when the buffer is full: "drop" and count new frames, or "wait", for a device that can
     be delayed, such as the replay of a recording."""
 
     _folder: Path = PrivateAttr(default=Path())
@@ -141,7 +142,7 @@ class CanSettings(Settings):
         return self._folder / (self.dbc or "")
 
     def check_channels(self, channels: Iterable[str], slow_channels: Iterable[str]) -> None:
-        """Refuse signals that do not fit a unit's channels, one to one.
+        """Check that signals and channels of the unit correspond one to one.
 
         Raises `MisfitError` if a channel is unknown or has no signal.
         """

@@ -1,4 +1,4 @@
-"""Sources of the plant file: Modbus devices, and the union of all kinds."""
+"""Settings of Modbus sources, and the union of the settings of all source kinds."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,26 +20,27 @@ MIN_STALE_POLLS = 2
 
 
 class MappedDeviceSettings(ModbusLinkSettings):
-    """A device that is read by a register map."""
+    """Settings of a Modbus device with a register map."""
 
     map: RegisterMapSettings | None = None
-    """Register map of the device, unless map_file is given."""
+    """Register map of the device; either this table or map_file is required."""
 
     map_file: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
     """File with the register map, relative to the folder of the plant file; example:
     "maps/vector-rack.toml"."""
 
     poll_period_s: Annotated[float, Field(ge=0.01, le=86_400.0)]
-    """Time between polls in seconds, at least the minimum of the map; example: 1.0."""
+    """Time between polls, s, at least min_poll_period_s of the register map; example: 1.0."""
 
     stale_after_s: Annotated[float, Field(ge=0.1, le=604_800.0)] = 60.0
-    """Time without a change of the heartbeat, else of the time stamp, else of any value, after
-    which the device counts as not connected, s; at least two poll periods."""
+    """Time without a change after which the device counts as not connected, s; at least two poll
+    periods. The change is that of the heartbeat, otherwise of the time stamp, otherwise of any
+    value."""
 
     connection: Literal["kept", "per_reply"] = "kept"
-    """"kept": one connection is reused. "per_reply": a new connection for each request, for a
-    device that closes idle connections or shares its only one with other clients. Not on a serial
-    line."""
+    """Use of TCP connections: with "kept" one connection is reused; with "per_reply" each request
+    opens a new connection, for a device that closes idle connections or that accepts only one
+    connection, shared with other clients. Must be "kept" on a serial line."""
 
     _map: RegisterMapSettings = PrivateAttr()
 
@@ -74,22 +75,22 @@ class MappedDeviceSettings(ModbusLinkSettings):
 
     @property
     def rate_hz(self) -> float:
-        """Polls per second, which is the sampling rate of the unit."""
+        """Poll rate, which is the sampling rate of the unit, Hz."""
         return 1.0 / self.poll_period_s
 
     @property
     def registers(self) -> RegisterMap:
-        """Register map as a value of the adapters."""
+        """Register map as a value of the Modbus adapter."""
         return self._map.register_map()
 
     @property
     def mapped_channels(self) -> tuple[str, ...]:
-        """Ids of the channels and slow channels with plain values."""
+        """Ids of the channels and slow channels with quantity "value" in the map."""
         return tuple(v.channel for v in self._map.value if not isinstance(v.quantity, VectorPart))
 
     @property
     def rows(self) -> tuple[VectorRow, ...]:
-        """Vector values in the order of the map."""
+        """Rows of vector quantities (such as 1× amplitudes), in the order of the map."""
         return tuple(
             VectorRow(v.channel, v.quantity)
             for v in self._map.value
@@ -97,7 +98,7 @@ class MappedDeviceSettings(ModbusLinkSettings):
         )
 
     def require_known(self, known: Sequence[str], *at: int | str) -> None:
-        """Refuse values of unknown channels. Raises `MisfitError` if the map has one."""
+        """Raise `MisfitError` if the map has a value of an unknown channel."""
         for n, value in enumerate(self._map.value):
             if value.channel not in known:
                 place = (*at, "map", "value", n, "channel") if self.map else (*at, "map_file")
@@ -108,15 +109,15 @@ class MappedDeviceSettings(ModbusLinkSettings):
 
 
 class ModbusPolledSettings(MappedDeviceSettings):
-    """Registers that are polled, each poll a sample; for slow machines and slow values."""
+    """Settings of polled registers, where each poll is a sample; for slow machines."""
 
     kind: Literal["modbus_polled"]
-    """Kind of the source."""
+    """Kind of the source, always "modbus_polled"."""
 
     def require_fit(self, channels: Sequence[str], slow: Sequence[str]) -> None:
-        """Refuse a map that does not fit the channels of the unit.
+        """Check that the register map matches the channels of the unit.
 
-        Raises `MisfitError` if a waveform channel is missing, or the map has vectors.
+        Raises `MisfitError` if a waveform channel has no value, or the map has vector quantities.
         """
         self.require_known([*channels, *slow], "source")
         for row in self.rows:
@@ -128,21 +129,21 @@ class ModbusPolledSettings(MappedDeviceSettings):
 
 
 class ModbusVectorSettings(MappedDeviceSettings):
-    """A rack with 1× amplitudes, optionally phases, instead of waveforms."""
+    """Settings of a monitoring rack that reports 1× vectors or amplitudes instead of waveforms."""
 
     kind: Literal["modbus_vector"]
-    """Kind of the source."""
+    """Kind of the source, always "modbus_vector"."""
 
     n_polls: Annotated[int, Field(ge=2, le=100_000)] = 60
-    """Number of averaged polls; 60 of 5 s are five minutes."""
+    """Number of averaged polls; 60 polls at 5 s are five minutes."""
 
     hop_polls: Annotated[int, Field(ge=1, le=100_000)] = 4
-    """Number of polls between results and checks of limits; 4 of 5 s are 20 s; not above
-    n_polls."""
+    """Number of polls from one result and check of limits to the next; 4 polls at 5 s are 20 s; not
+    above n_polls."""
 
     min_polls: Annotated[int, Field(ge=2, le=100_000)] = 4
-    """Number of polls with a changed vector below which a result is uncertain; not above
-    n_polls."""
+    """Minimum number of polls with a changed vector; a result of fewer polls is uncertain; not
+    above n_polls."""
 
     @model_validator(mode="after")
     def _check_polls(self) -> Self:
@@ -153,13 +154,13 @@ class ModbusVectorSettings(MappedDeviceSettings):
 
     @property
     def averaging(self) -> PollSettings:
-        """Averaging of polls as a value of core."""
+        """Averaging settings of the polls as a value of core."""
         return PollSettings(self.n_polls, self.hop_polls, self.min_polls)
 
     def require_fit(self, channels: Sequence[str], slow: Sequence[str]) -> None:
-        """Refuse a map that does not fit the channels of the unit.
+        """Check that the register map matches the channels of the unit.
 
-        Raises `MisfitError` if a 1× amplitude is missing, or the map has plain values.
+        Raises `MisfitError` if a waveform channel has no 1× amplitude, or has quantity "value".
         """
         self.require_known([*channels, *slow], "source")
         given = [r.channel for r in self.rows if r.part is VectorPart.ORDER1_AMPLITUDE]
@@ -173,10 +174,10 @@ class ModbusVectorSettings(MappedDeviceSettings):
 
 
 class SlowDeviceSettings(MappedDeviceSettings):
-    """A second device with slow values."""
+    """Settings of a second device of a unit, which reports slow values."""
 
     def require_fit(self, slow: Sequence[str]) -> None:
-        """Refuse a map that does not fit the slow channels of the unit.
+        """Check that the register map matches the slow channels of the unit.
 
         Raises `MisfitError` if a value belongs to no slow channel.
         """
@@ -184,36 +185,39 @@ class SlowDeviceSettings(MappedDeviceSettings):
 
 
 class ModbusFifoSettings(ModbusLinkSettings):
-    """A device with sample queues that are read by function 0x18."""
+    """Settings of a device with FIFO queues of samples, read by Modbus function 0x18."""
 
     kind: Literal["modbus_fifo"]
-    """Kind of the source."""
+    """Kind of the source, always "modbus_fifo"."""
 
     layout: FifoKind = FifoKind.INTERLEAVED
-    """"interleaved": one queue with a record of all channels per sample. "per_channel": one queue
-    per channel."""
+    """Layout of the queues: "interleaved" is one queue with a record of all channels per sample,
+    "per_channel" is one queue per channel."""
 
     addresses: Annotated[
         tuple[Annotated[int, Field(ge=0, le=65_535)], ...], Field(min_length=1, max_length=32)
     ]
-    """Address of the queue, or of the queue of each channel, counted from 0; example: [1000]."""
+    """Address of the interleaved queue, or addresses of the queues of all channels, counted from 0;
+    example: [1000]."""
 
     has_counter: bool = True
-    """Whether a record, or a reading of the queue of a channel, begins with an unsigned 16-bit
-    counter of samples. Without it only long losses are detected, with unknown length."""
+    """Whether each record (interleaved), or each reply (per channel), begins with an unsigned
+    16-bit sample counter. Without a counter only long losses are detected, and their length is
+    unknown."""
 
     reading: Literal["removes", "keeps"] = "removes"
-    """Whether reading removes samples from the queue ("removes") or not ("keeps")."""
+    """Effect of reading on the queue: "removes" the samples that are read, or "keeps" them."""
 
     poll_period_s: Annotated[float, Field(ge=0.001, le=60.0)] = 0.005
-    """Pause after a reading that emptied the queue, in seconds."""
+    """Pause after a read that emptied the queue, s."""
 
     stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 3.0
-    """Time without a new sample, or with a queue that is never empty, after which the device counts
-    as not connected, s."""
+    """Time after which the device counts as not connected if no new sample arrives, or if the queue
+    is never empty, s."""
 
     loss_tolerance_s: Annotated[float, Field(ge=0.01, le=10.0)] = 0.1
-    """Shortest loss that is detected without a counter, s; shorter ones look like jitter."""
+    """Minimum length of a loss that is detected without a counter, s; shorter losses are
+    indistinguishable from jitter."""
 
     @model_validator(mode="after")
     def _check_queues(self) -> Self:
@@ -234,10 +238,10 @@ class ModbusFifoSettings(ModbusLinkSettings):
         return self
 
     def fifo_layout(self, n_channels: int) -> FifoLayout:
-        """Return the queues as a value of the adapter.
+        """Return the queue layout as a value of the Modbus adapter.
 
-        Raises `MisfitError` if the channels do not fit into a FIFO read of 31 registers, or are not
-        distinguishable.
+        Raises `MisfitError` if the number of addresses is wrong, or if a record of all channels
+        exceeds a FIFO read of 31 registers.
         """
         n_queues = 1 if self.layout is FifoKind.INTERLEAVED else n_channels
         if len(self.addresses) != n_queues:
@@ -271,30 +275,31 @@ def _require_all(
 
 
 class ModbusRingSettings(ModbusLinkSettings):
-    """A streaming DAQ with a block ring, over Modbus TCP or RTU."""
+    """Settings of a streaming DAQ with a block ring, over Modbus TCP or RTU."""
 
     kind: Literal["modbus_ring"]
-    """Kind of the source."""
+    """Kind of the source, always "modbus_ring"."""
 
     base_address: Annotated[int, Field(ge=0, le=65520)] = 0
-    """Address of the header of the profile, counted from 0."""
+    """Address of the header of the block ring, counted from 0."""
 
     function: Literal[3, 4] = 3
-    """Function code that reads the registers: 3 (holding) or 4 (input)."""
+    """Modbus function code of the registers: 3 (holding) or 4 (input)."""
 
     poll_period_s: Annotated[float, Field(ge=0.01, le=60.0)] = 0.25
-    """Longest time between polls of the ring in seconds; the ring must hold several of them. Polls
-    are slightly faster and asynchronous to the slots, in order to measure the sampling rate."""
+    """Maximum time between polls of the ring, s; the ring must hold the samples of several poll
+    periods. The actual period is slightly shorter and asynchronous to the slots, in order to
+    measure the sampling rate."""
 
     stale_after_s: Annotated[float, Field(ge=0.1, le=3600.0)] = 3.0
     """Time without a new slot after which the DAQ counts as not connected, s."""
 
 
 class SimulatedSettings(Settings):
-    """Simulation of the unit in this process, without a device."""
+    """Settings of a unit that is simulated in this process, without a device."""
 
     kind: Literal["simulated"]
-    """Kind of the source."""
+    """Kind of the source, always "simulated"."""
 
 
 SourceSettings = Annotated[

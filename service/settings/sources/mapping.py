@@ -1,4 +1,4 @@
-"""Mapping file of an import: the columns of a foreign file by channel of a unit."""
+"""Mapping file of an import: assigns columns of a measurement file to channels of a unit."""
 
 from typing import Annotated, Literal, Self
 
@@ -27,36 +27,38 @@ CAN_LOGS = ("candump", "blf")
 WITH_GROUPS = ("tdms", "mdf4")
 WITH_OWN_TIME = ("tdms", "mdf4", *CAN_LOGS)
 IN_UTC = ("tdms", "candump")
-"""Formats whose own time is UTC by definition."""
+"""Formats whose time stamps are UTC by definition."""
 
 
 class TimeSettings(Settings):
-    """Times of the samples in the file."""
+    """Settings of the sample times in the file."""
 
     source: Literal["file", "column", "start"]
-    """"file": the format's own time (MDF4 time channel, TDMS waveform properties, stamps of a CAN
-    log). "column": a column of the file. "start": from `start` on at the unit's rate, no gaps."""
+    """Source of the times. "file": time stamps of the format (MDF4 time channel, TDMS waveform
+    properties, time stamps of a CAN log). "column": a column of the file. "start": `start` and the
+    rate of the unit, without gaps."""
 
     zone: Annotated[str, StringConstraints(pattern=r"^(UTC|[+-](0\d|1[0-4]):[0-5]\d)$")] = ""
-    """Time zone of times without one: "UTC", or an offset such as "-03:00". Not needed with
-    `start`, which has one."""
+    """Time zone of times that state no time zone: "UTC", or an offset such as "-03:00". Not
+    required with `start`, which includes a time zone."""
 
     column: ColumnName | None = None
-    """Column with the time of each sample; only for source "column"; example: "time"."""
+    """Name of the time column; only for source "column"; example: "time"."""
 
     group: GroupName = ""
-    """TDMS or MDF4 group of the column, if the name is ambiguous."""
+    """TDMS or MDF4 group of the time column, if the column name is ambiguous."""
 
     form: Form | None = None
-    """Form of the column: "iso8601" (CSV only), "epoch_s", "epoch_ms", "epoch_us", "epoch_ns"
-    (since 1970), "elapsed_s" … "elapsed_ns" (since `start`), "timestamp" (TDMS only)."""
+    """Format of the time column: "iso8601" (CSV only), "epoch_s", "epoch_ms", "epoch_us",
+    "epoch_ns" (since 1970), "elapsed_s" … "elapsed_ns" (since `start`), "timestamp" (TDMS only)."""
 
     start: AwareDatetime | None = None
-    """Time of the first sample, or of elapsed time zero, with its time zone; example:
+    """Time of the first sample, or origin of elapsed times, with time zone; example:
     2026-03-01T10:00:00-03:00."""
 
     tolerance: Annotated[float, Field(ge=0.01, le=0.45)] = 0.4
-    """Tolerance of a time against the unit's rate, in samples: 0.01 to 0.45."""
+    """Maximum deviation of a time from the uniform sampling at the unit's rate, in sample periods,
+    0.01 to 0.45."""
 
 
 class CsvSettings(Settings):
@@ -66,68 +68,71 @@ class CsvSettings(Settings):
     """Separator of columns; example: ";"."""
 
     decimal: Literal[".", ","] = "."
-    """Decimal point of numbers: "." or ","."""
+    """Decimal separator of numbers: "." or ","."""
 
     header_line: Annotated[int, Field(ge=1, le=1000)] = 1
-    """Number of the line with the column names, from 1; earlier lines are skipped."""
+    """Line number of the column names, from 1; earlier lines are skipped."""
 
 
 class MappedColumn(Settings):
-    """Channel of a unit and its column in the file."""
+    """Column of the file and its channel of the unit."""
 
     id: Identifier
     """Id of the channel in the plant file; example: "ujb_shaft_x"."""
 
     column: ColumnName
-    """Name of the CSV column, the TDMS or MDF4 channel; path of the HDF5 dataset."""
+    """Name of the CSV column or of the TDMS or MDF4 channel, or path of the HDF5 dataset."""
 
     group: GroupName = ""
-    """TDMS group, or name or number of the MDF4 channel group, if the name is ambiguous."""
+    """TDMS group, or name or number of the MDF4 channel group, if the column name is ambiguous."""
 
     unit: UnitName
-    """Unit of the values in the file; example: "um", "mm/s", "g", "mV", "degC", "kW". Refused if
-    the file states another unit, or if the channel is not measured in such a unit."""
+    """Unit of the values in the file; example: "um", "mm/s", "g", "mV", "degC", "kW". The import
+    fails if the file states a different unit, or if the unit cannot be converted to that of the
+    channel."""
 
 
 class MappedChannel(MappedColumn):
-    """A waveform channel of the unit."""
+    """Column of a waveform channel."""
 
     unit_per_count: Annotated[float, Field(allow_inf_nan=False)] | None = None
-    """Unit per count, if the column has the counts of the converter; example: 0.00036621."""
+    """Scale in `unit` per count, if the column contains counts of the converter; example:
+    0.00036621."""
 
 
 class MappedSlowChannel(MappedColumn):
-    """A slow channel of the unit."""
+    """Column of a slow channel."""
 
     time_column: ColumnName | None = None
-    """Its own time column, of the same form as that of the waveforms, if it has another rate;
-    example: "slow/time"."""
+    """Time column of a slow channel whose rate differs from that of the waveforms; its format is
+    that of the main time column; example: "slow/time"."""
 
     time_group: GroupName = ""
-    """Group of that column."""
+    """TDMS or MDF4 group of `time_column`."""
 
 
 class ImportMapping(Settings):
-    """A mapping file, which names every waveform and slow channel to import."""
+    """Model of a mapping file, which lists every waveform and slow channel to import."""
 
     format: Format
-    """"mdf4", "tdms", "hdf5", "csv", "candump" or "blf"."""
+    """File format: "mdf4", "tdms", "hdf5", "csv", "candump" or "blf"."""
 
     time: TimeSettings
-    """Time of the samples."""
+    """Sample times."""
 
     csv: CsvSettings | None = None
-    """Only for CSV files."""
+    """Dialect of a CSV file; only for format "csv"."""
 
     bus: Annotated[str, StringConstraints(max_length=64)] = ""
-    """Bus to import from a CAN log with several buses: its name in a candump log, its number from 1
-    in a BLF log; examples: "can0", "2"."""
+    """Bus to import from a CAN log with several buses: name of the bus in a candump log, number of
+    the bus, from 1, in a BLF log; examples: "can0", "2"."""
 
     channel: Annotated[tuple[MappedChannel, ...], Field(max_length=32)] = ()
-    """Waveform channels; none for CAN logs, which use the DBC file of the unit."""
+    """Columns of the waveform channels; none for CAN logs, whose signals are those of the unit's
+    DBC file."""
 
     slow_channel: Annotated[tuple[MappedSlowChannel, ...], Field(max_length=50)] = ()
-    """Slow channels; none for CAN logs."""
+    """Columns of the slow channels; none for CAN logs."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:

@@ -1,4 +1,4 @@
-"""Link to a Modbus device, and the identity expected of it."""
+"""Settings of the link to a Modbus device, and of the expected identity of the device."""
 
 from typing import Annotated, Literal, Self
 
@@ -11,19 +11,19 @@ IdentificationText = Annotated[str, StringConstraints(min_length=1, max_length=2
 
 
 class SignatureIdentity(Settings):
-    """Constant registers that identify a device: type, firmware, serial number."""
+    """Expected content of constant registers that identify a device, such as its serial number."""
 
     kind: Literal["signature"]
-    """Always "signature"."""
+    """Kind of the identity, always "signature"."""
 
     address: Annotated[int, Field(ge=0, le=0xFFFF)]
     """Address of the first register, counted from 0; example: 1000."""
 
     words: Annotated[tuple[Word, ...], Field(min_length=1, max_length=125)]
-    """Contents of the registers, 0 to 65535 each; example: [0x0102, 0x0007]."""
+    """Expected contents of the registers, 0 to 65535 each; example: [0x0102, 0x0007]."""
 
     function: Literal[3, 4] = 3
-    """Function code that reads them: 3 (holding) or 4 (input)."""
+    """Modbus function code of the registers: 3 (holding) or 4 (input)."""
 
     @model_validator(mode="after")
     def _check_end(self) -> Self:
@@ -33,10 +33,10 @@ class SignatureIdentity(Settings):
 
 
 class IdentificationIdentity(Settings):
-    """Response of the device to function 43/14; objects that are not given are not checked."""
+    """Expected device identification (function 43/14); an object is not checked by default."""
 
     kind: Literal["identification"]
-    """Always "identification"."""
+    """Kind of the identity, always "identification"."""
 
     vendor: IdentificationText | None = None
     """Vendor name (object 0); example: "Acme"."""
@@ -60,42 +60,44 @@ IdentitySettings = Annotated[
 
 
 class ModbusLinkSettings(Settings):
-    """A Modbus device on the network (host) or on a serial line (device)."""
+    """Settings of the link to a Modbus device, by TCP (host) or serial line (device)."""
 
     host: Annotated[str, StringConstraints(min_length=1, max_length=253)] | None = None
-    """Address or name of a Modbus TCP device; example: "192.0.2.17"."""
+    """IP address or host name of a Modbus TCP device; example: "192.0.2.17"."""
 
     port: Annotated[int, Field(ge=0, le=65535)] = 502
-    """TCP port; example: 502. 0 takes a free port, for a simulated DAQ only."""
+    """TCP port of the device; example: 502. With 0 a free port is used, for a simulated DAQ
+    only."""
 
     device: Annotated[str, StringConstraints(min_length=1, max_length=255)] | None = None
-    """Serial port of a Modbus RTU line, instead of a host; example: "/dev/ttyUSB0". "pty" makes a
-    pseudo-terminal, for a simulated DAQ only."""
+    """Serial port of a Modbus RTU line, instead of host; example: "/dev/ttyUSB0". With "pty" a
+    pseudo-terminal is created, for a simulated DAQ only."""
 
     baudrate: Annotated[int, Field(ge=1200, le=4_000_000)] = 115_200
-    """Bits per second of the serial line; 12 channels at 600 Hz need 460800."""
+    """Bit rate of the serial line, bit/s; 12 channels at 600 Hz require 460800."""
 
     parity: Literal["none", "even", "odd"] = "even"
     """Parity of the serial line."""
 
     stop_bits: Literal[1, 2] = 1
-    """Stop bits of the serial line: 1, or 2 where parity is "none"."""
+    """Number of stop bits of the serial line: 1, or 2 if parity is "none"."""
 
     device_id: Annotated[int, Field(ge=1, le=255)] = 1
     """Modbus unit identifier, 1 to 255; on a serial line at most 247."""
 
     timeout_s: Annotated[float, Field(ge=0.05, le=60.0)] = 0.5
-    """Time-out of a reply in seconds, 0.05 to 60, after which the link counts as lost. Up to two
-    poll periods, a loss is detected within three."""
+    """Time-out of a reply, s, 0.05 to 60, after which the link counts as lost. With a time-out of
+    at most two poll periods, a loss is detected within three poll periods."""
 
     identity: IdentitySettings | None = None
-    """Expected identity, checked on each connection: kind "signature" (registers) or
-    "identification" (function 43/14). Without it only the form of the data is checked."""
+    """Expected identity of the device, checked on each connection: kind "signature" (registers) or
+    "identification" (function 43/14). By default only the format of the data is checked."""
 
     requests_in_flight: Annotated[int, Field(ge=1, le=16)] | None = None
-    """Maximum number of pending requests over TCP, 1 to 16; six for a block ring and one for other
-    devices by default, as some support only one. If replies arrive out of order, one request at a
-    time is used from then on. `padwatch probe in-flight` measures it."""
+    """Maximum number of pending requests over TCP, 1 to 16; by default six for a block ring and one
+    for other devices, because some devices support only one. If replies arrive out of order,
+    requests are sent one at a time from then on. `padwatch probe in-flight` measures the number
+    that a device supports."""
 
     @model_validator(mode="after")
     def _check_link(self) -> Self:

@@ -1,4 +1,4 @@
-"""Register map of a Modbus device: values, time stamps and signature."""
+"""Settings of the register map of a Modbus device: values, time stamp and signature."""
 
 from pathlib import Path
 from typing import Annotated, Literal, Self
@@ -23,35 +23,35 @@ from service.settings.toml_file import load_toml
 
 
 class TogetherSettings(Settings):
-    """Registers that must be read in one request."""
+    """Block of registers that must be read in one request."""
 
     address: Address
-    """First register, as in the manual."""
+    """Address of the first register, as in the manual."""
 
     count: Annotated[int, Field(ge=1, le=125)]
     """Number of registers, 1 to 125."""
 
     function: Literal[3, 4] | None = None
-    """Default: the map's."""
+    """Modbus function code, 3 (holding) or 4 (input registers); default: that of the map."""
 
 
 class EpochTimeSettings(Settings):
-    """Seconds since 1970 UTC."""
+    """Time stamp of the device in seconds since 1970, UTC."""
 
     kind: Literal["epoch"]
-    """Always "epoch"."""
+    """Kind of the time stamp, always "epoch"."""
 
     seconds: CellSettings
     """Register of the seconds; example: { address = 4, type = "uint32", byte_order = "CDAB" }."""
 
     parts: CellSettings | None = None
-    """Register of fractions of a second, if any."""
+    """Register of the fraction of the second, in units of 1 / parts_per_s; none by default."""
 
     parts_per_s: Annotated[float, Field(ge=1.0, le=1e9)] = 1e6
-    """Number of fractions per second; example: 1000.0."""
+    """Resolution of `parts`, in parts per second; example: 1000.0."""
 
     def plain(self, default: MapDefaults) -> EpochTime:
-        """Return the time as a value of the adapters."""
+        """Return the time stamp as a value of the Modbus adapter."""
         return EpochTime(
             seconds=default.cell(self.seconds, "time", "seconds"),
             parts=_optional(default, self.parts, "time", "parts"),
@@ -60,16 +60,16 @@ class EpochTimeSettings(Settings):
 
 
 class CalendarTimeSettings(Settings):
-    """Six registers with date and time."""
+    """Time stamp of the device as six registers with date and time."""
 
     kind: Literal["calendar"]
-    """Always "calendar"."""
+    """Kind of the time stamp, always "calendar"."""
 
     first: CellSettings
-    """First of the six registers."""
+    """First of the six consecutive registers."""
 
     fields: Annotated[tuple[str, ...], Field(min_length=6, max_length=6)] = CALENDAR_FIELDS
-    """Order of the six registers."""
+    """Calendar fields of the six registers, in the order of the registers."""
 
     utc_offset_s: Annotated[float, Field(ge=-86400.0, le=86400.0)] = 0.0
     """Offset of the device's clock from UTC, s; example: -10800."""
@@ -81,61 +81,63 @@ class CalendarTimeSettings(Settings):
         return self
 
     def plain(self, default: MapDefaults) -> CalendarTime:
-        """Return the time as a value of the adapters."""
+        """Return the time stamp as a value of the Modbus adapter."""
         first = default.cell(self.first, "time", "first")
         default.require_in_space(first.address, len(self.fields), "time", "first")
         return CalendarTime(first=first, fields=self.fields, utc_offset_s=self.utc_offset_s)
 
 
 class SignatureSettings(CellSettings):
-    """A register that identifies the device."""
+    """Register with constant content that identifies the device."""
 
     expected: float
-    """Expected value of the register."""
+    """Expected content of the register."""
 
 
 class RegisterMapSettings(Settings):
-    """Register map of a device, as in its manual."""
+    """Register map of a device, with addresses as in the manual of the device."""
 
     base: Literal[0, 1, 10001, 30001, 40001, 100001, 300001, 400001] = 0
-    """Number of the first register in the manual: 0, 1, or 10001, 30001, 40001, 100001, 300001,
+    """Address of the first register in the manual: 0, 1, 10001, 30001, 40001, 100001, 300001 or
     400001."""
 
     function: Function = 3
-    """Default function code: 3 holding, 4 input registers, 1 coils, 2 inputs."""
+    """Default function code: 1 (coils), 2 (discrete inputs), 3 (holding registers) or 4 (input
+    registers)."""
 
     byte_order: ByteOrder = ByteOrder.ABCD
     """Default byte order: "ABCD", "CDAB", "BADC" or "DCBA"."""
 
     max_registers: Annotated[int, Field(ge=1, le=125)] = 125
-    """Maximum number of registers in one read, 1 to 125."""
+    """Maximum number of registers in one read request, 1 to 125."""
 
     max_gap: Annotated[int, Field(ge=0, le=124)] = 0
-    """Maximum number of unused registers between two values in one read; they must exist in the
-    device, or the read fails."""
+    """Maximum number of unused registers between two values in one read request. Unused registers
+    must exist in the device, otherwise the request fails."""
 
     min_poll_period_s: Annotated[float, Field(ge=0.0, le=86400.0)] = 0.0
-    """Minimum poll period by the manual, in seconds."""
+    """Minimum poll period according to the manual, s."""
 
     min_timeout_s: Annotated[float, Field(ge=0.0, le=60.0)] = 0.0
-    """Minimum time-out by the manual, in seconds."""
+    """Minimum time-out according to the manual, s."""
 
     heartbeat: CellSettings | None = None
-    """Counter that changes with every measurement; if it stops, the device counts as stale."""
+    """Register of a counter that changes with every measurement; if the counter stops, the device
+    counts as stale."""
 
     time: (
         Annotated[EpochTimeSettings | CalendarTimeSettings, Field(discriminator="kind")] | None
     ) = None
-    """Time of the measurement by the clock of the device."""
+    """Registers with the time stamp of the measurement, by the clock of the device."""
 
     signature: Annotated[tuple[SignatureSettings, ...], Field(max_length=16)] = ()
-    """Registers that are checked before values are used."""
+    """Registers that identify the device, checked before values are used."""
 
     together: Annotated[tuple[TogetherSettings, ...], Field(max_length=200)] = ()
-    """Blocks that must be read in one request."""
+    """Blocks of registers that must be read in one request."""
 
     value: Annotated[tuple[ValueSettings, ...], Field(min_length=1, max_length=500)]
-    """Values to read."""
+    """Values that are read from the device."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -146,7 +148,7 @@ class RegisterMapSettings(Settings):
         return self
 
     def register_map(self) -> RegisterMap:
-        """Return the map of the adapters. Raises `MisfitError` if no device can have it."""
+        """Return the map as a value of the Modbus adapter. Raises `MisfitError` if invalid."""
         default = MapDefaults(self.base, self.function, self.byte_order)
         register = 4 if self.function == 4 else 3
         for n, block in enumerate(self.together):
@@ -179,8 +181,8 @@ def _optional(default: MapDefaults, cell: CellSettings | None, *at: int | str) -
 
 
 def load_map_file(path: Path) -> RegisterMapSettings:
-    """Read and check a register map.
+    """Read and validate the file of a register map.
 
-    Raises `TomlFileError` if it cannot be read or anything in it is wrong.
+    Raises `TomlFileError` if the file is unreadable or invalid.
     """
     return load_toml(path, RegisterMapSettings)

@@ -1,4 +1,4 @@
-"""Values in Modbus registers: address, type, scale and flags, as cells of the adapter."""
+"""Settings of values in Modbus registers, and their conversion to adapter values."""
 
 import math
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ Function = Literal[1, 2, 3, 4]
 Address = Annotated[int, Field(ge=0, le=465_535)]
 ALL_BITS = 0xFFFF
 PK_PER = {"pk": 1.0, "pp": 0.5, "rms": math.sqrt(2.0)}
-"""Zero-to-peak amplitude of a sine per amplitude of each detector."""
+"""Factor from the reading of each detector to the zero-to-peak amplitude of a sine."""
 
 SIGN_OF = {"lead": 1.0, "lag": -1.0}
 
@@ -32,34 +32,40 @@ NotZero = Annotated[float, AfterValidator(_refuse_zero)]
 
 
 class CellSettings(Settings):
-    """One register, or several that form one number."""
+    """Register, or consecutive registers that form one number."""
 
     address: Address
-    """Address as in the manual, counted from the ``base`` of the map; example: 609."""
+    """Address of the first register as in the manual, counted from the ``base`` of the map;
+    example: 609."""
 
     function: Function | None = None
-    """1 (coils), 2 (discrete inputs), 3 (holding) or 4 (input registers); default: the map's."""
+    """Modbus function code: 1 (coils), 2 (discrete inputs), 3 (holding registers) or 4 (input
+    registers); default: that of the map."""
 
     type: NumberType = NumberType.UINT16
-    """"int16", "uint16", "int32", "uint32", "float32", "float64" or "bit"."""
+    """Data type: "int16", "uint16", "int32", "uint32", "float32", "float64" or "bit"."""
 
     byte_order: ByteOrder | None = None
-    """"ABCD", "CDAB", "BADC" or "DCBA", A the most significant byte; default: the map's."""
+    """Byte order: "ABCD", "CDAB", "BADC" or "DCBA", where A is the most significant byte; default:
+    that of the map."""
 
     bit: Annotated[int, Field(ge=0, le=15)] | None = None
-    """Bit of a register, 0 the least significant; with type "bit" and function 3 or 4; example:
-    0."""
+    """Number of the bit in a register, 0 for the least significant bit; only with type "bit" and
+    function 3 or 4; example: 0."""
 
 
 class ScaleRegisterSettings(CellSettings):
-    """value = raw / divisor * this register; both must be read in one request."""
+    """Register with the scale of a mantissa: value = raw / divisor * this register.
+
+    The mantissa and this register must be read in one request.
+    """
 
     divisor: NotZero = 32767.0
     """Divisor of the raw number; not 0."""
 
 
 class FullScaleSettings(Settings):
-    """Linear scale from raw numbers to values; raw numbers at its ends count as clipped."""
+    """Linear scale from raw numbers to values; a raw number at either end counts as clipped."""
 
     minimum: float | None = None
     """Value at ``raw_minimum``."""
@@ -68,16 +74,16 @@ class FullScaleSettings(Settings):
     """Value at ``raw_maximum``."""
 
     minimum_register: CellSettings | None = None
-    """Register of that value, instead of ``minimum``."""
+    """Register with the value at ``raw_minimum``, instead of ``minimum``."""
 
     maximum_register: CellSettings | None = None
-    """Register of that value, instead of ``maximum``."""
+    """Register with the value at ``raw_maximum``, instead of ``maximum``."""
 
     raw_minimum: float = 0.0
-    """Raw number at the lower end."""
+    """Raw number at the lower end of the scale."""
 
     raw_maximum: float = 65535.0
-    """Raw number at the upper end."""
+    """Raw number at the upper end of the scale."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -90,19 +96,20 @@ class FullScaleSettings(Settings):
 
 
 class FlagSettings(CellSettings):
-    """Status of the value in a status register."""
+    """Status register, or bits of it, that state whether a value is good, bad or clipped."""
 
     mask: Annotated[int, Field(ge=1, le=ALL_BITS)] = ALL_BITS
-    """Bits of the register that are evaluated; example: 0x0020."""
+    """Bit mask of the evaluated bits of the register; example: 0x0020."""
 
     set_means: Meaning | None = None
-    """"bad": any of these bits makes the value bad. "ok": it is bad unless all are set."""
+    """Meaning of set bits: with "bad" the value is bad if any of the bits is set, with "ok" the
+    value is bad unless all of the bits are set."""
 
     ok_values: Annotated[tuple[int, ...], Field(max_length=64)] = ()
-    """Masked numbers that mean a good value, instead of ``set_means``."""
+    """Masked register contents of a good value, instead of ``set_means``."""
 
     clipped_values: Annotated[tuple[int, ...], Field(max_length=64)] = ()
-    """Masked numbers that mean a clipped value, with ``ok_values``."""
+    """Masked register contents of a clipped value; only with ``ok_values``."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -127,49 +134,51 @@ class FlagSettings(CellSettings):
 
     @property
     def counted_bits(self) -> int:
-        """The mask; 1 for a single bit."""
+        """Bit mask of the evaluated bits; 1 for type "bit"."""
         return 1 if self.type is NumberType.BIT else self.mask
 
 
 class ValueSettings(CellSettings):
-    """A value and its conversion from registers: raw * scale + offset."""
+    """Value of a channel and its conversion from registers: raw * scale + offset."""
 
     channel: Identifier
-    """Channel or slow channel of the value; example: "ujb_shaft_x"."""
+    """Id of the channel or slow channel of the value; example: "ujb_shaft_x"."""
 
     quantity: VectorPart | Literal["value"] = "value"
-    """"value": a sample or slow value in the unit of the channel. Of a vector rack:
-    "order1_amplitude", "order1_phase", "vortex_amplitude", "overall" or "gap"."""
+    """Quantity of the value: "value" is a sample or slow value in the unit of the channel.
+    Quantities of a vector rack are "order1_amplitude", "order1_phase", "vortex_amplitude",
+    "overall" and "gap"."""
 
     detector: Literal["pk", "pp", "rms"] | None = None
-    """Detector of amplitudes: zero-to-peak, peak-to-peak or root mean square."""
+    """Detector of an amplitude: "pk" zero-to-peak, "pp" peak-to-peak or "rms" root mean square."""
 
     phase: Literal["lag", "lead"] | None = None
-    """Whether an increasing phase in degrees means a later ("lag") or earlier ("lead") signal."""
+    """Sign convention of a phase in degrees: phase "lag" or phase "lead"."""
 
     scale: NotZero = 1.0
-    """Factor to the unit of the channel; not 0; example: 25.4 from mil to µm."""
+    """Factor from the raw number to the unit of the channel; not 0; example: 25.4 from mil to
+    µm."""
 
     offset: float = 0.0
-    """Offset that is added after the factor."""
+    """Offset that is added after multiplication by ``scale``."""
 
     scale_register: ScaleRegisterSettings | None = None
-    """Register with the full-scale value of a mantissa."""
+    """Register with the full-scale value; the raw number is a mantissa."""
 
     full_scale: FullScaleSettings | None = None
-    """Range of the raw numbers and of the values."""
+    """Linear scale from a range of raw numbers to a range of values."""
 
     flag: Annotated[tuple[FlagSettings, ...], Field(max_length=8)] = ()
-    """Status registers of the value."""
+    """Status registers that state whether the value is good, bad or clipped."""
 
     invalid_values: Annotated[tuple[float, ...], Field(max_length=16)] = ()
-    """Raw numbers that mean an invalid value, as NaN always does; example: [0x8000]."""
+    """Raw numbers of invalid values; NaN is always invalid. Example: [0x8000]."""
 
     invalid_below: float | None = None
-    """Raw number below which values are invalid; example: -32000."""
+    """Raw number below which a value is invalid; example: -32000."""
 
     invalid_above: float | None = None
-    """Raw number above which values are invalid; example: 32000.0."""
+    """Raw number above which a value is invalid; example: 32000.0."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -201,16 +210,16 @@ class ValueSettings(CellSettings):
 
     @property
     def rim_factor(self) -> float:
-        """Factor to zero-to-peak amplitude and to degrees of lead."""
+        """Factor to zero-to-peak amplitude, or to phase lead."""
         factor = PK_PER[self.detector] if self.detector else 1.0
         return factor * (SIGN_OF[self.phase] if self.phase else 1.0)
 
 
 @dataclass(frozen=True)
 class MapDefaults:
-    """Defaults of a map: first address, function code and byte order of its cells.
+    """Defaults of a register map: first address, function code and byte order of its cells.
 
-    All methods raise `MisfitError` with the place in the map.
+    All methods raise `MisfitError` with the location in the map.
     """
 
     base: int
@@ -218,14 +227,14 @@ class MapDefaults:
     byte_order: ByteOrder
 
     def require_in_space(self, address: int, count: int, *at: int | str) -> None:
-        """Refuse registers that no device can have, by their address."""
+        """Refuse registers outside the Modbus address space."""
         last = self.base + ADDRESS_SPACE - count
         if not self.base <= address <= last:
             words = f"must be {self.base} to {last}, since the map counts from {self.base}"
             raise MisfitError(words, *at, "address")
 
     def cell(self, settings: CellSettings, *at: int | str) -> Cell:
-        """Build a cell."""
+        """Return a cell as a value of the adapter, completed by the defaults."""
         cell = Cell(
             address=settings.address,
             function=settings.function or self.function,
@@ -247,7 +256,7 @@ class MapDefaults:
         return cell
 
     def value(self, settings: ValueSettings, *at: int | str) -> MapValue:
-        """Build a value, in padwatch's conventions: zero-to-peak, degrees of lead."""
+        """Return a value of the adapter, converted to zero-to-peak amplitude and phase lead."""
         low, high = settings.invalid_below, settings.invalid_above
         return MapValue(
             id=settings.id,
@@ -292,12 +301,12 @@ class MapDefaults:
 
 
 def require_apart(values: Sequence[MapValue], base: int) -> None:
-    """Refuse two values on the same register, unless they are different bits of it.
+    """Refuse two values on the same register, unless they are different bits of the register.
 
     Raises
     ------
     MisfitError
-        With the place of the second one.
+        With the location of the second value.
     """
     taken: dict[tuple[int, int], MapValue] = {}
     for n, value in enumerate(values):

@@ -1,4 +1,4 @@
-"""Simulated machines: signals, machine lives and damage."""
+"""Settings of simulated machines: signals, machine lives and damage."""
 
 from typing import Annotated, Literal, Self
 
@@ -8,10 +8,10 @@ from service.settings.base import MisfitError, Settings, refuse_twice
 
 
 class SimulatedDamageSettings(Settings):
-    """Damage to one bearing of a simulated life."""
+    """Damage to one bearing of a simulated machine."""
 
     bearing: Literal["UJB", "LJB", "TJB"]
-    """Damaged bearing."""
+    """Name of the damaged bearing in the rotor model."""
 
     kind: Literal[
         "stiffness_loss",
@@ -22,23 +22,24 @@ class SimulatedDamageSettings(Settings):
         "probe_gain",
         "accelerometer_gain",
     ]
-    """Kind of damage: of the film (the first four), the bracket or the transducers."""
+    """Kind of damage: to the film (the first four kinds), the bracket or the transducers."""
 
     size: Annotated[float, Field(gt=-1.0, lt=1.0)]
     """Final relative loss of film stiffness, oil viscosity or bracket stiffness, or final relative
-    change of a gain, with its sign. Example: 0.2."""
+    change of a transducer gain, with sign. Example: 0.2."""
 
     after_s: Annotated[float, Field(ge=0.0, le=3.2e7)] | None = None
-    """Onset after the start of the simulator, s."""
+    """Onset of the damage after the start of the simulator, s."""
 
     at: AwareDatetime | None = None
-    """Onset as a time, instead of after_s. Example: 2026-03-01T12:00:00Z."""
+    """Onset of the damage as an absolute time, instead of after_s. Example:
+    2026-03-01T12:00:00Z."""
 
     ramp_s: Annotated[float, Field(ge=0.0, le=3.2e7)] = 0.0
-    """Duration of the linear increase to `size`, s; 0 is a step."""
+    """Duration of the linear increase of the damage to `size`, s; 0 is a step."""
 
     directions: Annotated[tuple[Literal["x", "y"], ...], Field(min_length=1)] = ("x", "y")
-    """Directions of the changed transducers, for gains."""
+    """Directions of the transducers with a changed gain; only for gains."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -50,28 +51,30 @@ class SimulatedDamageSettings(Settings):
 
 
 class SimulatedLifeSettings(Settings):
-    """A machine life: past readings, and samples from now on."""
+    """Settings of a machine life, the simulated history and future operation of a machine."""
 
     life_seed: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = None
-    """Seed of a machine life, instead of fixed films. Even seeds run at 92.3 r/min, odd ones at
-    90.9 r/min. The seed determines starts and stops, load, oil and the shaft position."""
+    """Seed of a machine life, instead of fixed films. The speed is 92.3 r/min for an even seed and
+    90.9 r/min for an odd seed. The seed determines starts and stops, load, oil temperature and
+    shaft position."""
 
     held_load: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
-    """Share of 700 MW at which the machine runs from the day before the start of the simulator;
-    without it, the machine may be stopped. Example: 0.95."""
+    """Constant load as a fraction of 700 MW, from the day before the start of the simulator; by
+    default the load varies and the machine may be stopped. Example: 0.95."""
 
     damage: tuple[SimulatedDamageSettings, ...] = ()
-    """Damage of the machine."""
+    """Damage to the bearings of the machine."""
 
 
 class SimulatedBearingSettings(Settings):
-    """Oil film and shaft position of one simulated bearing."""
+    """Settings of the oil film and shaft position of one simulated bearing."""
 
     bearing: Literal["UJB", "LJB", "TJB"]
-    """Bearing of the rotor model."""
+    """Name of the bearing in the rotor model."""
 
     k_xx_n_per_m: Annotated[float, Field(ge=1e6, le=1e12)]
-    """Direct film stiffness in x, N/m; damping follows as 0.0125 s times it. Example: 0.69e9."""
+    """Direct film stiffness in x, N/m; the film damping is 0.0125 s times the stiffness. Example:
+    0.69e9."""
 
     k_yy_n_per_m: Annotated[float, Field(ge=1e6, le=1e12)]
     """Direct film stiffness in y, N/m."""
@@ -86,13 +89,13 @@ class SimulatedBearingSettings(Settings):
     """Mean position of the shaft centre in y, µm."""
 
     centre_wander_um_rms: Annotated[float, Field(ge=0.0, le=1000.0)] = 0.0
-    """Slow wander of the shaft centre in each direction, µm rms."""
+    """Slow random variation of the shaft centre in each direction, µm rms."""
 
     oil_temperature_c: Annotated[float, Field(ge=0.0, le=120.0)] = 45.0
     """Mean oil temperature, °C."""
 
     oil_temperature_wander_c_rms: Annotated[float, Field(ge=0.0, le=20.0)] = 0.0
-    """Slow wander of the oil temperature, K rms."""
+    """Slow random variation of the oil temperature, K rms."""
 
 
 OF_A_LIFE = ("held_load", "damage")
@@ -109,19 +112,22 @@ NEEDED = ("speed_rpm", "power_mw", "bearing")
 
 
 class SimulationSettings(SimulatedLifeSettings):
-    """A unit on the paper's ten-degree-of-freedom model, with fixed films or with a life."""
+    """Settings of a simulated machine on the ten-degree-of-freedom model of Brito et al.
+
+    The machine has either constant films or a machine life.
+    """
 
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 1
     """Seed of the random signals; the same seed gives identical samples."""
 
     speed_rpm: Annotated[float, Field(ge=20.0, le=1500.0)] | None = None
-    """Running speed, r/min."""
+    """Running speed of the machine, r/min."""
 
     power_mw: Annotated[float, Field(ge=-2000.0, le=2000.0)] | None = None
-    """Active power, MW."""
+    """Mean active power of the machine, MW."""
 
     power_wander_mw_rms: Annotated[float, Field(ge=0.0, le=200.0)] = 0.0
-    """Slow wander of the active power, MW rms."""
+    """Slow random variation of the active power, MW rms."""
 
     unbalance_grade_mm_s: Annotated[float, Field(ge=0.0, le=40.0)] = 4.25
     """ISO balance grade G in mm/s; G4.25 is a rotating force of 75.6 kN at 92.3 r/min."""
@@ -130,31 +136,32 @@ class SimulationSettings(SimulatedLifeSettings):
     """Broadband hydraulic force on the runner, N rms in each direction."""
 
     hydraulic_cutoff_hz: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
-    """Bandwidth of the hydraulic force, Hz; white without it."""
+    """Bandwidth of the hydraulic force, Hz; white noise by default."""
 
     rope_force_n: Annotated[float, Field(ge=0.0, le=1e7)] = 0.0
     """Rotating force of the part-load vortex rope on the runner, N."""
 
     rope_order: Annotated[float, Field(ge=0.1, le=0.9)] = 0.25
-    """Mean frequency of the rope in multiples of the running speed."""
+    """Mean frequency of the vortex rope in multiples of the running speed."""
 
     gap_noise_um_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    """White noise of the proximity probes, µm rms."""
+    """White noise of the proximity probe channels, µm rms."""
 
     velocity_noise_mm_s_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    """White noise of velocity channels, mm/s rms."""
+    """White noise of the velocity channels, mm/s rms."""
 
     acceleration_noise_m_s2_rms: Annotated[float, Field(ge=0.0, le=100.0)] = 0.0
-    """White noise of acceleration channels, m/s² rms."""
+    """White noise of the acceleration channels, m/s² rms."""
 
     samples_per_slot: Annotated[int, Field(ge=1, le=4096)] = 50
-    """Samples per channel in a slot of the simulated DAQ's ring."""
+    """Number of samples per channel in a slot of the simulated DAQ's block ring."""
 
     n_slots: Annotated[int, Field(ge=2, le=4096)] = 64
-    """Slots of the simulated DAQ's ring; with 12 channels, 64 slots of 50 samples fit."""
+    """Number of slots of the simulated DAQ's block ring; at 12 channels at most 64 slots of 50
+    samples fit into the registers."""
 
     bearing: Annotated[tuple[SimulatedBearingSettings, ...], Field(min_length=3, max_length=3)] = ()
-    """The three bearings UJB, LJB and TJB."""
+    """Settings of the three bearings UJB, LJB and TJB."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
