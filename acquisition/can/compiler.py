@@ -109,7 +109,7 @@ class _Compiler:
             raise ConfigError(f"counters: {path} has {n_bits} bits, too few to count")
         for part in self._parts_of(signal):
             if part.counter is not None:
-                raise ConfigError(f"counters: {path} is the second of message {part.message}")
+                raise ConfigError(f"counters: {path} is a second counter of message {part.message}")
             part.counter, part.counter_step = scalar_reader(signal), step
             part.modulus = step << n_bits
 

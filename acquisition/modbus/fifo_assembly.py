@@ -157,7 +157,7 @@ def place_records(
     counters = () if piece.counters is None else piece.counters
     places = [samples.place(int(counter), now_s) for counter in counters]
     if len({place.epoch for place in places if place is not None}) > _MAX_EPOCHS:
-        raise LinkError("FIFO: what should be its counter does not count")
+        raise LinkError("FIFO: the counter channel does not count")
     return list(_joined(places, piece.counts))
 
 

@@ -82,7 +82,7 @@ class Span:
             raise ConfigError(f"modbus: function is {self.function}, allowed are 1, 2, 3 and 4")
         if not 0 <= self.address < self.stop <= ADDRESS_SPACE:
             raise ConfigError(
-                f"modbus: {self.count} at {self.address} are asked, addresses are 0 to"
+                f"modbus: {self.count} at {self.address} are requested, addresses are 0 to"
                 f" {ADDRESS_SPACE - 1}"
             )
 

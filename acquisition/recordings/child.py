@@ -169,7 +169,7 @@ class _Counts:
 
     def read(self, first_row: int, n_rows: int) -> RawArray:
         if first_row + n_rows > self._n_rows:
-            raise ConfigError("blocks of more samples than there are")
+            raise ConfigError("blocks exceed the number of samples")
         parts: list[Any] = []
         while n_rows > 0:
             group, offset = divmod(first_row, ROWS_PER_GROUP)

@@ -111,7 +111,7 @@ class RecordedUnit(ManifestPart):
         ids = [c.id for c in self.channels] + [c.id for c in self.slow_channels]
         twice = {id_ for id_ in ids if ids.count(id_) > 1}
         if twice:
-            raise ValueError(f"channel {min(twice)!r} is there twice")
+            raise ValueError(f"channel {min(twice)!r} is present twice")
         return self
 
     @property
@@ -193,7 +193,7 @@ class Progress:
             )
         for name, value in (("epoch", epoch), ("first index", first_index)):
             if not 0 <= value <= MAX_INDEX:
-                raise ConfigError(f"a block of {name} {value}; it must be 0 to {MAX_INDEX}")
+                raise ConfigError(f"a block with {name} {value}; it must be 0 to {MAX_INDEX}")
         expected = self.stop_index if epoch == self.epoch else 0
         n_missing = max(first_index - expected, 0)
         _require_room(rejected, n_missing)

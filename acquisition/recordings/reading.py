@@ -81,7 +81,7 @@ def confined_messages(
             elif found == kind:
                 yield message
             elif found != "end":
-                raise ConfigError(f"{path}: an answer out of turn from the reading process")
+                raise ConfigError(f"{path}: unexpected answer from the reading process")
             has_ended = found == "end"
         if refusal is not None:
             raise refusal

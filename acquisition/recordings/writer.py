@@ -81,10 +81,10 @@ class RecordingWriter:
         self._n_waiting = 0
         self._blocks: list[RawBlock] = []
         if os.path.lexists(folder):
-            raise ConfigError(f"{folder}: is there already; a recording is never overwritten")
+            raise ConfigError(f"{folder}: already exists; a recording is never overwritten")
         if os.path.lexists(self._aside):
             raise ConfigError(
-                f"{self._aside}: is there already: being written, or left by a program that was"
+                f"{self._aside}: already exists: being written, or left by a program that was"
                 " killed; delete it then"
             )
         with foreign_errors_of(self._aside):

@@ -98,7 +98,7 @@ def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[Ala
             change = AlarmChange.ACKNOWLEDGED
         case Shelve(actor, reason, until_ns):
             if until_ns <= now_ns:
-                raise ActionRefusedError("the time to shelve it for has passed already")
+                raise ActionRefusedError("the end of shelving is in the past")
             after = replace(alarm, shelf=Hold(actor, reason, now_ns, until_ns))
             change = AlarmChange.SHELVED
         case Unshelve():
@@ -117,9 +117,9 @@ def operate(alarm: Alarm, action: Action, now_ns: int) -> tuple[Alarm, tuple[Ala
             )
         case Reset():
             if not alarm.is_latched:
-                raise ActionRefusedError("nothing to reset: it is not its latch that holds it")
+                raise ActionRefusedError("nothing to reset: the alarm is not latched")
             if not alarm.is_acknowledged:
-                raise ActionRefusedError("it must be acknowledged before it is reset")
+                raise ActionRefusedError("the alarm must be acknowledged before it is reset")
             after = replace(alarm, level=standing_level(alarm.timers), is_latched=False)
             change = AlarmChange.RESET
         case Comment(_, reason):

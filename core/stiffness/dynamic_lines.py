@@ -111,7 +111,7 @@ def between_harmonics(
     """
     lowest, highest = turn_hz
     if not 0.0 < lowest <= highest:
-        raise ValueError(f"1× must lie between positive limits in order, got {turn_hz} Hz")
+        raise ValueError(f"turn_hz must be 0 < lowest <= highest, got {turn_hz} Hz")
     guard_hz = guard_bins * (frequency_hz[1] - frequency_hz[0])
     # harmonic n guards a line f if n · lowest - guard <= f <= n · highest + guard
     last = np.floor((frequency_hz + guard_hz) / lowest)

@@ -138,8 +138,8 @@ def unframed(message: bytes, identity: UnitIdentity) -> Frame:
     if make != identity.make:
         raise WireError(
             "other_configuration",
-            f"a block of {identity.unit} with other channels or another rate: use the same plant"
-            " file for acquire and analyse",
+            f"channels or rate of a block of {identity.unit} differ from the plant file: use"
+            " the same plant file for acquire and analyse",
         )
     if kind not in Kind.__members__.values():
         raise WireError("unknown_kind", f"a message of unknown kind {kind}")

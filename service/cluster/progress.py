@@ -52,7 +52,7 @@ def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPos
     if stored is None:
         return None
     if stored.stream != stream:
-        log.error("the stream was replaced: results resume with its messages", unit=stored.unit)
+        log.error("the stream was replaced: the stored position is discarded", unit=stored.unit)
         return None
     if stored.sequence > newest:
         log.error("the stream has lost confirmed messages", unit=stored.unit)

@@ -111,7 +111,7 @@ class _CountingBlfReader(can.BLFReader):
         known, at = self._tail + data, -1
         for frame in super()._parse_container(data):
             if self._pos == at:  # python-can would loop endlessly
-                raise ConfigError("damaged: an object of no length")
+                raise ConfigError("damaged: an object of length 0")
             at = self._pos
             yield frame
         self.n_objects += known.count(b"LOBJ", 0, len(known) - len(self._tail))
@@ -146,10 +146,10 @@ def _require_possible(frame: can.Message, number: int) -> None:
     if not is_sound or (not frame.is_remote_frame and frame.dlc != n_bytes):
         raise ConfigError(
             f"frame {number}: id {frame.arbitration_id:#x}, length {frame.dlc}, {n_bytes} bytes of"
-            " data cannot have been on a bus"
+            " data are impossible on a bus"
         )
     if not abs(frame.timestamp) < 2**33:  # NaN, too
-        raise ConfigError(f"frame {number}: {frame.timestamp} s is no time")
+        raise ConfigError(f"frame {number}: {frame.timestamp} s is not a valid time")
 
 
 def _batch(frames: list[can.Message], job: ImportJob) -> Frames:

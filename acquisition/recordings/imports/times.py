@@ -58,7 +58,7 @@ def utc_ns(us: TimeArray, start_ns: int) -> TimeArray:
     found = us + np.int64(start_ns // 1000)
     wrong = np.abs(found) >= _MAX_US
     if wrong.any():
-        raise ConfigError(f"a time of {found[wrong][0] / 1e6:.6g} s since 1970 is none")
+        raise ConfigError(f"a time of {found[wrong][0] / 1e6:.6g} s since 1970 is out of range")
     return found * 1000
 
 
@@ -68,7 +68,7 @@ def _whole_us(values: npt.NDArray[Any], us_per_unit: float) -> TimeArray:
     exact = np.rint(values.astype(np.float64) * us_per_unit)
     wrong = ~(np.abs(exact) < _MAX_US)  # NaN is wrong, too
     if wrong.any():
-        raise ConfigError(f"{values[wrong][0]} in the time column is no time")
+        raise ConfigError(f"{values[wrong][0]} in the time column is not a valid time")
     return exact.astype(np.int64)
 
 
@@ -88,7 +88,7 @@ def _text_to_us(text: str, zone: timezone) -> int:
     try:
         time = datetime.fromisoformat(text.strip())
     except ValueError as error:
-        raise ConfigError(f"{text[:40]!r} in the time column is no time of ISO 8601") from error
+        raise ConfigError(f"{text[:40]!r} in the time column is not an ISO 8601 time") from error
     if time.tzinfo is None:
         time = time.replace(tzinfo=zone)
     return (time - _EPOCH) // _MICROSECOND

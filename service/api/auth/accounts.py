@@ -250,7 +250,7 @@ def _is_own(request: Request, name: str) -> bool:
 async def _one(authenticator: Authenticator, name: str) -> AccountModel:
     found = await authenticator.work.run(lambda: authenticator.store.accounts.get(name))
     if found is None:
-        raise ProblemError(404, "Unknown account", "there is no such account")
+        raise ProblemError(404, "Unknown account", "the account does not exist")
     return account_model(found)
 
 
@@ -287,7 +287,7 @@ def key_router(context: Context, authenticator: Authenticator) -> APIRouter:
     async def revoke(key: KeyId) -> None:
         """Revoke a key permanently; the request is idempotent."""
         if await work.run(lambda: stored.get(key)) is None:
-            raise ProblemError(404, "Unknown key", "there is no such key")
+            raise ProblemError(404, "Unknown key", "the key does not exist")
         await work.run(lambda: stored.revoke(key, clock.now_ns()))
 
     return router

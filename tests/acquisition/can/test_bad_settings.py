@@ -88,7 +88,7 @@ MISFITS = [
     ((channel("u", "OTHER.u", "mm/s"),), {}, r'OTHER.u has unit "um" .* needed is "mm/s", .*or V'),
     ((X,), {"counters": ("WAVE.nix",)}, r"counters = \"WAVE.nix\": .*no signal nix"),
     ((X,), {"counters": ("WAVE.x",)}, r"counters = \"WAVE.x\": must be an unsigned integer"),
-    ((X,), {"counters": ("WAVE.count", "WAVE.count")}, r"second of message WAVE"),
+    ((X,), {"counters": ("WAVE.count", "WAVE.count")}, r"second counter of message WAVE"),
     ((X,), {"counters": ("SLOW.count",)}, r"counters: message WAVE carries waveforms but none"),
     ((X, channel("u", "OTHER.u")), {"counters": ("WAVE.count",)}, r"counters: message OTHER"),
     ((X,), {"frame_samples": ("WAVE.count",)}, r"frame_samples needs counters"),

@@ -55,12 +55,12 @@ async def test_what_the_device_does_not_have_is_a_config_error_that_says_what_wa
 @pytest.mark.parametrize(
     ("ask", "complaint"),
     [
-        (lambda link: link.read(65_535, 2), "2 at 65535 are asked, addresses are 0 to 65535"),
-        (lambda link: link.read(-1, 1), "1 at -1 are asked"),
-        (lambda link: link.read(0, 0), "0 at 0 are asked"),
+        (lambda link: link.read(65_535, 2), "2 at 65535 are requested, addresses are 0 to 65535"),
+        (lambda link: link.read(-1, 1), "1 at -1 are requested"),
+        (lambda link: link.read(0, 0), "0 at 0 are requested"),
         (lambda link: link.read(0, 1, function=6), "function is 6, allowed are 1, 2, 3 and 4"),
         (lambda link: link.read(0, 1, function=5), "function is 5, allowed are"),
-        (lambda link: link.read_fifos([65_536]), "1 at 65536 are asked"),
+        (lambda link: link.read_fifos([65_536]), "1 at 65536 are requested"),
     ],
 )
 async def test_what_no_device_can_have_is_never_asked(ask, complaint, linked, bench_server):

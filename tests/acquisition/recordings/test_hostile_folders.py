@@ -222,9 +222,9 @@ def change_block(folder: Path, number: int, **changes: Any) -> None:
         ({"n_samples": 0}, "block 3: a block of 0 samples; it must have 1 to 131072"),
         ({"n_samples": -50}, "block 3: a block of -50 samples"),
         ({"n_samples": 2**31 - 1}, "block 3: a block of 2147483647 samples"),
-        ({"first_index": -1}, "block 3: a block of first index -1"),
-        ({"first_index": 2**62}, "block 3: a block of first index 4611686018427387904"),
-        ({"epoch": -7}, "block 3: a block of epoch -7"),
+        ({"first_index": -1}, "block 3: a block with first index -1"),
+        ({"first_index": 2**62}, "block 3: a block with first index 4611686018427387904"),
+        ({"epoch": -7}, "block 3: a block with epoch -7"),
         ({"ok": 7}, "block 3: OK bits of more than the recorded channels"),
         (
             {"rejected": [{"reason": "torn", "n_samples": 10}]},

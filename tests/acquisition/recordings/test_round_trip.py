@@ -150,10 +150,10 @@ def test_a_recording_being_written_is_none_yet_and_is_never_overwritten(
             ConfigError, match=r"run\.incomplete: no manifest.json, so no recording"
         ):
             open_recording(tmp_path / "run.incomplete")
-        with pytest.raises(ConfigError, match=r"run\.incomplete: is there already: being"):
+        with pytest.raises(ConfigError, match=r"run\.incomplete: already exists: being"):
             RecordingWriter(folder, unit, "another")
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
-    with pytest.raises(ConfigError, match="run: is there already"):
+    with pytest.raises(ConfigError, match="run: already exists"):
         RecordingWriter(folder, unit, "another")
     assert open_recording(folder).manifest.n_samples == 10
 

@@ -70,7 +70,7 @@ def test_a_recorded_unit_can_be_read_back(plant_path: Path, tmp_path: Path) -> N
     again = padwatch(*command)
     assert (again.exit_code, again.stdout) == (1, "")
     assert again.stderr == (
-        f"padwatch record: {out}: is there already; a recording is never overwritten\n"
+        f"padwatch record: {out}: already exists; a recording is never overwritten\n"
     )
 
 

@@ -214,4 +214,4 @@ def test_a_mapping_that_does_not_fit_is_refused_and_leaves_nothing(
 def test_nothing_that_exists_is_overwritten(folder: Path) -> None:
     result = padwatch_recording("export", folder, "--format", "csv", "--out", folder)
     assert result.exit_code == 1
-    assert "is there already; nothing is overwritten" in result.stderr
+    assert "already exists; nothing is overwritten" in result.stderr

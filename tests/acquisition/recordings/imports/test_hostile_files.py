@@ -37,9 +37,12 @@ def csv_job(job: ImportJob) -> ImportJob:
         (b"a" * 5_000_000, "line 1: longer than 1000000 bytes"),
         (b"time,shaft x,shaft y\n0,eleven,2\n", "no number 'eleven'"),
         (b"time,shaft x,shaft y\n0,=1+1,2\n", "no number '=1+1'"),
-        (b"time,shaft x,shaft y\nnan,1,2\n", "nan in the time column is no time"),
-        (b"time,shaft x,shaft y\n1e300,1,2\n", "in the time column is no time"),
-        (b"time,shaft x,shaft y\n9007199254,1,2\n", "a time of 1.07744e+10 s since 1970 is none"),
+        (b"time,shaft x,shaft y\nnan,1,2\n", "nan in the time column is not a valid time"),
+        (b"time,shaft x,shaft y\n1e300,1,2\n", "in the time column is not a valid time"),
+        (
+            b"time,shaft x,shaft y\n9007199254,1,2\n",
+            "a time of 1.07744e+10 s since 1970 is out of range",
+        ),
         (b"time,shaft x,shaft y\n0,1_000,2\n", "line 2: or one of those before it: '_' in number"),
         (b"time,shaft x,shaft x\n0,1,2\n", "column 'shaft x' is there 2 times"),
         (b"time,shaft x,shaft y\n\xff\xfe,1,2\n", "line 2: not UTF-8 text"),
@@ -308,7 +311,7 @@ def test_objects_may_go_on_in_the_next_container(
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (lambda o: container(changed(o, 50, 8, 0)), "an object of no length"),  # for ever
+        (lambda o: container(changed(o, 50, 8, 0)), "an object of length 0"),  # for ever
         (lambda o: container(changed(o, 50, 8, 60000)), "ends within an object"),
         (lambda o: container(changed(o, 50, 6, 3)), "Unknown object header version"),
         (lambda o: container(changed(o, 50, 12, 7)[: len(o) // 2]), "50 objects, the header says"),
