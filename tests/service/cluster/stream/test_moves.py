@@ -5,7 +5,6 @@ links, blocks that overlap or come twice, messages that nobody understands, rest
 told, impossible blocks.
 """
 
-import sqlite3
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -249,12 +248,6 @@ def numbered(unit: MovingUnit, sent: Iterable[SampleBlock]) -> list[Message]:
     return [(n + 1, encoded_block(block, unit.identity, T0)) for n, block in enumerate(sent)]
 
 
-def windows(unit: MovingUnit) -> list[tuple[int, int]]:
-    with sqlite3.connect(unit.database) as database:
-        found = database.execute("SELECT epoch, first_index FROM assessment ORDER BY time_ns")
-        return found.fetchall()
-
-
 async def test_blocks_that_come_again_late_with_their_old_time_are_dropped(
     moving_unit: MakeUnit, rng: np.random.Generator
 ) -> None:
@@ -296,4 +289,4 @@ async def test_a_block_that_says_nothing_of_a_slow_channel_is_analysed_without_i
     sent = blocks(unit)
     sent = [*sent[:15], *(replace(block, elsewhere={}) for block in sent[15:])]
     assert not await unit.live(numbered(unit, sent), None, rng)
-    assert windows(unit)
+    assert found_in(unit.database)["assessment"]
