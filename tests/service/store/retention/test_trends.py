@@ -133,7 +133,7 @@ def overwritten(writer: Any, series: int, hour_ns: int, _: object) -> None:
             marks=pytest.mark.planted("late readings overwrite what was rolled up"),
         ),
         pytest.param(
-            *(deleting, "_stands_in", lambda *_: True),
+            *(deleting, "_agrees", lambda *_: True),
             marks=pytest.mark.planted("readings deleted before they were rolled up"),
         ),
     ],
