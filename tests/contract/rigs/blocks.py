@@ -57,11 +57,6 @@ def with_quality(block: SampleBlock, quality: Sequence[Quality]) -> SampleBlock:
     return GivenBlock(**(rest | {"given": tuple(quality)}))
 
 
-def with_samples(block: SampleBlock, samples: SampleArray) -> SampleBlock:
-    """The same block with other samples in engineering units, judged as they were."""
-    return replace(with_quality(block, block.channel_quality), counts=samples)
-
-
 def starting_at(block: SampleBlock, start_ns: int) -> SampleBlock:
     """The same block at another time."""
     side = block.side

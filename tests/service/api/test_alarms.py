@@ -54,11 +54,15 @@ async def test_a_lost_probe_is_on_the_list_and_in_the_history(service: Any, prob
     assert (alarm["condition"], alarm["condition_reason"]) == ("unknown", "not_connected")
 
 
-async def test_an_acknowledgement_is_durable_when_it_is_answered(
+async def test_an_acknowledgement_of_the_newest_occurrence_is_durable_when_it_is_answered(
     service: Any, probes: Probes
 ) -> None:
     probes.send(3, Reason.SENSOR_FAILURE)
 
+    problem = await service.refused(ACKNOWLEDGE, 409, {**ANNA, "occurrence": 2})
+    assert "the newest is 1" in problem["detail"]
+    [alarm] = (await service.json(ALARMS))["alarms"]
+    assert alarm["state"] == "unacknowledged"
     body = {**ANNA, "occurrence": 1, "comment": "cable torn"}
     answer = await post(service, ACKNOWLEDGE, body)
 
@@ -85,20 +89,6 @@ async def test_comments_without_end_have_to_wait(service: Any, probes: Probes) -
     assert statuses == [200] * N_COMMENTS + [429] * 2
     assert refused.headers["retry-after"] == "10"
     assert (await post(service, path, body)).status_code == 200
-
-
-async def test_an_acknowledgement_that_crosses_a_new_occurrence_is_refused(
-    service: Any, probes: Probes
-) -> None:
-    probes.send(3, Reason.SENSOR_FAILURE)
-    probes.send(12)
-    probes.send(3, Reason.SENSOR_FAILURE)
-
-    problem = await service.refused(ACKNOWLEDGE, 409, {**ANNA, "occurrence": 1})
-
-    assert "the newest is 2" in problem["detail"]
-    [alarm] = (await service.json(ALARMS))["alarms"]
-    assert alarm["state"] == "unacknowledged"
 
 
 async def test_an_alarm_comes_back_from_its_shelf_and_from_out_of_service(

@@ -96,9 +96,7 @@ async def test_wrong_parameters_are_refused(read_only: Any) -> None:
         {"limit": 1001},
         {"before": 0},
         {"before": 2**63},
-        {"start": "2026-01-01T00:00:00"},
         {"start": "2026-01-02T00:00:00Z", "end": "2026-01-01T00:00:00Z"},
         {"actor": "x" * 301},
-        {"aktor": "x"},
     ):
         await read_only.problem(AUDIT, 422, **wrong)

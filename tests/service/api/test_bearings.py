@@ -147,18 +147,6 @@ async def test_trends_are_the_stored_readings_to_the_last_bit_or_in_buckets(
     assert max(body["series"][K]["max"]) == max(v for v in values if v)
 
 
-async def test_trends_are_filtered_by_condition(read_only: Any, found: list[Assessment]) -> None:
-    eccentricity = sorted(a.readings["eccentricity_ratio"].value or 0.0 for a in found)
-    low, middle, high = (repr(value) for value in eccentricity[1:4])
-    for bounds, n in (
-        ({"eccentricity_min": middle}, 4),
-        ({"eccentricity_min": low, "eccentricity_max": high}, 3),
-        ({"oil_temperature_min": 90}, 0),
-    ):
-        body = await read_only.json(f"{UJB}/trends", **WHOLE, quantity=K, **bounds)
-        assert sum(body["series"][K]["count"]) == n
-
-
 async def test_a_hole_in_the_trend_is_a_point_without_a_value(
     running: Any, found: list[Assessment]
 ) -> None:

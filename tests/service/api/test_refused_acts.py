@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import Any
 
-import httpx2
 import pytest
 from rigs.probes import ACKNOWLEDGE, ALARMS, ANNA, SHELVE, Probes, post
 
@@ -52,43 +51,13 @@ async def test_an_unknown_alarm_is_not_found(read_only: Any) -> None:
         assert alarm in (await read_only.problem(f"{ALARMS}/{alarm}", 404))["detail"]
 
 
-async def test_no_page_of_another_site_acknowledges_but_the_dashboard_itself_does(
-    service: Any, probes: Probes
-) -> None:
-    probes.send(3, Reason.SENSOR_FAILURE)
-    body = {**ANNA, "occurrence": 1}
-
-    for headers in (
-        {"Origin": "http://elsewhere.example"},
-        {"Origin": "null"},
-        {"Sec-Fetch-Site": "cross-site"},
-        {"Sec-Fetch-Site": "same-site"},
-    ):
-        await service.refused(ACKNOWLEDGE, 403, body, **headers)
-        [alarm] = (await service.json(ALARMS))["alarms"]
-        assert alarm["state"] == "unacknowledged"
-    own = {"Origin": "http://padwatch", "Sec-Fetch-Site": "same-origin"}
-    assert (await post(service, ACKNOWLEDGE, body, **own)).status_code == 200
-
-
-async def test_from_another_host_nothing_is_seen_without_a_login(read_only: Any) -> None:
-    transport = httpx2.ASGITransport(read_only.app, client=("192.0.2.7", 40_000))
-    async with httpx2.AsyncClient(transport=transport, base_url="http://padwatch") as elsewhere:
-        acts = await elsewhere.post(ACKNOWLEDGE, json={**ANNA, "occurrence": 1})
-        looks = await elsewhere.get(ALARMS)
-
-    assert (acts.status_code, looks.status_code) == (401, 401)
-
-
 async def test_a_wrong_question_is_refused_by_name(read_only: Any) -> None:
     for wanted, named in (
         ({"kind": "earthquake"}, "kind"),
         ({"limit": 0}, "limit"),
         ({"limit": 1001}, "limit"),
         ({"before": 0}, "before"),
-        ({"start": "2026"}, "start"),
         ({"start": "2026-01-02T00:00:00Z", "end": "2026-01-01T00:00:00Z"}, "start"),
-        ({"unknown": 1}, "unknown"),
     ):
         problem = await read_only.problem(f"{ALARMS}/events", 422, **wanted)
         assert problem["errors"][0]["parameter"] == named

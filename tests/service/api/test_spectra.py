@@ -168,14 +168,11 @@ async def test_damage_is_told_with_its_time_and_the_rest_is_given(
 
 WRONG: list[tuple[dict[str, object], str]] = [
     ({"start": "2026-01-02T00:00:00Z", "end": "2026-01-01T00:00:00Z"}, "start"),
-    ({"start": "2026-01-02T00:00:00"}, "start"),
-    ({"start": "5"}, "start"),
     ({"max_spectra": 1_000_000_000}, "max_spectra"),
     ({"max_spectra": 1}, "max_spectra"),
     ({"channel": "shaft_z"}, "channel"),
     ({"channel": ["shaft_x"] * 9}, "channel"),
     ({"max_frequency_hz": 0.0}, "max_frequency_hz"),
-    ({"points": 5}, "points"),
 ]
 
 

@@ -89,6 +89,8 @@ async def test_cells_of_a_trend_are_as_wide_as_the_grid_and_share_no_reading(see
         ("0.35 to 0.4", [2]),
         ("0.4 to 0.45", [3]),
     ]
+    warm = {"quantity": K, "eccentricity_max": 0.4, "oil_temperature_min": 46.0}
+    assert minutes(await seen.json(TRENDS, **WHOLE, **warm)) == [2]
 
 
 async def test_more_groups_than_anybody_looks_at_are_refused(

@@ -110,14 +110,7 @@ def test_wrong_options_are_refused(
     assert says in result.stderr
 
 
-def test_states_are_neither_guessed_nor_needed_where_speed_and_power_tell(
-    readings: Path, plant_path: Path
-) -> None:
-    lines = [HEADINGS, *rows(20)]
-    readings.write_text("\n".join(lines), encoding="utf-8")
-    result = padwatch("backtest", readings)
-    assert result.exit_code == 1
-    assert "unit U1: operating states are not known: give a column state" in result.stderr
+def test_states_are_not_needed_where_speed_and_power_tell(readings: Path, plant_path: Path) -> None:
     lines = [HEADINGS + ",speed_rpm,power_mw", *(line + ",92.3,500" for line in rows(20))]
     readings.write_text("\n".join(lines), encoding="utf-8")
     rated = "rated_power_mw = 700.0\nrated_speed_rpm"

@@ -208,17 +208,6 @@ def test_another_calibration_is_told_and_used_only_when_asked_for(
     assert told_again == f"{recording}: {words} plant one\n"
 
 
-def test_a_recording_of_something_else_is_refused_naming_both(
-    plant_path: Path, recording: Path
-) -> None:
-    text = plant_path.read_text()
-    plant_path.write_text(text.replace("rate_hz = 600.0", "rate_hz = 500.0"))
-    result = padwatch("reanalyse", recording, "--plant", plant_path)
-    assert (result.exit_code, result.stdout) == (1, ""), result.stderr
-    assert "600 Hz, unit U1 is configured for 500 Hz" in result.stderr
-    assert result.stderr.count("\n") == 1
-
-
 def test_a_recording_too_short_for_a_segment_says_so(
     plant: PlantFile, plant_path: Path, tmp_path: Path
 ) -> None:

@@ -174,12 +174,6 @@ def test_what_is_exported_can_be_imported_again(
             1,
             "channel ujb_shaft_z is mapped, but unit U1 has ujb_shaft",
         ),
-        (
-            'column = "ujb_shaft_x [um]"',
-            'column = "nope"',
-            1,
-            "column 'nope' is not there; the file",
-        ),
         ('zone = "UTC"', "", 2, "time.zone (by default): is needed"),
         (
             'unit = "r/min"',

@@ -56,7 +56,6 @@ def test_what_was_set_is_listed_with_time_author_and_what_was_before(plant_path:
     ("flags", "changes", "said"),
     [
         ((), {"x_um": "nan"}, "gap x is nan µm, must be above 0 and at most 10000 µm"),
-        ((), {"author": "a" * 81}, "author has 81 characters, must be at most 80"),
         ((), {"opposite_x_um": 2000}, "bearing UJB has no opposite probe in x"),
         ((), {"bearing": "XJB"}, "unit U1 has no bearing XJB, it has UJB, LJB, TJB"),
         ((), {"unit": "U9"}, "has no unit U9, it has U1, U2"),

@@ -183,7 +183,7 @@ def test_clocks_captures_and_chattering_can_be_set(plant_of: PlantOf) -> None:
 
 
 ORDER1, SPAN, ECCENTRICITY = "shaft_order1_um_pk", "shaft_overall_um_pp", "eccentricity_ratio"
-VELOCITY, OIL_C, GAP = "bearing_overall_mm_s_rms", "oil_temperature_c", "gap_um"
+OIL_C, GAP = "oil_temperature_c", "gap_um"
 ZONES, REFERENCE = "zones.bearing_mm_s_rms", "order1_reference"
 TABLE = "a_b = 1.0, b_c = 2.0, c_d = 3.0"
 OTHER = "alert = 150.0, table = [{"
@@ -196,18 +196,13 @@ BETWEEN = "alert_below = 600.0, alert = 700.0"
     [
         (ORDER1, "{}", ".alert", "gives no limit"),
         (ORDER1, "{ alert = 0.0 }", ".alert = 0.0", "greater than 0"),
-        (ORDER1, "{ alert = -1.0 }", ".alert = -1.0", "greater"),
-        (ORDER1, "{ alert = nan }", ".alert = nan", "finite"),
         (ORDER1, "{ alert = 9.0, danger = 8.0 }", ".danger = 8.0", "must be above alert, 9"),
         (ORDER1, "{ alert = 9.0, deadband = 9.0 }", ".deadband = 9.0", "below the lowest limit, 9"),
         (ORDER1, "{ alert = 4.0 }", ".deadband (by default)", "must be below the lowest limit, 4"),
         (ORDER1, "{ alert = 9.0, on_delay_s = -1.0 }", ".on_delay_s = -1.0", "or equal to 0"),
         ("shaft_order1_um", "{ alert = 1.0 }", "", "known here: bearing_order1_change_um_pk"),
         (OIL_C, "{ alert = 300.0 }", ".alert = 300.0", "200"),
-        (SPAN, "{ alert = nan }", ".alert = nan", "finite"),
         (SPAN, "{ danger = 0.0 }", ".danger = 0.0", "than 0"),
-        (VELOCITY, "{ alert = 4.0, danger = 2.0 }", ".danger = 2.0", "must be above alert, 4"),
-        (ECCENTRICITY, "{ alert = 0.7, deadband = 0.8 }", ".deadband = 0.8", "lowest limit, 0.7"),
         (ECCENTRICITY, "{ alert = -0.7 }", ".alert = -0.7", "than 0"),
         (ECCENTRICITY, '{ alert = 1.0, states = ["x"] }', ".states[1] = 'x'", "'full_load'"),
         (ECCENTRICITY, "{ alert = 0.7, states = [] }", ".states", "least"),

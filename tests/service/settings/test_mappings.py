@@ -84,10 +84,8 @@ WRONG_CSV = [
     (UNIT, "unit = 3", ":12: channel[1].unit = 3: Input should be a valid string"),
     (UNIT, f'{UNIT}\ngroup = "a"', ":13: channel[1].group: csv has no groups"),
     (UNIT, f"{UNIT}\ngain = 2", ":13: channel[1].gain = 2: unknown key"),
-    ("[[channel]]", "[[chanel]]", "chanel"),
     (CSV[CSV.index("[[channel]]") :], "", "channel: needs at least one for csv"),
     ("[[channel]]", CSV[CSV.index("[[channel]]") :] + "[[channel]]", "is used twice"),
-    ("[time]", "[time", "not TOML"),
 ]
 WRONG_MDF = [
     ("[[channel]]", "[csv]\n[[channel]]", "csv: is for CSV files, this one is mdf4"),
@@ -119,20 +117,6 @@ def test_the_example_in_the_guide_is_a_right_mapping(tmp_path: Path) -> None:
     mapping = next(block for block in blocks if "slow_channel" in block)
     (tmp_path / "map.toml").write_text(mapping)
     assert mapping_of(tmp_path / "map.toml").slow_channel[0].unit == "degC"
-
-
-def test_a_mapping_that_is_no_text_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "map.toml"
-    for content, words in (
-        (b"\xff\xfe", "not UTF-8 text at byte 0"),
-        (b"#" * 4_000_001, "larger than 4000000 bytes"),
-        (b"a = " + b"[" * 100_000, "nested too deeply"),
-    ):
-        path.write_bytes(content)
-        with pytest.raises(TomlFileError, match=words):
-            mapping_of(path)
-    with pytest.raises(TomlFileError, match="No such file"):
-        mapping_of(tmp_path / "absent")
 
 
 MAPS = Path(__file__).parents[3] / "deploy" / "maps"
@@ -194,13 +178,11 @@ BEHIND = [
     ("invalid_values = [0.5]", "value[2].invalid_values: must each be a whole number of 16 b"),
     ("scale_register = { address = 25 }", "scale_register: is read in another request"),
     ("full_scale = { minimum = 0.0 }", "value[2].full_scale.maximum: give either"),
-    ("invalid_below = nan", "invalid_below"),
     ("[[together]]\naddress = 11\ncount = 5", "together: the block from 11 cuts"),
     ("[[together]]\naddress = 40\ncount = 126", "together[1].count = 126"),
     ('[time]\nkind = "epoch"\nseconds = { address = 0 }', "time.seconds.address = 0: must be 1"),
     (CALENDAR.replace("50", "65532").replace('"day", "day"', '"month", "day"'), "1 to 65531"),
     (CALENDAR, "time.fields: must name each of year, month"),
-    ('"\\n" = 1', "value[2].'\\n' = 1: unknown key"),
     (FLAG + "mask = 0\nset_means = 'bad'", ":12: value[2].flag[1].mask = 0: Input"),
     (FLAG, "value[2].flag[1].set_means: must be given"),
     (FLAG + "type = 'float32'\nset_means = 'bad'", ":12: value[2].flag[1].type = 'float32': mu"),
@@ -226,7 +208,6 @@ BEHIND = [
         "type = 'bit'\nbit = 3\n[[value]]\nchannel = 'c'\naddress = 20\ntype = 'bit'\nbit = 3",
         "value[3].address: lies on a register of value 'b'",
     ),
-    ("base = ", "not TOML"),
 ]
 
 
@@ -244,7 +225,6 @@ BEHIND = [
             "base = 1\nmax_registers = 10\n[[together]]\naddress = 40\ncount = 11",
             "together[1].count: must not be above max_registers, 10",
         ),
-        ("base = 1", "bass = 1", ":2: bass = 1: unknown key"),
         *((END, f"{END}{text}\n", said) for text, said in BEHIND),
     ],
 )

@@ -116,7 +116,6 @@ def test_a_life_is_no_fixed_scenario(tmp_path: Path) -> None:
         ("life_seed = 2\nheld_load = 0.95\n", "", "damage"),
         ("size = 0.2", "size = 1.2", "damage[1].size = 1.2"),
         ("size = 0.2", "size = -0.2", "damage[1].size = -0.2: must be above 0; only gains"),
-        ("size = 0.2", "size = 0.0", "damage[1].size = 0.0: must be above 0"),
         ('"stiffness_loss"', '"rust"', "damage[1].kind = 'rust'"),
         ('"UJB"', '"XJB"', "damage[1].bearing = 'XJB'"),
         ("after_s = 120.0\n", "", "needs either after_s or at"),

@@ -142,15 +142,10 @@ def test_hdf5_links_to_elsewhere_are_not_followed(
     assert "'shaft x' is a link to elsewhere" in refusal(read, tmp_path / "soft", hdf5_job)
 
 
-def test_hdf5_that_is_no_column_of_numbers_is_refused(
+def test_hdf5_that_has_no_such_dataset_is_refused(
     tmp_path: Path, read: Read, hdf5_job: ImportJob
 ) -> None:
     path = tmp_path / "run"
-    write_hdf5(path, shaft_x=np.zeros((10, 10)))
-    says = "dataset 'shaft x' has shape (10, 10) of float64; needed is one dimension of numbers"
-    assert says in refusal(read, path, hdf5_job)
-    write_hdf5(path, shaft_x=np.array([b"one"] * 100))
-    assert "needed is one dimension of numbers" in refusal(read, path, hdf5_job)
     with h5py.File(path, "w") as file:
         file.create_group("shaft x")
     assert "'shaft x' is no dataset" in refusal(read, path, hdf5_job)
@@ -223,7 +218,7 @@ def test_hdf5_values_that_nobody_has_written_are_not_zeros(
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        (np.zeros((100, 2)), "has shape (100, 2) of float64"),
+        (np.zeros((100, 2)), "(100, 2) of float64; needed is one dimension of numbers"),
         (np.array([b"a"] * 100), "has shape (100,) of |S1"),
         (np.zeros(100, np.complex128), "has shape (100,) of complex128"),
         (np.zeros(0), "0 samples, column"),

@@ -3,7 +3,6 @@
 import asyncio
 import itertools
 import os
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +14,7 @@ from acquisition.clock import SystemClock
 from acquisition.errors import ConfigError, LinkError
 from acquisition.simulated.devices.can_device import CanDevice
 from acquisition.simulated.devices.can_server import CanBusServer
-from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, daq_dbc, dbc_name
+from acquisition.simulated.devices.can_shape import CanShape, DaqSignal, dbc_name
 from acquisition.simulated.devices.can_slcan import SlcanPtyServer, SlcanTcpServer
 from acquisition.simulated.devices.modbus_links import ModbusRtuServer
 from acquisition.simulated.devices.ring_device import RingDevice
@@ -130,27 +129,6 @@ def test_a_feed_that_does_not_fit_the_shape_is_refused(counting_feed):
         CanDevice(counting_feed(n_channels=3), SHAPE)
     with pytest.raises(ConfigError, match=r'need the profile "padwatch_int16", not "padwatch_f'):
         CanDevice(counting_feed(), replace(SHAPE, floats=True))
-
-
-DEPLOY = Path(__file__).parents[4] / "deploy"
-COUNTS = 32768
-
-
-def demo_shape(**others) -> CanShape:
-    unit = tomllib.loads((DEPLOY / "demo.toml").read_text(encoding="utf-8"))["unit"][0]
-    return CanShape(
-        channels=tuple(
-            DaqSignal(c["id"], "V", c["full_scale_v"] / COUNTS) for c in unit["channel"]
-        ),
-        slow=tuple(DaqSignal(s["id"], s["unit"]) for s in unit["slow_channel"]),
-        **others,
-    )
-
-
-@pytest.mark.parametrize(("name", "fd"), [("demo_classic.dbc", False), ("demo_fd.dbc", True)])
-def test_an_example_is_what_the_simulated_daq_sends(name, fd):
-    text = (DEPLOY / "can" / name).read_text(encoding="utf-8")
-    assert text == daq_dbc(demo_shape(fd=fd))
 
 
 @pytest.mark.parametrize(

@@ -56,7 +56,9 @@ def test_late_readings_are_added_to_what_is_left_of_their_hour(
 
     for _ in range(2):  # before they are merged, and after that
         for minutes in widths:
-            require_same_hours(rolled.trend(asked(minutes)), plain.trend(asked(minutes)))
+            for states in ((), (OperatingState.FULL_LOAD,)):
+                query = asked(minutes, states=states)
+                require_same_hours(rolled.trend(query), plain.trend(query))
         gather_all(rolled)
     assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
     assert n_rows(path, "rollup_redo") == 0
@@ -158,22 +160,6 @@ def test_planted_bugs_are_found(
 
     with pytest.raises(AssertionError):
         require_same_hours(rolled.trend(asked(60)), plain.trend(asked(60)))
-
-
-@pytest.mark.parametrize(("limits", "widths"), TIERS)
-def test_trends_of_a_state_say_the_same_before_and_after(
-    rolled: SqliteStore,
-    plain: SqliteStore,
-    path: Path,
-    limits: Ages,
-    widths: tuple[int, ...],
-) -> None:
-    delete_all(rolled, limits)
-
-    assert n_rows(path, "assessment", f"time_ns < {NOW_NS - HOUR_NS}") == 0
-    for minutes in widths:
-        query = asked(minutes, states=(OperatingState.FULL_LOAD,))
-        require_same_hours(rolled.trend(query), plain.trend(query))
 
 
 @pytest.mark.parametrize(
