@@ -241,7 +241,7 @@ class PlantFile(Settings):
     """HTTP server and data folder of the running program."""
 
     access: AccessSettings = AccessSettings()
-    """Requirement and duration of logins."""
+    """Whether logins are required, and how long they last."""
 
     analysis: AnalysisModel = AnalysisModel()
     """Segments, averaging and estimation."""
