@@ -247,7 +247,7 @@ class PlantFile(Settings):
     """Segments, averaging and estimation."""
 
     alarms: AlarmSettings = AlarmSettings()
-    """Delays and limits of alarms that apply to all units."""
+    """Common settings of all alarms: delays, chattering, and limits of the service."""
 
     films: FilmAlarmSettings = FilmAlarmSettings()
     """Monitoring of film stiffness against its baseline."""
