@@ -63,7 +63,7 @@ class DeviceClock:
     u_drift_ppm
         Standard uncertainty of `drift_ppm`.
     n_faults
-        Number of blocks since the start whose time stamp was not used.
+        Number of blocks with an unused time stamp since the adapter started.
     """
 
     offset_s: float | None
@@ -116,7 +116,7 @@ class SideValues:
         return len(self.starts)
 
     def within(self, start: int, stop: int, rate_hz: float) -> "SideValues":
-        """Return the values of the samples `start` to `stop - 1`; the first cell begins at 0."""
+        """Return the side values of the samples `start` to `stop - 1`, relative to `start`."""
         first = int(np.searchsorted(self.starts, start, side="right")) - 1
         cells = slice(first, max(first + 1, int(np.searchsorted(self.starts, stop))))
         starts, start_ns = self.starts[cells] - start, self.start_ns[cells].copy()
@@ -144,8 +144,8 @@ class SampleBlock:
     side
         Time stamps, channel states reported by the device, and slow values.
     rejected
-        Samples rejected between the previous block and this one; the rest of a jump in
-        ``first_index`` is a gap.
+        Samples rejected between the previous block and this one. If `first_index` jumps by more
+        than their number, the rest is a gap.
     clock
         Comparison of the device's clock with the host's; None without a device clock.
     stamp_fault
@@ -236,11 +236,11 @@ class SampleBlock:
 
     @cached_property
     def channel_quality(self) -> tuple[Quality, ...]:
-        """Worst quality of each channel within the block."""
+        """Worst quality of each channel within the block, in the order of the channels."""
         return worst_qualities(self.verdicts)
 
     def cell_qualities(self) -> Iterator[tuple[tuple[Quality, ...], int]]:
-        """Yield, for each cell, the channel qualities and the time of the first sample after it."""
+        """Yield the channel qualities of each cell and the end time of the cell, UTC ns."""
         lengths = np.diff(self.side.starts, append=self.n_samples)
         stops_ns = self.side.start_ns + np.rint(lengths / self.rate_hz * NS_PER_S).astype(np.int64)
         for verdicts, stop_ns in zip(self.verdicts.T.tolist(), stops_ns.tolist(), strict=True):
@@ -262,7 +262,7 @@ class SampleBlock:
 
     @cached_property
     def slow(self) -> Mapping[str, Reading]:
-        """Newest reading of each slow channel."""
+        """Newest reading of each slow channel, by id."""
         newest = zip(self.calibration.slow, self.side.slow[:, -1].tolist(), strict=True)
         return {c.id: c.reading(value) for c, value in newest} | dict(self.elsewhere)
 
@@ -286,7 +286,10 @@ class SampleBlock:
 
 
 def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:
-    """Return consecutive blocks as one, with the last block's clock and the first stamp fault."""
+    """Join at least one block with consecutive samples to one block.
+
+    The clock is that of the last block; the stamp fault is the first of any block.
+    """
     first, last = blocks[0], blocks[-1]
     if first is last:
         return first

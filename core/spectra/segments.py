@@ -1,4 +1,4 @@
-"""Segments: each window of samples is transformed once; averages are computed elsewhere."""
+"""Transform of sample windows to segments, and the segments kept for averaging."""
 
 import cmath
 import copy
@@ -58,7 +58,7 @@ class Evidence(StrEnum):
 
 @dataclass(frozen=True)
 class Segment:
-    """Transformed segment of a unit's samples, or one poll of its rack.
+    """Fourier-transformed segment of a unit's samples, or one poll of its rack.
 
     Parameters
     ----------
@@ -71,19 +71,22 @@ class Segment:
     bin_phasors_um_pk
         (n_channels, n_lines) displacement phasors at the bins above zero; None for a poll.
     order_frequency_hz
-        (2,) exact frequencies of 1× and of the vortex; without a vortex peak, its nominal order.
+        (2,) exact frequencies of 1× and of the vortex; without a vortex peak, the nominal frequency
+        of the vortex.
     has_vortex_peak
-        Whether a line shared by shaft and bearings has a peak in the vortex band, averaged up to
-        this segment.
+        Whether the spectra averaged up to this segment have a peak, shared by shaft and bearing, in
+        the vortex band.
     order_phasors_um_pk
         (n_channels, 2) displacement phasors at exactly `order_frequency_hz`, finite also if not
         usable; amplitudes if the phase is unknown. Runout is subtracted from 1× if possible.
     order_quality
-        (2, n_channels) qualities of the order phasors.
-    order_usable, has_phase : (2, n_channels)
-        Whether each order phasor is usable, and whether its phase is known.
+        (2, n_channels) qualities of `order_phasors_um_pk`.
+    order_usable : (2, n_channels)
+        Whether each of these phasors is usable.
+    has_phase : (2, n_channels)
+        Whether the phase of each of these phasors is known.
     at_mark_um_pk : (n_channels,)
-        1× phasors relative to the passage of the shaft's mark; None without a key-phase.
+        1× phasors with the phase at the passage of the shaft's mark; None without a key-phase.
     runout
         Whether runout was subtracted from 1×, by shaft channel.
     overall
@@ -122,7 +125,7 @@ class Segment:
         return bool(few) and self.channel_quality[row] == CLIPPED
 
     def line_quality(self, row: int, line: int) -> Quality:
-        """Return a channel's quality at a line; a few clipped samples make it only uncertain."""
+        """Return a channel's quality at a line: only uncertain if the channel `is_grazed`."""
         return uncertain(Reason.CLIPPED) if self.is_grazed(row) else self.order_quality[line][row]
 
     @cached_property
@@ -140,7 +143,10 @@ class Segment:
         return tuple(self.reading((row,), value) for row, value in enumerate(each))
 
     def reading(self, rows: Sequence[int], value: float) -> Reading:
-        """Return a value derived from channels with their worst quality; missing if one is bad."""
+        """Return a value derived from channels as a reading with their worst quality.
+
+        The reading is missing if a channel is bad or the value is NaN.
+        """
         qualities = [self.channel_quality[row] for row in rows]
         if any(quality.level is Level.BAD for quality in qualities):
             return missing(worst(qualities).reason)
@@ -161,7 +167,8 @@ class KeptSegments:
     segment_samples, hop_samples
         Samples per segment, and between the starts of consecutive segments.
     result_samples
-        Results are due at the first segment that ends at or after each multiple of this.
+        Results are due at the first segment that ends at or after each multiple of this number of
+        samples.
     n_rows
         Number of rows of a block.
 
@@ -240,9 +247,10 @@ class SegmentTransform(KeptSegments):
         self._bearing_rows = [[ids.index(i) for i in b.channels] for b in unit.bearings]
 
     def add(self, window: Window) -> Segment:
-        """Transform a window to a segment, keep it, and drop segments outside the averaging window.
+        """Transform a window to a segment, keep it for averaging, and return it.
 
-        They are dropped before the vortex search: after a gap they may be arbitrarily old.
+        Segments outside the averaging window are dropped before the vortex search: after a gap they
+        may be arbitrarily old.
         """
         self.drop_before(window.first_index - self.n_segments * self.hop_samples)
         samples: FloatArray = window.samples.astype(np.float64)
@@ -375,7 +383,7 @@ class SegmentTransform(KeptSegments):
     def _vortex_hz(
         self, turn_hz: float, bins: ComplexArray, usable: npt.NDArray[np.bool_]
     ) -> float | None:
-        """Return the vortex frequency, or None; averaged, as one segment resolves it poorly."""
+        """Return the vortex frequency in the spectra averaged up to now; None without a vortex."""
         low, high = self._settings.vortex_band
         band_hz = (low * turn_hz, high * turn_hz)
         # one more bin on each side, to distinguish a peak from the flank of a line outside
@@ -407,7 +415,7 @@ def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
 
 
 def _factors(channels: Sequence[Channel], frequency_hz: FloatArray) -> ComplexArray:
-    """Return displacement factors (n_channels, n_lines), computed once for identical channels."""
+    """Return the `displacement_factor` of each channel at each frequency, (n_channels, n_lines)."""
     kinds = [(c.measurand, c.direction, c.response, c.delay_s) for c in channels]
     alike = dict(zip(kinds, channels, strict=True))
     factors = {kind: displacement_factor(channel, frequency_hz) for kind, channel in alike.items()}

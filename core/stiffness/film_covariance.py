@@ -52,7 +52,7 @@ class FilmFit:
     smoothing : (n_lines, n_lines)
         Matrix from `core.stiffness.film_fit.smoother`.
     smear_share : (n_lines, 2)
-        Integration error as a fraction of the bearing's power.
+        Power of the integration error as a fraction of the bearing's power.
     n_segments
         Number of independent segments.
     floor_std : (2,)
@@ -91,7 +91,7 @@ class FilmFit:
 
     @property
     def coherence_segments(self) -> FloatArray:
-        """Number of segments with which a single line's coherence is equally certain, (2,).
+        """Number of segments that makes a single line's coherence as certain as `coherence`, (2,).
 
         The unexplained fraction is residual over total power. Its error comes from each line's
         residual and power, with relative errors of ``1 / √n`` that are correlated by their ratio.
@@ -207,7 +207,7 @@ def _hermitian_root(shaft: ComplexArray) -> ComplexArray:
 
 @dataclass(frozen=True)
 class BracketEstimate:
-    """Estimated changes of the bracket.
+    """Estimated changes of properties of the bracket.
 
     Parameters
     ----------
@@ -266,7 +266,7 @@ class BracketChanges:
         return information
 
     def follow(self, change: int, fitted: Sequence[int]) -> FloatArray:
-        """Return the response of the fitted changes to a unit of another change, (n_fitted,)."""
+        """Return the shift of fitted changes per unit of another, unfitted change, (n_fitted,)."""
         information = self._information
         step = np.linalg.solve(information[np.ix_(fitted, fitted)], information[fitted, change])
         return np.asarray(-step, dtype=np.float64)
