@@ -20,8 +20,6 @@ class SlowRollVector:
 
     Parameters
     ----------
-    channel
-        Channel id of the probe.
     probe
         Serial number or mark of the probe. A replaced or moved probe reads another surface.
     phasor_um_pk

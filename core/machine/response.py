@@ -42,12 +42,7 @@ class HighPass:
 class Resonance:
     """Second-order low-pass response, such as the mounted resonance of a transducer.
 
-    Parameters
-    ----------
-    natural_hz
-        Natural frequency.
-    damping
-        Fraction of critical damping.
+    `damping` is the fraction of critical damping.
     """
 
     natural_hz: float

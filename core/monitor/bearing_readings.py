@@ -148,10 +148,7 @@ class _Bearing:
     def readings(
         self, position: Found
     ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """Return all readings except the preferred stiffness, their budgets, and the fitted film.
-
-        The fitted film is the result of `dynamic`, None without a result.
-        """
+        """Return all readings except the preferred stiffness, their budgets, and the film or None."""
         unit, segments = self._unit, self._segments
         speed = segments[-1].speed
         dynamic, dynamic_budgets, film = self._dynamic()
@@ -264,10 +261,7 @@ class _Bearing:
         return with_budgets({**found, "frequency_hz": self._frequency(line)}, prefix)
 
     def _dynamic(self) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """Return readings and budgets of `dynamic`, and the fitted film or None.
-
-        The film is fitted to the segments in which all four channels were usable.
-        """
+        """Return readings, budgets and the fitted film (or None) of the `dynamic` estimator."""
         if self.spectrum is None:
             return dict.fromkeys(DYNAMIC_NAMES, missing(Reason.NOT_MEASURED)), {}, None
         settings, quality = self._settings.dynamic, self._line_quality(*range(len(self._rows)))
@@ -343,10 +337,7 @@ class _Bearing:
         return other_line_hz(self.spectrum, turn_hz, band_hz, self._settings.min_line_to_floor)
 
     def _line_quality(self, *places: int, line: int = ORDER1) -> Quality | Reading:
-        """Return the worst quality of a line in some of the bearing's channels.
-
-        If no value can be given, return a missing reading with the reason instead.
-        """
+        """Return the worst quality of a line in channels, or a missing reading with the reason."""
         newest, few = self._segments[-1], uncertain(Reason.FEW_SEGMENTS)
         own = [newest.line_quality(self._rows[place], line) for place in places]
         now = worst([newest.speed.rpm.quality, self._doubts, *own])

@@ -36,10 +36,7 @@ STORED = (True, True)
 
 
 def _each(name: str, unit: str, label: str, kept: Iterable[bool] = LIVE) -> tuple[Quantity, ...]:
-    """Return one quantity for x and one for y; the axis replaces the braces in name and label.
-
-    `kept` holds `has_uncertainty` and `keeps_uncertainty`; if it is empty, both are false.
-    """
+    """Return one quantity for x and one for y; the axis replaces the braces in name and label."""
     return tuple(Quantity(name.format(axis), unit, label.format(axis), *kept) for axis in "xy")
 
 

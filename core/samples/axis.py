@@ -35,10 +35,7 @@ class ClockTolerance:
     drift: float = 1e-3
 
     def over(self, elapsed: float, per_s: float = NS_PER_S) -> float:
-        """Return the largest allowed deviation after an elapsed time.
-
-        Both times are in units of 1/per_s seconds; by default, nanoseconds.
-        """
+        """Return the largest allowed deviation after an elapsed time, both in 1/per_s seconds."""
         return self.step_s * per_s + self.drift * abs(elapsed)
 
 
@@ -84,18 +81,13 @@ class Epochs:
 
 
 def signed_distance(counter: int, reference: int, modulus: int) -> int:
-    """Return the signed distance from a reference to a counter that wraps at a modulus.
-
-    The distance is the shorter one, at most half the modulus.
-    """
+    """Return the shortest signed distance from a reference to a counter that wraps at `modulus`."""
     half = modulus // 2
     return (counter - reference + half) % modulus - half
 
 
 class SampleAxis:
-    """Current sample index of one device, kept across connections.
-
-    Its methods convert a counter of the device, which wraps at `modulus`, to a number of samples.
+    """Sample index of one device across connections; converts its wrapping counter to samples.
 
     Attributes
     ----------

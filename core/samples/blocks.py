@@ -286,10 +286,7 @@ class SampleBlock:
 
 
 def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:
-    """Join at least one block with consecutive samples to one block.
-
-    The clock is that of the last block; the stamp fault is the first of any block.
-    """
+    """Return consecutive blocks as one, with the clock of the last and the first stamp fault."""
     first, last = blocks[0], blocks[-1]
     if first is last:
         return first

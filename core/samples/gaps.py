@@ -78,10 +78,7 @@ class SampleAccount:
         return self.n_stored + self.n_flagged + self.n_gap + sum(self.rejected.values())
 
     def with_taken(self, n_samples: int, n_flagged: int, n_repeated: int) -> "SampleAccount":
-        """Return the account with the samples of one block added.
-
-        Of `n_samples`, `n_flagged` have a channel that is not good; `n_repeated` is not included.
-        """
+        """Return the account with the samples of one block added; `n_samples` includes flagged."""
         return replace(
             self,
             n_stored=self.n_stored + n_samples - n_flagged,
@@ -114,7 +111,7 @@ class Reach:
     stop_index, stop_ns
         Index and time (UTC nanoseconds since 1970) of the first sample after the stored samples.
     gaps
-        Gaps already recorded after this end.
+        Gaps already recorded after this end, oldest first.
     """
 
     epoch: int
@@ -138,13 +135,7 @@ def restart(reach: Reach, block: SampleBlock) -> Gap | None:
     """Return the gap between the last received sample and the restart of the sample count.
 
     None if the times show no gap. Samples missing after the restart are not included.
-
-    Parameters
-    ----------
-    reach
-        End of the received samples.
-    block
-        First block of the new sample count.
+    `reach` is the end of the received samples, `block` the first block of the new count.
     """
     stop_ns = _begin_ns(block) if n_missed(reach.stop_ns, block) else block.start_ns
     lost = _lost(reach, reach.stop_ns, stop_ns, block.rate_hz)
@@ -165,14 +156,8 @@ def n_missed(stop_ns: int, block: SampleBlock) -> int:
     """Return the number of samples missing between the start of a new count and its first block.
 
     The number is the block's index if the counter started at zero. If index and time place its
-    start before `stop_ns`, the counter continued or wrapped, and the number is 0.
-
-    Parameters
-    ----------
-    stop_ns
-        Time of the first sample after those received in earlier counts.
-    block
-        First block of the new count.
+    start before `stop_ns`, the end of the samples received in earlier counts, the counter continued
+    or wrapped, and the number is 0.
     """
     counted_ns = ns_from_s(block.first_index / block.rate_hz)
     return block.first_index if _begin_ns(block) - stop_ns >= -_TOLERANCE.over(counted_ns) else 0

@@ -58,15 +58,7 @@ class Window:
 
 @dataclass(frozen=True)
 class _Part:
-    """Part of a block within a window.
-
-    Parameters
-    ----------
-    cells, samples
-        Ranges of cells and of samples of the block that lie in the window.
-    weights : (n_cells,)
-        Number of samples of each cell that lie in the window.
-    """
+    """Part of a block in a window: ranges of cells and samples, and number of samples per cell."""
 
     block: SampleBlock
     cells: slice
@@ -101,8 +93,6 @@ class Ring:
 
     Parameters
     ----------
-    n_channels
-        Number of channels of every block.
     capacity
         Number of samples held per channel.
     """

@@ -173,10 +173,7 @@ class PollTransform(KeptSegments):
     def _of_channels(
         self, part: VectorPart, window: Window, least: float = -math.inf
     ) -> tuple[FloatArray, tuple[Quality, ...]]:
-        """Return a quantity of all channels, (n_channels,), and its quality in each channel.
-
-        Values that are missing, not good or below `least` are bad and returned as zero.
-        """
+        """Return a quantity of all channels, (n_channels,), zero if not usable, and its qualities."""
         found = [self._row_of(channel.id, part, window, least) for channel in self._unit.channels]
         return np.array([value for value, _ in found]), tuple(quality for _, quality in found)
 

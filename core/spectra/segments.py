@@ -143,10 +143,7 @@ class Segment:
         return tuple(self.reading((row,), value) for row, value in enumerate(each))
 
     def reading(self, rows: Sequence[int], value: float) -> Reading:
-        """Return a value derived from channels as a reading with their worst quality.
-
-        The reading is missing if a channel is bad or the value is NaN.
-        """
+        """Return a value with the channels' worst quality; missing for a bad channel or a NaN."""
         qualities = [self.channel_quality[row] for row in rows]
         if any(quality.level is Level.BAD for quality in qualities):
             return missing(worst(qualities).reason)

@@ -69,10 +69,7 @@ class DynamicSettings:
 def used_lines(
     spectrum: CrossSpectrum, turn_hz: tuple[float, float], settings: DynamicSettings
 ) -> npt.NDArray[np.int64]:
-    """Return the indices of the lines that `dynamic` uses, ascending.
-
-    These are lines of the band between the harmonics, with motion and little leakage.
-    """
+    """Return the indices of the lines between harmonics that have motion and little leakage."""
     power = np.diagonal(spectrum.matrix, axis1=1, axis2=2).real
     used = _between_harmonics_of(settings.band_hz, spectrum, turn_hz, settings)
     used &= np.all(power > 0.0, axis=1)

@@ -68,10 +68,7 @@ def effective_stiffness_n_per_m(
 
 
 def motion_across(spectrum: CrossSpectrum, line: int, shaft: int) -> complex:
-    """Return the complex ratio of transverse to direct shaft motion at a line; 1 if unknown.
-
-    `shaft` is the index of the channel of direct motion.
-    """
+    """Return the ratio of coherent motion across a shaft channel to that along it; 1 if unknown."""
     across = SHAFT_Y if shaft == SHAFT_X else SHAFT_X
     power = float(spectrum.power[line, shaft, across])
     return complex(spectrum.matrix[line, across, shaft]) / power if power > 0.0 else 1.0

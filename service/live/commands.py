@@ -50,10 +50,7 @@ class Thaw:
 
 @dataclass(frozen=True)
 class Renew:
-    """Learn a new baseline after a machine event such as an overhaul.
-
-    Readings before `from_ns`, UTC nanoseconds since 1970, are not used.
-    """
+    """Learn a new baseline from readings after `from_ns`, the time of an overhaul or the like."""
 
     from_ns: int
 

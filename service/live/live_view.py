@@ -34,8 +34,6 @@ class UnitStatus:
 
     Parameters
     ----------
-    state
-        State of the link.
     reason
         Reason why the device is not connected, or None.
     since_ns
@@ -141,10 +139,7 @@ class LiveView:
         )
 
     def set_assessment(self, assessment: Assessment, sampled_s: float | None = None) -> None:
-        """Set the newest result of a bearing.
-
-        ``sampled_s`` is the monotonic arrival time of its newest samples; by default, now.
-        """
+        """Set the newest result; ``sampled_s`` is its samples' monotonic arrival time, else now."""
         self.revision += 1
         key = (assessment.unit, assessment.bearing)
         since_s = self._clock.monotonic_s() if sampled_s is None else sampled_s
