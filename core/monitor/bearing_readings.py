@@ -148,7 +148,7 @@ class _Bearing:
     def readings(
         self, position: Found
     ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """Return all readings except the preferred stiffness, their budgets, and the film or None."""
+        """Return all readings but the preferred stiffness, their budgets, and the film or None."""
         unit, segments = self._unit, self._segments
         speed = segments[-1].speed
         dynamic, dynamic_budgets, film = self._dynamic()
@@ -245,7 +245,7 @@ class _Bearing:
         return all(s.runout[channel] is RunoutVerdict.APPLIED for s, usable in counted if usable)
 
     def _steadiness(self) -> Quality:
-        """Return the data quality: uncertain if speed or power varied, or power is unknown."""
+        """Return the data quality: uncertain if speed or power varied by more than its limit."""
         power = self._unit.power_channel
         speeds = [segment.speed.rpm for segment in self._segments]
         powers = (
@@ -337,7 +337,7 @@ class _Bearing:
         return other_line_hz(self.spectrum, turn_hz, band_hz, self._settings.min_line_to_floor)
 
     def _line_quality(self, *places: int, line: int = ORDER1) -> Quality | Reading:
-        """Return the worst quality of a line in channels, or a missing reading with the reason."""
+        """Return the worst quality of a line in the channels, or a missing reading with a reason."""
         newest, few = self._segments[-1], uncertain(Reason.FEW_SEGMENTS)
         own = [newest.line_quality(self._rows[place], line) for place in places]
         now = worst([newest.speed.rpm.quality, self._doubts, *own])

@@ -32,7 +32,7 @@ class MonitorState:
     growth
         Last measured thermal growth of the gaps, by bearing id.
     account
-        Number of samples by fate.
+        Balance of the samples that the device offered.
     """
 
     epoch: int | None
@@ -77,7 +77,7 @@ class UnitMonitor:
 
     @property
     def account(self) -> SampleAccount:
-        """Account of all samples that the unit's device offered."""
+        """Balance of the samples that the unit's device offered: stored, lost, rejected."""
         return self._ring.account
 
     @property

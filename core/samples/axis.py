@@ -35,7 +35,10 @@ class ClockTolerance:
     drift: float = 1e-3
 
     def over(self, elapsed: float, per_s: float = NS_PER_S) -> float:
-        """Return the largest allowed deviation after an elapsed time, both in 1/per_s seconds."""
+        """Return the largest allowed deviation after an elapsed time, in the unit of that time.
+
+        The unit is 1 / per_s seconds; by default, a nanosecond.
+        """
         return self.step_s * per_s + self.drift * abs(elapsed)
 
 
@@ -87,7 +90,7 @@ def signed_distance(counter: int, reference: int, modulus: int) -> int:
 
 
 class SampleAxis:
-    """Sample index of one device across connections; converts its wrapping counter to samples.
+    """Current sample index of one device, from which its wrapping counter is unwrapped.
 
     Attributes
     ----------
@@ -113,11 +116,11 @@ class SampleAxis:
         self.index, self.at_ns = index, at_ns
 
     def forward(self, counter: int, modulus: int) -> int:
-        """Return the number of samples to a counter value, from 0 to ``modulus - 1``."""
+        """Return the samples from the index to a counter value, from 0 to ``modulus - 1``."""
         return (counter - (self.index or 0)) % modulus
 
     def jump(self, counter: int, modulus: int, at_ns: int) -> int:
-        """Return the number of samples to a counter value, with wraps by the elapsed time."""
+        """Return the samples from the index to a counter value, adding wraps by elapsed time."""
         forward = self.forward(counter, modulus)
         return forward + modulus * max(0, round((self.elapsed(at_ns) - forward) / modulus))
 

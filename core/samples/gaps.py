@@ -44,7 +44,7 @@ class Gap:
 
 @dataclass(frozen=True)
 class SampleAccount:
-    """Number of samples per channel by fate: offered = stored + flagged + gap + rejected.
+    """Balance of the samples per channel: offered = stored + flagged + gap + rejected.
 
     The account starts with the first block.
 
@@ -78,7 +78,7 @@ class SampleAccount:
         return self.n_stored + self.n_flagged + self.n_gap + sum(self.rejected.values())
 
     def with_taken(self, n_samples: int, n_flagged: int, n_repeated: int) -> "SampleAccount":
-        """Return the account with the samples of one block added; `n_samples` includes flagged."""
+        """Return the account with one block's samples added; `n_samples` includes `n_flagged`."""
         return replace(
             self,
             n_stored=self.n_stored + n_samples - n_flagged,

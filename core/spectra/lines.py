@@ -152,7 +152,7 @@ def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) ->
 
 
 def line_phasors(tapered_samples: FloatArray, factors: ComplexArray) -> ComplexArray:
-    """Return the phasors (n_channels, n_lines) of tapered samples from `turning_factors`."""
+    """Return the phasors (n_channels, n_lines) at the frequencies given to `turning_factors`."""
     parts: FloatArray = tapered_samples @ factors.view(np.float64)
     return parts.view(np.complex128)
 

@@ -173,7 +173,7 @@ class PollTransform(KeptSegments):
     def _of_channels(
         self, part: VectorPart, window: Window, least: float = -math.inf
     ) -> tuple[FloatArray, tuple[Quality, ...]]:
-        """Return a quantity of all channels, (n_channels,), zero if not usable, and its qualities."""
+        """Return values and qualities of a quantity, (n_channels,); unusable values are zero."""
         found = [self._row_of(channel.id, part, window, least) for channel in self._unit.channels]
         return np.array([value for value, _ in found]), tuple(quality for _, quality in found)
 

@@ -9,7 +9,7 @@ from core.spectra.lines import peak_frequency_hz
 
 
 def roundness(spectrum: CrossSpectrum, line: int) -> float:
-    """Return the roundness of the shaft orbit at the line with an index in the spectrum.
+    """Return the roundness of the shaft orbit at the spectral line with index `line`.
 
     1 is a forward circle, 0 a straight line or no motion, -1 a backward circle. In forward motion,
     u_y lags u_x by 90°, and the imaginary part of their cross-spectrum is positive.

@@ -107,7 +107,7 @@ def _without_cross_coupling(budget: Budget) -> Budget:
 
 
 def _combined(budgets: Sequence[Budget], factors: FloatArray, covariance: FloatArray) -> Budget:
-    """Return the budget of the sum of coefficients times factors, (4,) each."""
+    """Return the budget of the sum of four coefficients, each multiplied by its factor."""
     random = math.sqrt(float(factors @ covariance @ factors))
     systematic = zip(
         *([line for line in b.lines if line.kind is Kind.SYSTEMATIC] for b in budgets), strict=True

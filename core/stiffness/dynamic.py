@@ -115,7 +115,7 @@ def dynamic_stiffness(
     settings: DynamicSettings,
     n_integrations: tuple[int, int] = (2, 2),
 ) -> DynamicStiffness | Reason:
-    """Estimate a film's coefficients, or return the reason why there is no result.
+    """Return a film's coefficients fitted to a spectrum, or the reason why there is no result.
 
     An unknown mass of the bracket is fitted with the film, one mass for both directions.
 

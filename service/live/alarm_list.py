@@ -53,12 +53,12 @@ class AlarmList(Protocol):
 
     @property
     def revision(self) -> int:
-        """Number of the list's state, different after every change of an alarm."""
+        """Revision number of the list; changes whenever an alarm changes."""
         ...
 
     @property
     def chatter_rule(self) -> ChatterRule:
-        """Rule by which an alarm counts as chattering: too many occurrences in a time."""
+        """Number of occurrences within a time that makes an alarm count as chattering."""
         ...
 
     @property
@@ -71,7 +71,7 @@ class AlarmList(Protocol):
         ...
 
     def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether it is now known if the condition of an alarm is true or false."""
+        """Return whether the condition of an alarm is currently known to be true or false."""
         ...
 
     def is_chattering(self, alarm: Alarm) -> bool:

@@ -43,7 +43,7 @@ class UnitStatus:
     received_s
         Arrival time of the newest block by a monotonic clock, s; None before the first block.
     account
-        Number of samples by fate.
+        Balance of the samples that the device offered.
     clock
         Offset and drift of the device clock; None if unknown.
     stamp_fault
