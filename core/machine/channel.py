@@ -1,4 +1,4 @@
-"""Waveform channels, and the conversion of their spectra to displacement."""
+"""Waveform channels, and the conversion of their phasors to displacement."""
 
 import math
 from dataclasses import dataclass

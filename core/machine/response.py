@@ -89,7 +89,7 @@ class ResponseTable:
         return np.asarray(np.exp(log_magnitude + 1j * phase_rad))
 
     def covers(self, low_hz: float, high_hz: float) -> bool:
-        """Whether the whole frequency band lies within the table."""
+        """Whether a frequency band lies completely within the table."""
         return self.frequency_hz[0] <= low_hz and high_hz <= self.frequency_hz[-1]
 
 

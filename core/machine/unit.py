@@ -192,7 +192,7 @@ class Bearing:
 
     @property
     def bracket(self) -> BracketDynamics:
-        """Dynamics of the bracket, from which the film force is derived."""
+        """Stiffness, mass and damping of the bracket, from which the film force is derived."""
         return BracketDynamics(
             self.bracket_stiffness_n_per_m, self.bracket_mass_kg, self.bracket_damping_n_s_per_m
         )

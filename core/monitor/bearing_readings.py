@@ -337,7 +337,7 @@ class _Bearing:
         return other_line_hz(self.spectrum, turn_hz, band_hz, self._settings.min_line_to_floor)
 
     def _line_quality(self, *places: int, line: int = ORDER1) -> Quality | Reading:
-        """Return the worst quality of a line in the channels, or a missing reading with a reason."""
+        """Return the quality of a line in the channels, or a missing reading with the reason."""
         newest, few = self._segments[-1], uncertain(Reason.FEW_SEGMENTS)
         own = [newest.line_quality(self._rows[place], line) for place in places]
         now = worst([newest.speed.rpm.quality, self._doubts, *own])

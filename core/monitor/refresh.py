@@ -82,7 +82,7 @@ class Refresh:
         return measured_growth(self._position[0]) if measures_growth(self.bearing) else None
 
     def assessment(self) -> Assessment:
-        """Evaluate the bearing and return its assessment."""
+        """Return the assessment of the bearing, computed from this input."""
         newest, rows, coverage = self._segment, self._rows, self.averaged.coverage
         found = bearing_readings(
             self.unit, self.bearing, self.settings, self.kept, coverage, self._position

@@ -202,7 +202,7 @@ class SampleBlock:
 
     @property
     def rate_hz(self) -> float:
-        """Sampling rate of each channel."""
+        """Sampling rate of each channel in Hz."""
         return self.calibration.rate_hz
 
     @property
@@ -222,7 +222,7 @@ class SampleBlock:
 
     @property
     def stop_ns(self) -> int:
-        """Time of the first sample after the block."""
+        """Time of the first sample after the block, UTC nanoseconds since 1970."""
         n_last = self.n_samples - int(self.side.starts[-1])
         return int(self.side.start_ns[-1]) + ns_from_s(n_last / self.rate_hz)
 
@@ -250,8 +250,8 @@ class SampleBlock:
     def samples(self) -> SampleArray:
         """Samples in the engineering unit of each channel, (n_channels, n_samples).
 
-        A channel with a non-finite sample is zero, and bad, in the whole cell: one NaN would
-        invalidate a whole spectrum.
+        If a sample of a channel is not finite, all samples of its cell are set to zero and bad: one
+        NaN would invalidate a whole spectrum.
         """
         found = self.calibration.to_units(self.counts)
         is_blank = self.verdicts == NOT_FINITE
@@ -267,9 +267,9 @@ class SampleBlock:
         return {c.id: c.reading(value) for c, value in newest} | dict(self.elsewhere)
 
     def from_sample(self, start: int, stop: int | None = None) -> "SampleBlock":
-        """Return samples `start` to `stop - 1` as a block; `rejected` is kept if `start` is 0.
+        """Return the samples `start` to `stop - 1` as a block; `rejected` is kept if `start` is 0.
 
-        Raises `ValueError` if the part begins outside the block.
+        Raises `ValueError` if `start` lies outside the block.
         """
         stop = self.n_samples if stop is None else min(stop, self.n_samples)
         if not 0 <= start <= self.n_samples:

@@ -11,7 +11,7 @@ from core.checks.channels import COUNTS_FULL_SCALE, ChannelLimits
 from core.quality import Reading, Reason, mean_reading, missing
 
 BLOCK_SAMPLES = 50
-"""Default number of samples per cell: 1/12 s at 600 Hz, the shortest probe failure that shows."""
+"""Default number of samples per cell: 1/12 s at 600 Hz, the shortest visible probe failure."""
 
 _LARGEST = float(np.finfo(np.float32).max)
 
@@ -42,7 +42,7 @@ class ChannelCalibration:
 
     @property
     def ok_limits(self) -> tuple[float, float]:
-        """Lowest and highest mean of a healthy transducer, engineering units."""
+        """Lowest and highest mean signal of a healthy transducer, in engineering units."""
         ends = (self.ok_min_v * self.unit_per_v, self.ok_max_v * self.unit_per_v)
         return min(ends), max(ends)
 
@@ -71,7 +71,7 @@ class SlowCalibration:
         return Reading(float(value))
 
     def mean(self, values: FloatArray, weights: npt.NDArray[np.int64]) -> Reading:
-        """Return the mean of slow values, bit-identical to `core.quality.mean_reading`.
+        """Return the weighted mean of slow values; equals `core.quality.mean_reading` bit by bit.
 
         Parameters
         ----------

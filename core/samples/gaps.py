@@ -30,8 +30,8 @@ class Gap:
     start_ns
         Time of the first missing sample; None if it follows from `n_samples` and `stop_ns`.
     is_estimated
-        Whether `n_samples` is estimated from times: the device restarted its sample count, or has
-        none.
+        Whether `n_samples` is estimated from times, because the device restarted its sample count
+        or does not count samples.
     """
 
     epoch: int
@@ -123,8 +123,8 @@ class Reach:
 def outage(reach: Reach, block: SampleBlock) -> list[Gap]:
     """Return the gaps between the stored samples and the first block after them.
 
-    Gaps already recorded are left out. The list is empty if the block continues or repeats the
-    stored samples.
+    Recorded gaps (`reach.gaps`) are left out. The list is empty if the block continues or repeats
+    the stored samples.
     """
     if _goes_on(reach, block):
         return list(_counted(reach, block))
@@ -164,7 +164,7 @@ def n_missed(stop_ns: int, block: SampleBlock) -> int:
 
 
 def _goes_on(reach: Reach, block: SampleBlock) -> bool:
-    """Whether the block continues the same sample count, by its index and its time."""
+    """Whether the block continues the sample count of `reach`, by its index and its time."""
     if block.epoch != reach.epoch:
         return False
     passed_ns = ns_from_s((block.first_index - reach.stop_index) / block.rate_hz)
@@ -209,7 +209,7 @@ def _estimated(reach: Reach, block: SampleBlock) -> list[Gap]:
 
 
 def _begin_ns(block: SampleBlock) -> int:
-    """Return the start time of the sample count, from the block's index and time."""
+    """Return the time of index 0 of the block's sample count, UTC nanoseconds since 1970."""
     return block.start_ns - ns_from_s(block.first_index / block.rate_hz)
 
 
@@ -240,7 +240,7 @@ class Count:
 
 
 class Counts:
-    """Assignment of a new epoch to a sample count that restarts within the same epoch.
+    """Assignment of epochs: a sample count that restarts within an epoch gets a new epoch.
 
     A device or a program that reads it may restart the count without reporting it. The index alone
     then looks like repeated samples; the time shows that they are new. `count` is None before the

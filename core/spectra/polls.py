@@ -57,7 +57,7 @@ class VectorRow:
 
     @property
     def id(self) -> str:
-        """Name of the row in register maps."""
+        """Id of the row in register maps: channel id, dot, quantity."""
         return f"{self.channel}.{self.part}"
 
 

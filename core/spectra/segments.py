@@ -130,12 +130,12 @@ class Segment:
 
     @cached_property
     def spans_um_pp(self) -> tuple[Reading, ...]:
-        """Broad-band peak-to-peak displacement of each channel."""
+        """Broad-band peak-to-peak displacement of each channel in µm; missing for polls."""
         return self._of_channels(None if self.overall is None else self.overall.peak_to_peak_um)
 
     @cached_property
     def velocities_mm_s_rms(self) -> tuple[Reading, ...]:
-        """Broad-band rms velocity of each channel."""
+        """Broad-band rms velocity of each channel in mm/s; missing for polls."""
         return self._of_channels(None if self.overall is None else self.overall.velocity_mm_s_rms)
 
     def _of_channels(self, values: FloatArray | None) -> tuple[Reading, ...]:
@@ -158,7 +158,7 @@ class KeptSegments:
     Parameters
     ----------
     n_segments
-        Number of segments of a full average.
+        Number of segments in a full averaging window.
     min_segments
         Number of independent segments below which a result is uncertain.
     segment_samples, hop_samples
@@ -196,7 +196,7 @@ class KeptSegments:
         self.segments.clear()
 
     def snapshot(self) -> "KeptSegments":
-        """Return a copy that later segments do not change."""
+        """Return a copy of the object, which later segments do not change."""
         found = copy.copy(self)
         found.segments = self.segments.copy()
         return found
@@ -311,7 +311,7 @@ class SegmentTransform(KeptSegments):
         mean: FloatArray,
         speed: Speed,
     ) -> tuple[Quality, ...]:
-        """Return the qualities after checks of signal and level; failed transducers are bad."""
+        """Return the channel qualities after checks of signal and level; bad for failed sensors."""
         turning, limits = speed.rpm.value is not None, self._settings.sensors
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
         turn_samples = round(self._unit.rate_hz / turn_hz)

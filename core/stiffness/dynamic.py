@@ -99,7 +99,7 @@ class DynamicStiffness:
 
     @property
     def c_n_s_per_m(self) -> FloatArray:
-        """Damping coefficients, (2, 2)."""
+        """Damping coefficients, (2, 2); rows and columns as for `k_n_per_m`."""
         return self.coefficients[:, 2:]
 
     @property
@@ -187,7 +187,7 @@ def _bracket_changes(bracket: BracketDynamics, fit: FilmFit) -> BracketChanges:
 
 
 def _with_mass(bracket: BracketDynamics, fit: FilmFit) -> BracketDynamics | None:
-    """Return the bracket with the mass fitted to the residual; None if it is not determined."""
+    """Return the bracket with a mass fitted to the residual force; None if it cannot be fitted."""
     found = _bracket_changes(bracket, fit).estimate([MASS])
     if found is None:
         return None

@@ -17,7 +17,7 @@ from core.spectra.cross_spectrum import (
 
 MAX_LEAKAGE = 0.005
 """Largest fraction of a line's shaft power that may be leakage from stronger lines. Leakage
-contains runout, and it is integrated with the wrong frequency."""
+contains runout and is integrated with the wrong frequency."""
 
 N_BLOCKS = 4
 """Number of parts of the quiet band, each with its own noise floor."""
@@ -47,7 +47,7 @@ class DynamicSettings:
     min_signal_share
         Smallest fraction of the shaft's weighted power that is not noise, in the worst direction.
     min_coherence
-        Smallest coherence of the result, see `DynamicStiffness`, in each direction.
+        Smallest `coherence` of a `DynamicStiffness` in each direction.
     max_relative_uncertainty
         Largest random standard uncertainty of a direct stiffness, relative to the larger direct
         stiffness; beyond it the excitation is insufficient.

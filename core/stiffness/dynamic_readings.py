@@ -69,7 +69,7 @@ def dynamic_readings(
     quality
         Quality of the input; without a spectrum, all readings are missing for its reason.
     n_integrations
-        Number of integrations of v_x and v_y to displacement.
+        Number of integrations of v_x and v_y to displacement, as in `dynamic_stiffness`.
     """
     if spectrum is None:
         return dict.fromkeys(NAMES, missing(quality.reason)), {}, None

@@ -21,7 +21,7 @@ MIN_SHARE = 0.05
 singular."""
 
 ROUNDING = 1e-12
-"""Relative residual power of noise-free signals, from rounding."""
+"""Residual power of noise-free signals, due to rounding, as a fraction of the force's power."""
 
 SMOOTHING_REACH_BINS = 6
 """Number of bins to each side over which the residual spectrum is smoothed for the weights."""
@@ -72,7 +72,7 @@ class NormalEquations:
 
     @property
     def cross(self) -> ComplexArray:
-        """Cross-spectra of the bearing with the conjugated shaft, (n_lines, 2, 2)."""
+        """Cross-spectra of the bearing's with the shaft's (conjugated) motion, (n_lines, 2, 2)."""
         return self.matrix[:, BEARING_X:, :BEARING_X]
 
     @cached_property
@@ -97,22 +97,22 @@ class NormalEquations:
 
     @cached_property
     def force_power(self) -> FloatArray:
-        """Power of the bracket's force, for each row, (n_lines, 2)."""
+        """Power of the bracket's force in (N/m)² µm², for each row, (n_lines, 2)."""
         bearing = self.matrix[:, BEARING_X:, BEARING_X:]
         power = np.diagonal(bearing, axis1=1, axis2=2).real
         return np.asarray(np.abs(self.bracket_n_per_m[:, np.newaxis]) ** 2 * power)
 
     def moment(self, stiffness_n_per_m: ComplexArray) -> FloatArray:
-        """Return the moments of the shaft's motion with the force of brackets.
+        """Return the moments (..., n_lines, 2, 4) of the shaft's motion with the force of brackets.
 
-        Dynamic stiffnesses (..., n_lines) give moments (..., n_lines, 2, 4).
+        `stiffness_n_per_m` holds the dynamic stiffnesses of the brackets, (..., n_lines).
         """
         cross = stiffness_n_per_m[..., np.newaxis, np.newaxis] * self.cross
         scale = self.ratio[:, np.newaxis, np.newaxis]
         return np.concatenate([cross.real, scale * cross.imag], axis=-1)
 
     def solve(self, weight: FloatArray, right: FloatArray) -> FloatArray:
-        """Solve for the unknowns of both rows, (..., 2, 4).
+        """Return the unknowns of both rows that solve the normal equations, (..., 2, 4).
 
         Parameters
         ----------

@@ -33,7 +33,7 @@ class Accept:
 
 @dataclass(frozen=True)
 class Reject:
-    """Withdraw or reject a version of a baseline; it never comes into force automatically."""
+    """Reject a version of a baseline: never put it in force again automatically."""
 
     version: int
 

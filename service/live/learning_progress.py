@@ -55,7 +55,7 @@ class LearningProgress:
         Number of usable readings, and of days with such readings, in the direction (x or y) with
         fewer readings; None after a baseline was learned in this period.
     recent
-        Numbers of readings in the last days.
+        Numbers of readings in the last `RECENT_DAYS` days.
     """
 
     since_ns: int | None

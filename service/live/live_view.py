@@ -159,7 +159,7 @@ class LiveView:
         return blocks[-1] if blocks else None
 
     def why_no_samples(self, unit: str) -> Reason | None:
-        """Return the reason why the samples of a unit are not current; None if they are current."""
+        """Return the reason why a unit's samples are out of date; None if they are current."""
         return self._why_not_current(unit, self.data_age_s(unit))
 
     def data_age_s(self, unit: str) -> float | None:
