@@ -1,7 +1,7 @@
 """Coherence and random covariance of a fitted film, and bracket changes from the residual force.
 
-Every estimate is a linear function of ``Σ_lines w Σ_segments conj(f u) e``, where w is the weight of
-a line, e the residual force, and f the influence of the shaft's motion u on the estimate.
+Every estimate is a linear function of ``Σ_lines w Σ_segments conj(f u) e``, with the weight w of a
+line, the residual force e, and the influence f of the shaft's motion u on the estimate.
 """
 
 from collections.abc import Sequence

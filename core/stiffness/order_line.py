@@ -122,7 +122,7 @@ class OrderLine:
         return int(changed_polls(*np.abs(self.phasors_um_pk[both][:, [first, last]]).T).sum())
 
     def readings(self, quality_of: QualityOf) -> dict[str, Budgeted]:
-        """Return amplitudes, roundness, coherence, equation (5) and `transfer` with their budgets."""
+        """Return amplitudes, roundness, coherence and stiffnesses with budgets, by quantity."""
         found = {
             f"{name}_um_pk": self._amplitude(place, quality_of(place))
             for name, place in AMPLITUDES.items()

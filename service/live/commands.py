@@ -33,7 +33,7 @@ class Accept:
 
 @dataclass(frozen=True)
 class Reject:
-    """Reject a version of a baseline: never put it in force again automatically."""
+    """Reject a version of a baseline, even if in force; it is not put in force automatically."""
 
     version: int
 
