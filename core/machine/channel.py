@@ -1,4 +1,4 @@
-"""Waveform channels, and the conversion of their spectra to displacement."""
+"""Waveform channels, and the conversion of their phasors to displacement."""
 
 import math
 from dataclasses import dataclass
@@ -10,20 +10,25 @@ from core.arrays import ComplexArray, FloatArray
 from core.machine.response import Response
 
 MAX_SLOW_ROLL_FRACTION = 0.25
-"""Largest slow-roll speed as a fraction of rated speed; unbalance force is then at most 1/16."""
+"""Largest slow-roll speed as a fraction of rated speed. The unbalance force is then at most 1/16 of
+that at rated speed."""
 
 
 @dataclass(frozen=True)
 class SlowRollVector:
-    """1× vector of one probe at slow roll: the runout of the shaft.
+    """1× vector of one proximity probe at slow roll: the runout of the shaft under the probe.
 
     Parameters
     ----------
     probe
         Serial number or mark of the probe. A replaced or moved probe reads another surface.
     phasor_um_pk
-        Displacement along the axis, relative to the mark on the shaft: its phase is the phase of
-        the signal at the moment when the mark passes the key-phase pick-up.
+        Displacement phasor along the positive bearing axis. Its phase is that of the signal at the
+        moment when the mark on the shaft passes the key-phase pick-up.
+    speed_rpm
+        Speed at which the vector was measured.
+    taken_ns
+        Time of the measurement, UTC nanoseconds since 1970.
     """
 
     channel: str
@@ -44,7 +49,7 @@ class Measurand(StrEnum):
 
     @property
     def n_integrations(self) -> int:
-        """Number of integrations to displacement: 2 for acceleration, 1 for velocity."""
+        """Number of integrations to displacement: 2 for acceleration, 1 for velocity, else 0."""
         return {Measurand.ACCELERATION_M_S2: 2, Measurand.VELOCITY_MM_S: 1}.get(self, 0)
 
 
@@ -58,10 +63,13 @@ class Channel:
         +1 if a growing reading means motion along the positive bearing axis, -1 if against it. The
         gap of a probe on the positive axis shrinks as the shaft approaches: -1. For a key-phase
         channel, -1 if its pulses fall.
+    response
+        Frequency response of transducer and amplifier, relative to the sensitivity; None if flat.
     delay_s
         Time by which the channel is sampled later than the others, s.
     line_floor
-        Line amplitude of the transducer's own noise, zero-to-peak in the channel's unit.
+        Amplitude that the transducer's own noise gives a spectral line, zero-to-peak in the
+        channel's unit.
     unit_per_count
         Engineering units per count of the converter; zero if unknown.
     ok_limits
@@ -69,7 +77,7 @@ class Channel:
     probe
         Serial number or mark of the installed probe; empty if unknown.
     slow_roll
-        Runout of the shaft under the probe, if it was measured.
+        Runout of the shaft under the probe; None if it was not measured.
     """
 
     id: str
@@ -109,9 +117,10 @@ def displacement_factor(channel: Channel, frequency_hz: FloatArray) -> ComplexAr
 
 
 def line_floor_um_pk(channel: Channel, frequency_hz: float) -> float:
-    """Return the line amplitude of the transducer's own noise as displacement, µm zero-to-peak.
+    """Return `Channel.line_floor` at a frequency as displacement, µm zero-to-peak.
 
-    It grows with falling frequency if the signal is integrated or the response falls off.
+    The displacement grows towards low frequencies if the signal must be integrated or the
+    transducer's response falls off.
     """
     factor = displacement_factor(channel, np.array([frequency_hz]))[0]
     return float(abs(factor)) * channel.line_floor

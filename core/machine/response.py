@@ -13,7 +13,7 @@ BUTTERWORTH_DAMPING = 1.0 / math.sqrt(2.0)
 
 @dataclass(frozen=True)
 class HighPass:
-    """Lower frequency limit of an accelerometer, a charge amplifier or a velocity pickup.
+    """High-pass response of an accelerometer, a charge amplifier or a velocity pickup.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class HighPass:
     damping: float = BUTTERWORTH_DAMPING
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the complex response at positive frequencies, (n_lines,)."""
+        """Return the complex response at positive frequencies in Hz, (n_lines,)."""
         ratio = frequency_hz / self.corner_hz
         if self.order == 1:
             return np.asarray(1j * ratio / (1.0 + 1j * ratio))
@@ -40,13 +40,16 @@ class HighPass:
 
 @dataclass(frozen=True)
 class Resonance:
-    """Mounted resonance of a transducer, or another second-order upper frequency limit."""
+    """Second-order low-pass response, such as the mounted resonance of a transducer.
+
+    `damping` is the fraction of critical damping.
+    """
 
     natural_hz: float
     damping: float
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the complex response at positive frequencies, (n_lines,)."""
+        """Return the complex response at positive frequencies in Hz, (n_lines,)."""
         ratio = frequency_hz / self.natural_hz
         return np.asarray(1.0 / (1.0 - ratio**2 + 2j * self.damping * ratio))
 
@@ -75,7 +78,7 @@ class ResponseTable:
     phase_deg: tuple[float, ...]
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the complex response at positive frequencies, (n_lines,)."""
+        """Return the complex response at positive frequencies in Hz, (n_lines,)."""
         from scipy.interpolate import PchipInterpolator  # slow import, not needed at start
 
         points = np.log(self.frequency_hz)
@@ -86,18 +89,18 @@ class ResponseTable:
         return np.asarray(np.exp(log_magnitude + 1j * phase_rad))
 
     def covers(self, low_hz: float, high_hz: float) -> bool:
-        """Whether the whole frequency band lies within the table."""
+        """Whether a frequency band lies completely within the table."""
         return self.frequency_hz[0] <= low_hz and high_hz <= self.frequency_hz[-1]
 
 
 @dataclass(frozen=True)
 class ResponseChain:
-    """Responses in series, such as transducer and amplifier; an empty chain is flat."""
+    """Product of responses in series, such as transducer and amplifier; 1 for an empty chain."""
 
     parts: tuple["Response", ...]
 
     def at(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the complex response at positive frequencies, (n_lines,)."""
+        """Return the complex response at positive frequencies in Hz, (n_lines,)."""
         factor = np.ones(np.shape(frequency_hz), dtype=np.complex128)
         for part in self.parts:
             factor *= part.at(frequency_hz)
@@ -105,4 +108,4 @@ class ResponseChain:
 
 
 Response: TypeAlias = HighPass | Resonance | ResponseTable | ResponseChain
-"""Any frequency response: `at` returns the complex reading per unit of motion."""
+"""Any frequency response; `at` returns the ratio of the reading to the true motion, complex."""

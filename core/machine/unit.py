@@ -1,4 +1,4 @@
-"""Generating unit in numbers: channels, bearings, brackets and their accuracies."""
+"""Description of a generating unit: channels, bearings, brackets, and accuracies of its data."""
 
 import math
 from dataclasses import dataclass, field, fields
@@ -11,7 +11,12 @@ from core.machine.channel import Channel
 
 
 class Estimator(StrEnum):
-    """Stiffness estimators. The names appear in settings, API and store."""
+    """Estimators of the oil-film stiffness. The names appear in settings, API and store.
+
+    `dynamic` fits the film to broadband vibration. `transfer` and `ratio` use one spectral line, 1×
+    or vortex: `transfer` the H1 transfer function, `ratio` the amplitudes in equation (5) of Brito
+    et al.
+    """
 
     DYNAMIC = "dynamic"
     TRANSFER_ORDER1 = "transfer_order1"
@@ -27,20 +32,21 @@ PREFERENCE = (
     Estimator.RATIO_VORTEX,
     Estimator.RATIO_ORDER1,
 )
-"""Estimators in the default order of preference. `dynamic` needs no line and is free of runout; the
-vortex line is free of runout; equation (5) includes damping and is biased upwards by bearing
-noise."""
+"""Estimators in the default order of preference. `dynamic` needs no line, and neither `dynamic` nor
+the vortex line contains runout. Equation (5) (`ratio`) includes damping and is biased upwards by
+noise of the bearing transducer."""
 
 
 MIN_NATURAL_HZ = 15.0
-"""Lowest natural frequency of a bracket; it is 24 to 26 Hz in Brito et al., Table 1."""
+"""Lowest natural frequency assumed for a bracket; Brito et al., Table 1, give 24 to 26 Hz."""
 
 
 @dataclass(frozen=True)
 class BracketDynamics:
     """Isotropic spring, effective mass and damper between bearing and foundation.
 
-    The inertia of an unknown mass is neglected. Structural damping is usually unknown and zero.
+    The inertia of an unknown mass (None) is neglected. Structural damping is usually unknown and
+    set to zero.
     """
 
     stiffness_n_per_m: float
@@ -49,13 +55,13 @@ class BracketDynamics:
 
     @property
     def max_mass_kg(self) -> float:
-        """Bracket mass or, if unknown, the largest mass possible with the bracket's stiffness."""
+        """Bracket mass or, if unknown, the mass with natural frequency `MIN_NATURAL_HZ`."""
         if self.mass_kg is not None:
             return self.mass_kg
         return self.stiffness_n_per_m / (2.0 * math.pi * MIN_NATURAL_HZ) ** 2
 
     def dynamic_stiffness_n_per_m(self, frequency_hz: FloatArray) -> ComplexArray:
-        """Return the film force per absolute displacement of the bracket, (n_lines,).
+        """Return the film force per absolute displacement of the bracket in N/m, (n_lines,).
 
         ``k_b - m_b ω² + iω c_b``: the bracket's row of Brito et al., equation (6), which does not
         contain the forces on the rotor.
@@ -76,11 +82,11 @@ class GapAccuracy:
     Parameters
     ----------
     gain
-        Relative error of a gap change since the reference was read.
+        Relative error of a gap change since the reference gap was read.
     reference_um
         Error of a reference gap.
     growth_um
-        Error of thermal growth that was never measured.
+        Largest thermal growth of a gap if it was never measured.
     growth_change_um
         Largest change of thermal growth since its last measurement.
     growth_asymmetry_um
@@ -136,7 +142,7 @@ class BearingAccuracy:
 
 @dataclass(frozen=True)
 class Bearing:
-    """Guide bearing with two shaft and two bearing channels, which are given by channel id.
+    """Guide bearing with two channels for shaft and two for bearing vibration, given by id.
 
     Parameters
     ----------
@@ -145,7 +151,8 @@ class Bearing:
     clearance_um
         Radial assembled clearance in operation: the radius within which the shaft centre moves.
     gap_reference_um, opposite_reference_um
-        Gaps (x, y) of the probes and of the opposite probes with the shaft centred.
+        Gaps (x, y) of the probes and of the opposite probes with the shaft centred; None without
+        opposite probes.
     oil_temperature, gap_x, gap_y, opposite_gap_x, opposite_gap_y
         Ids of the slow channels; None if not measured. Without slow gap channels, the mean of the
         shaft channels is the gap.
@@ -185,31 +192,35 @@ class Bearing:
 
     @property
     def bracket(self) -> BracketDynamics:
-        """Dynamics of the bracket, from which the film force is derived."""
+        """Stiffness, mass and damping of the bracket, from which the film force is derived."""
         return BracketDynamics(
             self.bracket_stiffness_n_per_m, self.bracket_mass_kg, self.bracket_damping_n_s_per_m
         )
 
     @property
     def channels(self) -> tuple[str, str, str, str]:
-        """Channel ids in the order of every matrix in padwatch: u_x, u_y, v_x, v_y."""
+        """Channel ids in the order of all matrices: shaft u_x, u_y, then bearing v_x, v_y."""
         return (self.shaft_x, self.shaft_y, self.bearing_x, self.bearing_y)
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Generating unit: its waveform channels in wire order and its bearings.
+    """Generating unit: its waveform channels in the order of the device, and its bearings.
 
     Parameters
     ----------
+    rate_hz
+        Sampling rate of each channel; for a monitoring rack, the rate of the polls.
+    speed_channel, power_channel
+        Ids of the slow channels of speed and active power; None if not measured.
     rotation_sense
         +1 if the shaft turns from x to y, -1 if it turns from y to x.
     has_vortex
         Whether a part-load vortex can occur: in Francis turbines, not in Kaplan turbines.
     key_phase
-        Id of the waveform channel with one pulse per turn, if installed.
+        Id of the waveform channel with one pulse per turn; None if not installed.
     rated_power_mw
-        Rated power, to which changes of load are related; None if unknown.
+        Rated power, the reference of relative load changes; None if unknown.
     """
 
     id: str
@@ -226,7 +237,10 @@ class Unit:
 
 
 def require_same_machine(here: Unit, there: Unit) -> None:
-    """Check that two descriptions differ only in gap references, clearances and brackets.
+    """Check that two descriptions of a unit agree in all fields that cannot change while it runs.
+
+    Only the data of the bearings may differ, such as gap references, clearances and brackets; their
+    ids and channels must agree.
 
     Raises
     ------
@@ -240,7 +254,7 @@ def require_same_machine(here: Unit, there: Unit) -> None:
 
 
 def bearings_with_new_references(here: Unit, there: Unit) -> list[str]:
-    """Return the ids of the bearings whose gap references differ."""
+    """Return the ids of the bearings whose gap references differ between two descriptions."""
     pairs = zip(here.bearings, there.bearings, strict=True)
     return [
         b.id
@@ -251,6 +265,6 @@ def bearings_with_new_references(here: Unit, there: Unit) -> list[str]:
 
 
 def _fixed_parts(unit: Unit) -> dict[str, object]:
-    """Return, by name, the fields that cannot change while the unit is monitored."""
+    """Return the fields of a unit that cannot change while it is monitored, by name."""
     fixed: dict[str, object] = {field.name: getattr(unit, field.name) for field in fields(unit)}
     return fixed | {"bearings": tuple((b.id, b.channels) for b in unit.bearings)}

@@ -19,14 +19,14 @@ from core.uncertainty import Budget
 
 @dataclass(frozen=True)
 class AnalysisSettings(EvidenceSettings):
-    """Settings of segments, averaging, evidence and the fit of all eight film coefficients."""
+    """Settings of segments, averaging, required evidence, and the `dynamic` estimator."""
 
     dynamic: DynamicSettings = field(default_factory=DynamicSettings)
 
 
 @dataclass(frozen=True)
 class AveragingWindow:
-    """Range of the samples that a result averages.
+    """Range of samples over which a result is averaged.
 
     Parameters
     ----------
@@ -35,11 +35,12 @@ class AveragingWindow:
     n_segments
         Number of segments in which all four channels were usable.
     n_segments_wanted
-        Number of segments of a full average.
+        Number of segments in a full averaging window.
     n_voided
         Number of segments interrupted by gaps or restarts since the service started.
     coverage
-        `n_segments` over the largest number possible in the window so far, 0 to 1.
+        `n_segments` as a fraction of the segments possible since the epoch began, at most a full
+        window; 0 to 1.
     """
 
     epoch: int
@@ -54,12 +55,14 @@ class AveragingWindow:
 
 @dataclass(frozen=True)
 class OrbitTrace:
-    """Shaft orbit of the newest turns, means removed.
+    """Shaft orbit in a bearing over the newest turns.
 
     Parameters
     ----------
-    shaft_x_um, shaft_y_um
-        Displacement samples, (n_samples,) each.
+    start_ns
+        Time of the first sample, UTC nanoseconds since 1970.
+    shaft_x_um, shaft_y_um : (n_samples,)
+        Displacement samples without their mean.
     """
 
     start_ns: int
@@ -75,28 +78,30 @@ class Assessment:
     Parameters
     ----------
     time_ns
-        End of the newest segment, UTC.
+        End of the newest segment, UTC nanoseconds since 1970.
     readings
         One reading for each quantity of :data:`core.monitor.catalogue.CATALOGUE`.
     quality
         Quality of the bearing: the worst of its 1× amplitudes and its preferred stiffness.
     budgets
-        Uncertainty budgets of the readings, by quantity, if known.
+        Uncertainty budgets, by quantity; only of readings with known uncertainty.
     estimators
         Estimator that `stiffness` was taken from, by axes "xx" and "yy"; None without a value.
     spectrum
-        Cross-spectrum at the bins; displacement, µm.
+        Cross-spectrum of the displacements at the Fourier bins, µm²; empty for a rack.
+    orbit
+        Shaft orbit; None without speed, usable probes or waveforms.
     runout
         Whether the slow-roll vector was subtracted from 1× of the newest segment, by "shaft_x" and
         "shaft_y".
     clipped_share
-        Fraction of the newest segment's samples at an end of the converter's range, by "shaft_x" to
-        "bearing_y"; empty without waveforms.
+        Fraction of the newest segment's samples at an end of the converter's range, by "shaft_x",
+        "shaft_y", "bearing_x" and "bearing_y"; empty without waveforms.
     recent
         Vibration of the newest parts of the averaging window, oldest first; empty if unavailable.
     evidence
-        Kind of the input: waveforms, or vectors of a rack. Vectors have no coherence; with them,
-        equation (5) does not distinguish noise from motion.
+        Kind of the input: waveforms, or vectors of a rack. Without waveforms there is no coherence,
+        and equation (5) does not distinguish noise from motion.
     condition
         Operating condition of the bearing; None until the unit's operation was evaluated.
     """

@@ -57,9 +57,11 @@ class BearingReadings:
     budgets
         Uncertainty budgets, by quantity; only of readings with known uncertainty.
     estimators
-        Estimator that `stiffness` was taken from, by axes "xx" and "yy".
+        Estimator that `stiffness` was taken from, by axes "xx" and "yy"; None without a value.
     spectrum
-        Cross-spectrum at the bins; empty for polls.
+        Cross-spectrum of the displacements at the Fourier bins, µm²; empty for polls.
+    evidence
+        Kind of the input: waveforms, vectors with phase, or amplitudes only.
     """
 
     readings: Mapping[str, Reading]
@@ -77,7 +79,7 @@ def bearing_readings(
     coverage: float,
     position: Found,
 ) -> BearingReadings:
-    """Evaluate one bearing over the kept segments or polls.
+    """Return the readings of one bearing, averaged over the kept segments or polls.
 
     Parameters
     ----------
@@ -86,7 +88,7 @@ def bearing_readings(
     coverage
         Segments in which all four channels were usable, as a fraction of the possible segments.
     position
-        Shaft position from `core.condition.shaft_readings.position_results`.
+        Readings and budgets from `core.condition.shaft_readings.position_results`.
     """
     found = _Bearing(unit, bearing, settings, kept, coverage)
     readings, budgets, dynamic = found.readings(position)
@@ -105,7 +107,7 @@ def bearing_readings(
 
 
 class _Bearing:
-    """One evaluation of one bearing; keeps no state for the next evaluation."""
+    """Computation of the readings of one bearing from one set of segments or polls."""
 
     def __init__(
         self,
@@ -146,7 +148,7 @@ class _Bearing:
     def readings(
         self, position: Found
     ) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """Return all readings but the preferred stiffness, their budgets, and the fitted film."""
+        """Return all readings but the preferred stiffness, their budgets, and the film or None."""
         unit, segments = self._unit, self._segments
         speed = segments[-1].speed
         dynamic, dynamic_budgets, film = self._dynamic()
@@ -177,7 +179,10 @@ class _Bearing:
         budgets: Mapping[str, Budget],
         film: DynamicStiffness | None,
     ) -> dict[str, Reading]:
-        """Return, marked uncertain, the readings that disagree or are affected by a delay."""
+        """Return the readings that must be marked uncertain, with that quality, by quantity.
+
+        These are stiffnesses and dampings with disagreeing estimators or a channel delay.
+        """
         names: dict[str, Reason] = {}
         if readings["dynamic_k_xx_n_per_m"].quality.reason is Reason.CHANNEL_DELAY:
             delayed = (name for name in budgets if "_transfer_" in name)
@@ -195,7 +200,7 @@ class _Bearing:
     def _order_lines(self) -> tuple[OrderLine, OrderLine]:
         """Return the spectral lines of 1× and of the vortex.
 
-        Both are averaged over the same segments; with polls, each line is averaged separately.
+        Both lines are averaged over the same segments; with polls, each over its own usable polls.
         """
         marked = [segment.at_mark_um_pk for segment in self._segments]
         nothing = np.zeros(len(self._unit.channels), dtype=np.complex128)
@@ -234,13 +239,13 @@ class _Bearing:
         return lines[0], lines[1]
 
     def _is_round(self, place: int) -> bool:
-        """Whether runout was subtracted from every averaged segment of a shaft channel."""
+        """Whether runout was subtracted in all averaged segments of a shaft channel."""
         channel = self._bearing.channels[place]
         counted = zip(self._segments, self._usable[:, ORDER1, place], strict=True)
         return all(s.runout[channel] is RunoutVerdict.APPLIED for s, usable in counted if usable)
 
     def _steadiness(self) -> Quality:
-        """Return whether speed and load are steady over the averaging window, as a quality."""
+        """Return the data quality: uncertain if speed or power varied by more than its limit."""
         power = self._unit.power_channel
         speeds = [segment.speed.rpm for segment in self._segments]
         powers = (
@@ -256,7 +261,7 @@ class _Bearing:
         return with_budgets({**found, "frequency_hz": self._frequency(line)}, prefix)
 
     def _dynamic(self) -> tuple[dict[str, Reading], dict[str, Budget], DynamicStiffness | None]:
-        """Fit all eight coefficients to the segments in which all four channels were usable."""
+        """Return readings, budgets and the fitted film (or None) of the `dynamic` estimator."""
         if self.spectrum is None:
             return dict.fromkeys(DYNAMIC_NAMES, missing(Reason.NOT_MEASURED)), {}, None
         settings, quality = self._settings.dynamic, self._line_quality(*range(len(self._rows)))
@@ -305,7 +310,7 @@ class _Bearing:
         return Reading(frequency_hz, speed.rpm.quality), budget
 
     def _vortex_quality(self, *places: int) -> Quality | Reading:
-        """Return the quality as `_line_quality`, or a missing reading if there is no vortex."""
+        """Return the vortex line's `_line_quality`, or a missing reading if there is no vortex."""
         if not self._unit.has_vortex:
             return missing(Reason.SWITCHED_OFF)
         quality = self._line_quality(*places, line=VORTEX)
@@ -317,7 +322,7 @@ class _Bearing:
 
     @cached_property
     def _no_vortex(self) -> Reading | None:
-        """Missing reading with the reason why this bearing shows no vortex; None if it does."""
+        """Missing reading with the reason why there is no vortex line; None if there is one."""
         if self._segments[-1].has_vortex_peak and self._lines[VORTEX].is_of_shaft:
             return None
         found = self._other_line_hz
@@ -332,7 +337,7 @@ class _Bearing:
         return other_line_hz(self.spectrum, turn_hz, band_hz, self._settings.min_line_to_floor)
 
     def _line_quality(self, *places: int, line: int = ORDER1) -> Quality | Reading:
-        """Return the quality of a line for these channels, or a missing reading with a reason."""
+        """Return the quality of a line in the channels, or a missing reading with the reason."""
         newest, few = self._segments[-1], uncertain(Reason.FEW_SEGMENTS)
         own = [newest.line_quality(self._rows[place], line) for place in places]
         now = worst([newest.speed.rpm.quality, self._doubts, *own])

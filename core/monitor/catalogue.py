@@ -13,15 +13,15 @@ class Quantity:
     Parameters
     ----------
     name
-        Name in the API and in the store: quantity, kind, unit, detector.
+        Name in the API and in the store; ends with unit and detector.
     unit
-        Displayed unit, UCUM-like.
+        Displayed unit, with the detector of amplitudes.
     label
         Short description for the user.
     has_uncertainty
         Whether its readings have a random and a systematic standard uncertainty.
     keeps_uncertainty
-        Whether the uncertainties are also stored, for trends: those of results, not of inputs.
+        Whether these uncertainties are also stored, for trends.
     """
 
     name: str
@@ -36,7 +36,7 @@ STORED = (True, True)
 
 
 def _each(name: str, unit: str, label: str, kept: Iterable[bool] = LIVE) -> tuple[Quantity, ...]:
-    """Return a quantity for x and one for y; the axis replaces the braces in name and label."""
+    """Return one quantity for x and one for y; the axis replaces the braces in name and label."""
     return tuple(Quantity(name.format(axis), unit, label.format(axis), *kept) for axis in "xy")
 
 

@@ -1,4 +1,4 @@
-"""Monitor of one unit: assessments of its bearings from its sample blocks."""
+"""Monitor of one unit: computation of its bearings' assessments from its sample blocks."""
 
 from collections import deque
 from collections.abc import Iterator, Mapping
@@ -17,7 +17,7 @@ from core.spectra.segments import Segment, SegmentTransform
 
 @dataclass(frozen=True)
 class MonitorState:
-    """State of a monitor that cannot be recomputed from its samples since `start`.
+    """State of a monitor that cannot be recomputed from the samples since `start`.
 
     Parameters
     ----------
@@ -26,11 +26,13 @@ class MonitorState:
     start
         Index of the first sample to replay.
     first_start
-        Index of the first sample from which the possible segments of this epoch are counted.
+        Index of the first sample of this epoch, the start of its first possible segment.
     n_voided
         Number of segments interrupted by gaps or restarts.
     growth
-        Last measured thermal growth, by bearing.
+        Last measured thermal growth of the gaps, by bearing id.
+    account
+        Balance of the samples that the device offered.
     """
 
     epoch: int | None
@@ -45,7 +47,7 @@ class UnitMonitor:
     """Monitor of one unit; it holds the whole state of the unit's analysis.
 
     Results depend only on the samples and their indices, not on the boundaries of blocks or their
-    arrival times. Slow readings apply to the samples of their block.
+    arrival times. The value of a slow channel applies to all samples of its cell.
 
     Parameters
     ----------
@@ -75,12 +77,12 @@ class UnitMonitor:
 
     @property
     def account(self) -> SampleAccount:
-        """Account of all samples that the unit's device offered."""
+        """Balance of the samples that the unit's device offered: stored, lost, rejected."""
         return self._ring.account
 
     @property
     def state(self) -> MonitorState:
-        """State from which another monitor continues, together with the newest samples.
+        """State from which a new monitor continues after a replay of the newest samples.
 
         The samples to replay begin up to two averaging times back: the vortex frequency of an
         averaged segment depends on the segments before it.
@@ -96,11 +98,11 @@ class UnitMonitor:
         )
 
     def rewind(self, state: MonitorState) -> None:
-        """Prepare a new monitor for the replay of the samples since `state.start`."""
+        """Prepare a new monitor for a replay of stored samples from index `state.start` on."""
         self._rewound_to = state.start
 
     def settle(self, state: MonitorState) -> None:
-        """Restore a state, after the samples since `state.start` were replayed."""
+        """Restore a state after the replay of the samples from index `state.start` on."""
         self._growth = dict(state.growth)
         self._ring.account = state.account
         self._gaps.clear()
@@ -126,7 +128,10 @@ class UnitMonitor:
         self.unit = unit
 
     def go_on(self, reach: Reach | None) -> None:
-        """Resume after a stop, before the first block; samples missing since `reach` are gaps."""
+        """Set the end of the stored samples, before the first block; None if nothing is stored.
+
+        Samples missing between this end and the first block are recorded as gaps.
+        """
         self._reach = reach
 
     def drain_gaps(self) -> list[Gap]:
@@ -135,11 +140,11 @@ class UnitMonitor:
         return gaps
 
     def ingest(self, block: SampleBlock) -> list[Assessment]:
-        """Process a block and return the assessments that it completes."""
+        """Process a block and return the assessments of all bearings that it completes."""
         return list(self.steps(block))
 
     def steps(self, block: SampleBlock) -> Iterator[Assessment]:
-        """Process a block and yield the assessments that it completes; see `refreshes`."""
+        """Process a block and yield the assessments that it completes, one bearing at a time."""
         for refresh in self.refreshes(block):
             yield refresh.assessment()
 
@@ -250,6 +255,6 @@ class UnitMonitor:
 
 
 def _pieces(block: SampleBlock, n_most: int) -> Iterator[SampleBlock]:
-    """Split a long block, so that the ring does not overwrite the segment being filled."""
+    """Yield a block in pieces of at most `n_most` samples; the ring buffer holds twice as many."""
     for start in range(0, block.n_samples, n_most):
         yield block.from_sample(start, start + n_most)

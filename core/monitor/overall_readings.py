@@ -1,4 +1,4 @@
-"""Broad-band vibration of one bearing, averaged over segments, and its most recent vibration."""
+"""Vibration of one bearing: broad-band averages over segments, and values of the last seconds."""
 
 import math
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ def overall_readings(
 ) -> Found:
     """Return the broad-band vibration, averaged over the segments, and its budgets, by quantity.
 
-    Peak-to-peak values and farthest excursions are averaged linearly, velocities as power. `rows`
+    Peak-to-peak values and farthest excursions are averaged linearly, velocities as squares. `rows`
     are the rows of the bearing's four channels, `number` is the bearing's index in the unit.
     """
     if segments[-1].overall is None:
@@ -57,9 +57,10 @@ def overall_readings(
 def recent_readings(
     segment: Segment, rows: Sequence[int], rate_hz: float
 ) -> tuple[RecentReadings, ...]:
-    """Return the shaft vibration of the newest parts of a segment, oldest first.
+    """Return the vibration of one bearing in the newest parts of a segment, oldest first.
 
-    The newest entry also contains the bearing velocities of the whole segment.
+    Each entry has the shaft vibration, the newest also the bearing velocities over the whole
+    segment. `rows` are the rows of the bearing's channels. Empty if the segment is a poll.
     """
     recent, overall, found = segment.recent, segment.overall, []
     if recent is None or overall is None:
@@ -84,7 +85,7 @@ def recent_readings(
 
 
 def polled_readings(polls: Sequence[Segment], rows: Sequence[int]) -> tuple[RecentReadings, ...]:
-    """Return the shaft vibration at 1× of each poll."""
+    """Return the 1× shaft vibration of each poll; `rows` are the rows of the bearing's channels."""
     return tuple(
         RecentReadings(
             poll.stop_ns,
@@ -105,7 +106,7 @@ def _polled(poll: Segment, row: int) -> Reading:
 
 
 def _turning(segment: Segment, amplitude: Reading) -> Reading:
-    """Return a 1× amplitude with the quality of the speed included; missing without a speed."""
+    """Return a 1× amplitude with the worse of its own and the speed's quality; missing at rest."""
     speed = segment.speed.rpm
     if speed.value is None or amplitude.value is None:
         return speed if speed.value is None else amplitude

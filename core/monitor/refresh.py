@@ -1,4 +1,4 @@
-"""Evaluation of one bearing over the segments that are averaged at one moment."""
+"""Evaluation of one bearing over the segments of one averaging window."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ JUDGED = (
 
 @dataclass(frozen=True)
 class Refresh:
-    """Immutable input of one assessment, which can be evaluated later.
+    """Immutable input from which one assessment of a bearing can be computed later.
 
     Parameters
     ----------
@@ -43,11 +43,11 @@ class Refresh:
     newest
         Samples of the newest segment or poll.
     n_expected
-        Largest possible number of segments.
+        Number of segments possible since the epoch began, at most a full averaging window.
     n_voided
         Number of segments interrupted by gaps or restarts since the service started.
     last_growth
-        Last measured thermal growth of the gaps.
+        Last measured thermal growth of the gaps; None if there is none.
     """
 
     unit: Unit
@@ -61,7 +61,7 @@ class Refresh:
 
     @cached_property
     def averaged(self) -> AveragingWindow:
-        """Range of the averaged samples."""
+        """Range of the averaged samples, with the numbers of segments."""
         first, last = self.kept.segments[0], self._segment
         usable = np.array([segment.order_usable[ORDER1] for segment in self.kept.segments])
         n_segments = int(usable[:, self._rows].all(axis=1).sum())
@@ -82,7 +82,7 @@ class Refresh:
         return measured_growth(self._position[0]) if measures_growth(self.bearing) else None
 
     def assessment(self) -> Assessment:
-        """Evaluate the bearing and return its assessment."""
+        """Return the assessment of the bearing, computed from this input."""
         newest, rows, coverage = self._segment, self._rows, self.averaged.coverage
         found = bearing_readings(
             self.unit, self.bearing, self.settings, self.kept, coverage, self._position

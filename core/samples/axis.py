@@ -9,10 +9,12 @@ from dataclasses import dataclass
 from core.units import NS_PER_S
 
 DEVICE_EPOCHS = 1 << 32
-"""Epochs reported by a device are below this number; epochs counted by an adapter start here."""
+"""Limit of the epochs that a device reports. If an adapter also numbers epochs of the same device,
+its numbers are above this limit."""
 
 RECOUNTED_EPOCHS = 1 << 33
-"""Epochs from here on number sample counts that restarted within an epoch, by start second."""
+"""Smallest epoch assigned to a sample count that restarted without a new epoch from the device; the
+start time in seconds is added."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,10 @@ class ClockTolerance:
     drift: float = 1e-3
 
     def over(self, elapsed: float, per_s: float = NS_PER_S) -> float:
-        """Return the largest deviation over an elapsed time, both in units of 1/per_s seconds."""
+        """Return the largest allowed deviation after an elapsed time, in the unit of that time.
+
+        The unit is 1 / per_s seconds; by default, a nanosecond.
+        """
         return self.step_s * per_s + self.drift * abs(elapsed)
 
 
@@ -42,8 +47,9 @@ class Epochs:
 
     The adapter loses its own state (wraps of a narrow counter, restarts that the device did not
     report) when its process ends. It therefore numbers such sample counts itself: its start time in
-    seconds plus the number of restarts since, fewer than one per second. Only a device that reports
-    its epoch, and whose counter needs no unwrapping, keeps its epoch when the adapter restarts.
+    seconds plus the number of restarts since. The numbers are unique if a count restarts less than
+    once per second. Only a device that reports its epoch, and whose counter needs no unwrapping,
+    keeps its epoch when the adapter restarts.
 
     Parameters
     ----------
@@ -78,20 +84,20 @@ class Epochs:
 
 
 def signed_distance(counter: int, reference: int, modulus: int) -> int:
-    """Return the signed distance from a reference to a counter value, at most half a modulus."""
+    """Return the shortest signed distance from a reference to a counter that wraps at `modulus`."""
     half = modulus // 2
     return (counter - reference + half) % modulus - half
 
 
 class SampleAxis:
-    """Position of one device on its sample axis, kept across connections.
+    """Current sample index of one device, from which its wrapping counter is unwrapped.
 
     Attributes
     ----------
     index
         Current sample index; None before the first sample.
     at_ns
-        Monotonic time at which the index was reached.
+        Time of a monotonic clock at which the index was reached, in nanoseconds.
     """
 
     def __init__(self, rate_hz: float, epochs: Epochs) -> None:
@@ -106,22 +112,22 @@ class SampleAxis:
         return self.epochs.number
 
     def stand_at(self, index: int, at_ns: int) -> None:
-        """Set the sample index, reached at a time of a monotonic clock."""
+        """Set the current sample index, and the monotonic time at which it was reached."""
         self.index, self.at_ns = index, at_ns
 
     def forward(self, counter: int, modulus: int) -> int:
-        """Return the samples from the current index to a counter value, without whole wraps."""
+        """Return the samples from the index to a counter value, from 0 to ``modulus - 1``."""
         return (counter - (self.index or 0)) % modulus
 
     def jump(self, counter: int, modulus: int, at_ns: int) -> int:
-        """Return the samples to a counter value, with whole wraps according to the elapsed time."""
+        """Return the samples from the index to a counter value, adding wraps by elapsed time."""
         forward = self.forward(counter, modulus)
         return forward + modulus * max(0, round((self.elapsed(at_ns) - forward) / modulus))
 
     def elapsed(self, at_ns: int) -> float:
-        """Return the number of samples in the time since the current index was reached."""
+        """Return the nominal number of samples from the current index to a monotonic time."""
         return max(0, at_ns - self.at_ns) / NS_PER_S * self._rate_hz
 
     def allowance(self, at_ns: int, tolerance: ClockTolerance) -> float:
-        """Return the allowed difference, in samples, between a jump and the elapsed time."""
+        """Return the allowed difference, in samples, between a jump and `elapsed`."""
         return tolerance.over(self.elapsed(at_ns), self._rate_hz)

@@ -63,7 +63,7 @@ class DeviceClock:
     u_drift_ppm
         Standard uncertainty of `drift_ppm`.
     n_faults
-        Number of blocks since the start whose time stamp was not used.
+        Number of blocks with an unused time stamp since the adapter started.
     """
 
     offset_s: float | None
@@ -116,7 +116,7 @@ class SideValues:
         return len(self.starts)
 
     def within(self, start: int, stop: int, rate_hz: float) -> "SideValues":
-        """Return the values of the samples `start` to `stop - 1`; the first cell begins at 0."""
+        """Return the side values of the samples `start` to `stop - 1`, relative to `start`."""
         first = int(np.searchsorted(self.starts, start, side="right")) - 1
         cells = slice(first, max(first + 1, int(np.searchsorted(self.starts, stop))))
         starts, start_ns = self.starts[cells] - start, self.start_ns[cells].copy()
@@ -144,8 +144,8 @@ class SampleBlock:
     side
         Time stamps, channel states reported by the device, and slow values.
     rejected
-        Samples rejected between the previous block and this one; the rest of a jump in
-        ``first_index`` is a gap.
+        Samples rejected between the previous block and this one. If `first_index` jumps by more
+        than their number, the rest is a gap.
     clock
         Comparison of the device's clock with the host's; None without a device clock.
     stamp_fault
@@ -202,7 +202,7 @@ class SampleBlock:
 
     @property
     def rate_hz(self) -> float:
-        """Sampling rate of each channel."""
+        """Sampling rate of each channel in Hz."""
         return self.calibration.rate_hz
 
     @property
@@ -222,7 +222,7 @@ class SampleBlock:
 
     @property
     def stop_ns(self) -> int:
-        """Time of the first sample after the block."""
+        """Time of the first sample after the block, UTC nanoseconds since 1970."""
         n_last = self.n_samples - int(self.side.starts[-1])
         return int(self.side.start_ns[-1]) + ns_from_s(n_last / self.rate_hz)
 
@@ -236,11 +236,11 @@ class SampleBlock:
 
     @cached_property
     def channel_quality(self) -> tuple[Quality, ...]:
-        """Worst quality of each channel within the block."""
+        """Worst quality of each channel within the block, in the order of the channels."""
         return worst_qualities(self.verdicts)
 
     def cell_qualities(self) -> Iterator[tuple[tuple[Quality, ...], int]]:
-        """Yield, for each cell, the channel qualities and the time of the first sample after it."""
+        """Yield the channel qualities of each cell and the end time of the cell, UTC ns."""
         lengths = np.diff(self.side.starts, append=self.n_samples)
         stops_ns = self.side.start_ns + np.rint(lengths / self.rate_hz * NS_PER_S).astype(np.int64)
         for verdicts, stop_ns in zip(self.verdicts.T.tolist(), stops_ns.tolist(), strict=True):
@@ -250,8 +250,8 @@ class SampleBlock:
     def samples(self) -> SampleArray:
         """Samples in the engineering unit of each channel, (n_channels, n_samples).
 
-        A channel with a non-finite sample is zero, and bad, in the whole cell: one NaN would
-        invalidate a whole spectrum.
+        If a sample of a channel is not finite, all samples of its cell are set to zero and bad: one
+        NaN would invalidate a whole spectrum.
         """
         found = self.calibration.to_units(self.counts)
         is_blank = self.verdicts == NOT_FINITE
@@ -262,14 +262,14 @@ class SampleBlock:
 
     @cached_property
     def slow(self) -> Mapping[str, Reading]:
-        """Newest reading of each slow channel."""
+        """Newest reading of each slow channel, by id."""
         newest = zip(self.calibration.slow, self.side.slow[:, -1].tolist(), strict=True)
         return {c.id: c.reading(value) for c, value in newest} | dict(self.elsewhere)
 
     def from_sample(self, start: int, stop: int | None = None) -> "SampleBlock":
-        """Return samples `start` to `stop - 1` as a block; `rejected` is kept if `start` is 0.
+        """Return the samples `start` to `stop - 1` as a block; `rejected` is kept if `start` is 0.
 
-        Raises `ValueError` if the part begins outside the block.
+        Raises `ValueError` if `start` lies outside the block.
         """
         stop = self.n_samples if stop is None else min(stop, self.n_samples)
         if not 0 <= start <= self.n_samples:
@@ -286,7 +286,7 @@ class SampleBlock:
 
 
 def joined(blocks: Sequence[SampleBlock]) -> SampleBlock:
-    """Return consecutive blocks as one, with the last block's clock and the first stamp fault."""
+    """Return consecutive blocks as one, with the clock of the last and the first stamp fault."""
     first, last = blocks[0], blocks[-1]
     if first is last:
         return first

@@ -11,7 +11,7 @@ from core.checks.channels import COUNTS_FULL_SCALE, ChannelLimits
 from core.quality import Reading, Reason, mean_reading, missing
 
 BLOCK_SAMPLES = 50
-"""Default samples per cell; 1/12 s at 600 Hz, the shortest reported loss of a probe."""
+"""Default number of samples per cell: 1/12 s at 600 Hz, the shortest visible probe failure."""
 
 _LARGEST = float(np.finfo(np.float32).max)
 
@@ -42,7 +42,7 @@ class ChannelCalibration:
 
     @property
     def ok_limits(self) -> tuple[float, float]:
-        """Lowest and highest mean of a healthy transducer, engineering units."""
+        """Lowest and highest mean signal of a healthy transducer, in engineering units."""
         ends = (self.ok_min_v * self.unit_per_v, self.ok_max_v * self.unit_per_v)
         return min(ends), max(ends)
 
@@ -56,14 +56,14 @@ transducers itself."""
 
 @dataclass(frozen=True)
 class SlowCalibration:
-    """Name and plausible range of one slow channel."""
+    """Id of one slow channel, and its plausible range in the unit of its values."""
 
     id: str
     minimum: float
     maximum: float
 
     def reading(self, value: float) -> Reading:
-        """Return a slow value with its quality: missing if it is not finite or out of range."""
+        """Return a value of the channel as a reading; missing if not finite or out of range."""
         if not np.isfinite(value):
             return missing(Reason.NOT_MEASURED)
         if not self.minimum <= value <= self.maximum:
@@ -71,7 +71,7 @@ class SlowCalibration:
         return Reading(float(value))
 
     def mean(self, values: FloatArray, weights: npt.NDArray[np.int64]) -> Reading:
-        """Return the mean of slow values, bit-identical to `core.quality.mean_reading`.
+        """Return the weighted mean of slow values; equals `core.quality.mean_reading` bit by bit.
 
         Parameters
         ----------
@@ -91,14 +91,14 @@ class SlowCalibration:
 
 @dataclass(frozen=True)
 class UnitCalibration:
-    """Calibration of one unit's device, with the channels in wire order.
+    """Calibration of one unit's device, with the channels in the order of the device.
 
     Parameters
     ----------
     block_samples
-        Samples of a cell, which share one OK state per channel and one set of slow values. Cells
-        begin at multiples of this number, so that quality does not depend on the message
-        boundaries.
+        Samples per cell; the samples of a cell share one OK state per channel and one set of slow
+        values. Cells begin at multiples of this number, so that quality does not depend on the
+        boundaries of the device's messages.
     """
 
     unit: str

@@ -17,17 +17,21 @@ _SECONDS = 1 << 32
 
 @dataclass(frozen=True)
 class Gap:
-    """Gap of samples per channel that were not delivered.
+    """Consecutive samples of a unit that are missing because they were lost or rejected.
 
     Parameters
     ----------
+    epoch, first_index
+        Epoch and index of the first missing sample.
+    n_samples
+        Number of missing samples per channel.
     stop_ns
-        Time of the first sample after the gap.
+        Time of the first sample after the gap, UTC nanoseconds since 1970.
     start_ns
-        Time of the first missing sample; None if it follows from `n_samples`.
+        Time of the first missing sample; None if it follows from `n_samples` and `stop_ns`.
     is_estimated
-        Whether `n_samples` is estimated from times: the device restarted its sample count, or has
-        none.
+        Whether `n_samples` is estimated from times, because the device restarted its sample count
+        or does not count samples.
     """
 
     epoch: int
@@ -40,19 +44,25 @@ class Gap:
 
 @dataclass(frozen=True)
 class SampleAccount:
-    """Account of samples per channel: offered = stored + flagged + gap + rejected.
+    """Balance of the samples per channel: offered = stored + flagged + gap + rejected.
 
-    It starts with the first block.
+    The account starts with the first block.
 
     Parameters
     ----------
+    n_stored
+        Samples received with all channels good.
     n_flagged
-        Samples held, like `n_stored`, at which at least one channel was not good.
+        Samples received and kept, with at least one channel not good.
+    n_gap
+        Samples lost before they were received.
     n_repeated
         Samples offered a second time and dropped; not part of the balance.
     n_restarts
-        Number of restarts of the device's sample count. The samples between the last one that
-        arrived and the restart are not counted.
+        Number of restarts of the device's sample count. Samples lost between the last received
+        sample and a restart are not counted.
+    rejected
+        Samples received but refused, by reason.
     """
 
     n_stored: int = 0
@@ -64,11 +74,11 @@ class SampleAccount:
 
     @property
     def n_offered(self) -> int:
-        """Number of samples that the device offered."""
+        """Number of samples per channel that the device offered, without repeated samples."""
         return self.n_stored + self.n_flagged + self.n_gap + sum(self.rejected.values())
 
     def with_taken(self, n_samples: int, n_flagged: int, n_repeated: int) -> "SampleAccount":
-        """Return the account with one block added; `n_flagged` of `n_samples` are not good."""
+        """Return the account with one block's samples added; `n_samples` includes `n_flagged`."""
         return replace(
             self,
             n_stored=self.n_stored + n_samples - n_flagged,
@@ -79,7 +89,7 @@ class SampleAccount:
     def with_missing(self, n_missing: int, rejections: Iterable[Rejection]) -> "SampleAccount":
         """Return the account with the samples missing before a block added.
 
-        Rejections count only up to `n_missing`; further rejected samples were offered before.
+        At most `n_missing` rejected samples are counted; the others were already offered before.
         """
         if not n_missing:
             return self
@@ -94,9 +104,14 @@ class SampleAccount:
 
 @dataclass(frozen=True)
 class Reach:
-    """End of the stored samples of a unit: index and time of the first sample after them.
+    """End of the stored samples of a unit.
 
-    `gaps` are the gaps already recorded after this end, oldest first.
+    Parameters
+    ----------
+    stop_index, stop_ns
+        Index and time (UTC nanoseconds since 1970) of the first sample after the stored samples.
+    gaps
+        Gaps already recorded after this end, oldest first.
     """
 
     epoch: int
@@ -108,8 +123,8 @@ class Reach:
 def outage(reach: Reach, block: SampleBlock) -> list[Gap]:
     """Return the gaps between the stored samples and the first block after them.
 
-    Gaps already recorded are left out. The list is empty if the block continues or repeats the
-    stored samples.
+    Recorded gaps (`reach.gaps`) are left out. The list is empty if the block continues or repeats
+    the stored samples.
     """
     if _goes_on(reach, block):
         return list(_counted(reach, block))
@@ -117,9 +132,10 @@ def outage(reach: Reach, block: SampleBlock) -> list[Gap]:
 
 
 def restart(reach: Reach, block: SampleBlock) -> Gap | None:
-    """Return the gap between the last sample that arrived and the restart of the sample count.
+    """Return the gap between the last received sample and the restart of the sample count.
 
-    The result is None if the times show no gap. Samples missing after the restart are not included.
+    None if the times show no gap. Samples missing after the restart are not included.
+    `reach` is the end of the received samples, `block` the first block of the new count.
     """
     stop_ns = _begin_ns(block) if n_missed(reach.stop_ns, block) else block.start_ns
     lost = _lost(reach, reach.stop_ns, stop_ns, block.rate_hz)
@@ -129,7 +145,7 @@ def restart(reach: Reach, block: SampleBlock) -> Gap | None:
 def begins_anew(reach: Reach, block: SampleBlock) -> bool:
     """Whether the device restarted its sample count within the same epoch.
 
-    The block's index was reached before, but its time is new: it is no repetition.
+    This is so if samples with the block's index have arrived, but with earlier times.
     """
     if block.epoch != reach.epoch or block.first_index >= reach.stop_index:
         return False
@@ -139,16 +155,16 @@ def begins_anew(reach: Reach, block: SampleBlock) -> bool:
 def n_missed(stop_ns: int, block: SampleBlock) -> int:
     """Return the number of samples missing between the start of a new count and its first block.
 
-    Up to `stop_ns`, samples of earlier counts have arrived. If index and time place the start of
-    the new count before that, the counter did not start at zero (it continued or wrapped) and
-    shows no missing samples: 0.
+    The number is the block's index if the counter started at zero. If index and time place its
+    start before `stop_ns`, the end of the samples received in earlier counts, the counter continued
+    or wrapped, and the number is 0.
     """
     counted_ns = ns_from_s(block.first_index / block.rate_hz)
     return block.first_index if _begin_ns(block) - stop_ns >= -_TOLERANCE.over(counted_ns) else 0
 
 
 def _goes_on(reach: Reach, block: SampleBlock) -> bool:
-    """Whether the block continues the same sample count, by its index and its time."""
+    """Whether the block continues the sample count of `reach`, by its index and its time."""
     if block.epoch != reach.epoch:
         return False
     passed_ns = ns_from_s((block.first_index - reach.stop_index) / block.rate_hz)
@@ -158,7 +174,7 @@ def _goes_on(reach: Reach, block: SampleBlock) -> bool:
 
 
 def _counted(reach: Reach, block: SampleBlock) -> Iterator[Gap]:
-    """Yield the gaps before the block that are not recorded yet, in a continued sample count."""
+    """Yield the unrecorded gaps between `reach` and a block of the same sample count."""
     at = reach.stop_index
     for gap in sorted(reach.gaps, key=lambda gap: gap.first_index):
         if gap.epoch != reach.epoch or _is_older(gap, reach):
@@ -183,7 +199,7 @@ def _piece(block: SampleBlock, start: int, stop: int) -> Gap:
 
 
 def _estimated(reach: Reach, block: SampleBlock) -> list[Gap]:
-    """Return the gap between the old and the new sample count and, if any, that within the new."""
+    """Return the gap between two sample counts and, if any, the gap at the start of the new one."""
     start_ns = max([reach.stop_ns, *(gap.stop_ns for gap in reach.gaps if gap.is_estimated)])
     begin_ns = _begin_ns(block)
     if block.epoch == reach.epoch or begin_ns < start_ns or block.first_index == 0:
@@ -193,7 +209,7 @@ def _estimated(reach: Reach, block: SampleBlock) -> list[Gap]:
 
 
 def _begin_ns(block: SampleBlock) -> int:
-    """Return the start time of the sample count, from the block's index and time."""
+    """Return the time of index 0 of the block's sample count, UTC nanoseconds since 1970."""
     return block.start_ns - ns_from_s(block.first_index / block.rate_hz)
 
 
@@ -210,11 +226,11 @@ class Count:
     Parameters
     ----------
     reported
-        Epoch in the adapter's blocks.
+        Epoch that the adapter reports in its blocks.
     epoch
-        Epoch in the store and in the analysis.
+        Epoch assigned by `Counts`, used in the store and in the analysis.
     stop_index, stop_ns
-        Index and time of the first sample after those that have arrived.
+        Index and time (UTC nanoseconds since 1970) of the first sample after the received ones.
     """
 
     reported: int
@@ -224,7 +240,7 @@ class Count:
 
 
 class Counts:
-    """Assignment of a new epoch to a sample count that restarts within the same epoch.
+    """Assignment of epochs: a sample count that restarts within an epoch gets a new epoch.
 
     A device or a program that reads it may restart the count without reporting it. The index alone
     then looks like repeated samples; the time shows that they are new. `count` is None before the
@@ -245,7 +261,7 @@ class Counts:
         return _in(block, self.count.epoch)
 
     def placed(self, block: SampleBlock) -> SampleBlock:
-        """Return the next block with the epoch of its sample count; detects a restarted count."""
+        """Return the next block with the epoch of its count; a restarted count gets a new epoch."""
         count = self.count
         epoch, is_new = block.epoch, True
         if count is not None and block.epoch == count.reported:

@@ -17,10 +17,18 @@ from core.units import ns_from_s
 
 @dataclass(frozen=True)
 class Window:
-    """Window of consecutive samples (n_channels, n_samples) of one epoch, in engineering units.
+    """Window of consecutive samples of one epoch.
 
-    `channel_quality` is the worst quality of each channel within the window; `slow` holds the means
-    of the slow channels.
+    Parameters
+    ----------
+    start_ns
+        Time of the first sample, UTC nanoseconds since 1970.
+    samples : (n_channels, n_samples)
+        Samples in the engineering unit of each channel.
+    channel_quality
+        Worst quality of each channel within the window.
+    slow
+        Mean of each slow channel, by id.
     """
 
     unit: str
@@ -44,13 +52,13 @@ class Window:
 
     @property
     def stop_ns(self) -> int:
-        """Time of the first sample after the window."""
+        """Time of the first sample after the window, UTC nanoseconds since 1970."""
         return self.start_ns + ns_from_s(self.n_samples / self.rate_hz)
 
 
 @dataclass(frozen=True)
 class _Part:
-    """Part of a block within a window: its cells, and the number of samples of each (weights)."""
+    """Part of a block in a window: ranges of cells and samples, and number of samples per cell."""
 
     block: SampleBlock
     cells: slice
@@ -101,8 +109,8 @@ class Ring:
     def write(self, block: SampleBlock) -> Gap | None:
         """Append a block and return the gap of lost or rejected samples before it, or None.
 
-        Repeated samples are counted and dropped. Rejected samples count only up to the jump in the
-        index.
+        Repeated samples are counted in `account` and dropped. At most as many rejected samples are
+        counted as are missing in the index.
 
         Raises
         ------
@@ -204,7 +212,7 @@ def _units(parts: Sequence[_Part]) -> SampleArray:
 
 
 def _slow_means(parts: Sequence[_Part]) -> dict[str, Reading]:
-    """Return the mean of each slow channel, weighted by the samples of each cell."""
+    """Return the mean of each slow channel by id, weighted by the samples of each cell."""
     first = parts[0].block
     weights = np.concatenate([part.weights for part in parts])
     are_alike = all(part.block.calibration is first.calibration for part in parts)

@@ -1,4 +1,4 @@
-"""Averaged cross-spectra of the four signals of a bearing, and their statistics."""
+"""Averaged cross-spectra of the four channels of a bearing, and their statistics."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from core.arrays import ComplexArray, FloatArray
 from core.spectra.lines import hann
 
 SHAFT_X, SHAFT_Y, BEARING_X, BEARING_Y = range(4)
-"""Indices of a bearing's channels in every matrix."""
+"""Indices of a bearing's four channels in all matrices."""
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class CrossSpectrum:
     Parameters
     ----------
     frequency_hz : (n_lines,)
+        Frequency of each line.
     matrix : (n_lines, n_channels, n_channels)
         Mean of ``P_i · conj(P_j)`` of the zero-to-peak displacement phasors, µm². Hermitian.
     power : (n_lines, n_channels, n_channels)
@@ -38,7 +39,7 @@ class CrossSpectrum:
     n_segments: npt.NDArray[np.int64]
 
     def amplitude_um_pk(self, channel: int) -> FloatArray:
-        """Return the rms over the segments of a channel's line amplitudes, (n_lines,)."""
+        """Return the rms over the segments of a channel's amplitudes in µm 0-pk, (n_lines,)."""
         amplitude: FloatArray = np.sqrt(self.power[:, channel, channel])
         return amplitude
 
@@ -73,7 +74,7 @@ class CrossSpectrum:
 NO_SPECTRUM = CrossSpectrum(
     np.zeros(0), np.zeros((0, 4, 4), complex), np.zeros((0, 4, 4)), np.zeros((4, 4), np.int64)
 )
-"""Empty cross-spectrum, for evidence without waveforms."""
+"""Empty cross-spectrum, for input without waveforms."""
 
 
 def average(
@@ -111,7 +112,7 @@ BIN_CORRELATION = (1.0, 2.0 / 3.0, 1.0 / 6.0)
 """Correlation of white-noise phasors 0, 1 and 2 bins apart: Hann's taper convolved with itself."""
 
 CORRELATED_LINES = 1.0 + 2.0 * sum(rho**2 for rho in BIN_CORRELATION[1:])
-"""Number of adjacent lines equivalent to one independent line in a mean of squares, 1.94."""
+"""Number of adjacent lines that, in a mean of squares, equal one independent line: 1.94."""
 
 
 def phasor_power_per_density(bin_hz: float) -> float:
@@ -145,16 +146,16 @@ def independent_segments(n_segments: int, overlap: float) -> float:
 
 
 WHITE_PRODUCTS = (1.0, *(rho**2 for rho in BIN_CORRELATION[1:]))
-"""Correlation, 0, 1 and 2 bins apart, of products of two independent white noises."""
+"""Correlation of the products of two independent white noises, for lines 0, 1 and 2 bins apart."""
 
 SMEARED_IN_PHASE = (1.0, -1.0 / 3.0, -1.0 / 6.0)
 SMEARED_IN_QUADRATURE = (1.0, 1.0 / 3.0, 0.0)
 SMEARED_APART = (1.0, 0.0, -1.0 / 12.0)
-"""Correlation, 0, 1 and 2 bins apart, of products of white noise and its integration error in a
-line. The error arises because noise d bins off is integrated with the line's frequency instead of
-its own; it is d times the taper's weight at d = -1, 0, 1. The factors are in phase with the noise,
-in quadrature, and independent of it. In phase, the errors of neighbouring lines cancel; only those
-at the ends of a run of lines remain."""
+"""Correlation of the products of white noise and its integration error in a line, for lines 0, 1
+and 2 bins apart. The error arises because noise d bins off the line is integrated with the line's
+frequency instead of its own; the error is d times the taper's weight at d = -1, 0, 1. The products
+are with noise in phase, in quadrature, and independent. In phase, the errors of neighbouring lines
+cancel; only those at the ends of a run of lines remain."""
 
 SMEAR_BINS_SQUARED = 1.0 / 3.0
 """Variance of the frequencies, in bins squared, that contribute to a line of broadband noise."""
@@ -163,7 +164,7 @@ SMEAR_BINS_SQUARED = 1.0 / 3.0
 def correlated_sum(
     terms: FloatArray, lines: npt.NDArray[np.int64], products: FloatArray | Sequence[float]
 ) -> FloatArray:
-    """Return the covariance of n sums over lines whose terms are correlated between near bins.
+    """Return the covariance of n sums over lines; terms up to 2 bins apart are correlated.
 
     Parameters
     ----------

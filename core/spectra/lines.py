@@ -24,7 +24,7 @@ class SegmentSettings:
     overlap
         Overlap of consecutive segments as a fraction of a segment.
     n_segments
-        Number of averaged segments; 24 at 600 Hz are about five minutes.
+        Number of segments in the averaging window; 24 at 600 Hz are about five minutes.
     min_segments
         Number of segments below which a result is marked uncertain.
     max_frequency_hz
@@ -32,16 +32,16 @@ class SegmentSettings:
     vortex_order
         Nominal frequency of the part-load vortex in multiples of the running speed.
     vortex_band
-        Lowest and highest order of the vortex peak.
+        Lowest and highest frequency of the vortex peak in multiples of the running speed.
     min_line_to_floor
-        Smallest ratio of a significant line's power to the median of the surrounding lines.
+        Smallest ratio of a significant line's power to the median power of the bins around it.
     min_speed_fraction
         Fraction of the rated speed below which the machine is at standstill.
     velocity_low_order, velocity_high_hz
         Band of a bearing's broad-band velocity: from this multiple of the rated speed (0.25
         includes the vortex) to this frequency.
     sensors
-        Limits for failed transducers and unsteady operation.
+        Limits for the detection of failed transducers and unsteady operation.
     """
 
     segment_samples: int = 8192
@@ -59,12 +59,12 @@ class SegmentSettings:
 
     @property
     def hop_samples(self) -> int:
-        """Samples between the starts of consecutive segments."""
+        """Number of samples from the start of one segment to the start of the next."""
         return self.segment_samples - round(self.segment_samples * self.overlap)
 
 
 FINE_STEPS = 64
-"""Number of samples covered by the fine table in `turning_factors`."""
+"""Length of a run of samples in `turning_factors`."""
 
 
 @lru_cache(maxsize=8)
@@ -77,14 +77,14 @@ def hann(n_samples: int) -> FloatArray:
 
 @lru_cache(maxsize=8)
 def taper_weights(n_samples: int) -> FloatArray:
-    """Return the Hann taper scaled so that a line's phasor is zero-to-peak, read-only."""
+    """Return the Hann taper, (n_samples,), scaled for zero-to-peak phasors, read-only."""
     weights: FloatArray = 2.0 * hann(n_samples) / hann(n_samples).sum()
     weights.setflags(write=False)
     return weights
 
 
 def tapered(samples: SampleArray | FloatArray) -> FloatArray:
-    """Remove each channel's mean and apply the Hann taper of `taper_weights`.
+    """Return samples without each channel's mean, multiplied by `taper_weights`.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def tapered(samples: SampleArray | FloatArray) -> FloatArray:
 
 
 def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
-    """Return the phasors at the first bins above zero of the discrete Fourier transform.
+    """Return the phasors at the first `n_lines` bins above zero of the discrete Fourier transform.
 
     Returns
     -------
@@ -114,7 +114,7 @@ def bin_phasors(tapered_samples: FloatArray, n_lines: int) -> ComplexArray:
 def exact_phasors(
     tapered_samples: FloatArray, rate_hz: float, frequency_hz: FloatArray
 ) -> ComplexArray:
-    """Return the phasors at arbitrary frequencies, on or between the bins, as Fourier sums.
+    """Return the phasors at given frequencies, on or between the bins, as Fourier sums.
 
     Parameters
     ----------
@@ -140,7 +140,8 @@ def exact_phasors(
 def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) -> ComplexArray:
     """Return the factors ``exp(-iωt)`` of Fourier sums at the frequencies, (n_samples, n_lines).
 
-    Each factor is the product of a fine table within a run and a coarse table over the runs.
+    Each factor is computed as the product of the factor at the start of its run of `FINE_STEPS`
+    samples and the factor within the run.
     """
     turn_rad = -2j * np.pi * frequency_hz / rate_hz
     n_coarse = -(-n_samples // FINE_STEPS)
@@ -151,15 +152,16 @@ def turning_factors(n_samples: int, rate_hz: float, frequency_hz: FloatArray) ->
 
 
 def line_phasors(tapered_samples: FloatArray, factors: ComplexArray) -> ComplexArray:
-    """Return phasors as `exact_phasors`, from precomputed factors of `turning_factors`."""
+    """Return the phasors (n_channels, n_lines) at the frequencies given to `turning_factors`."""
     parts: FloatArray = tapered_samples @ factors.view(np.float64)
     return parts.view(np.complex128)
 
 
 def part_phasors(samples: FloatArray, factors: ComplexArray) -> ComplexArray:
-    """Return the phasors of samples without taper, (n_channels, n_lines), without copying them.
+    """Return the phasors (n_channels, n_lines) of samples with mean and without taper.
 
-    The taper is applied to the factors, and the mean of each channel is removed.
+    The samples are not copied: the taper is applied to the factors from `turning_factors`, and the
+    contribution of each channel's mean is subtracted.
     """
     weighted = factors * taper_weights(samples.shape[1])[:, np.newaxis]
     of_mean = samples.mean(axis=1, keepdims=True) * weighted.sum(axis=0)
@@ -185,7 +187,7 @@ def peak_frequency_hz(
 
     Returns
     -------
-    None if the strongest line of the band is not a peak but the flank of a line outside.
+    Frequency in Hz; None if the strongest line of the band is the flank of a line outside the band.
     """
     inside = np.flatnonzero((frequency_hz >= band_hz[0]) & (frequency_hz <= band_hz[1]))
     inside = inside[(inside > 0) & (inside < power.size - 1)]

@@ -1,6 +1,6 @@
 """Shaft orbit in its bearing, sample by sample: unfiltered, 1×-filtered, and key-phase marks.
 
-Missing samples are NaN; results from too few samples are NaN, too.
+Missing samples are NaN; so are results computed from too few samples.
 """
 
 import math
@@ -40,7 +40,7 @@ class Ellipse:
 
 
 def order_phasors(trace_um: FloatArray, rate_hz: float, frequency_hz: float) -> ComplexArray:
-    """Return the phasor at one frequency for each sample, tapered over `FILTER_TURNS` turns.
+    """Return the phasor at one frequency around each sample, over `FILTER_TURNS` tapered turns.
 
     Parameters
     ----------
@@ -80,14 +80,14 @@ def order_phasors(trace_um: FloatArray, rate_hz: float, frequency_hz: float) -> 
 
 
 def trace_of(phasors: ComplexArray, rate_hz: float, frequency_hz: float) -> FloatArray:
-    """Return the displacement of phasors from `order_phasors`, (n_samples,) µm."""
+    """Return the filtered displacement (n_samples,), µm, from the phasors of `order_phasors`."""
     angle = 2.0 * math.pi * frequency_hz / rate_hz * np.arange(phasors.size)
     trace: FloatArray = (phasors * np.exp(1.0j * angle)).real
     return trace
 
 
 def ellipse_of(x: complex, y: complex) -> Ellipse:
-    """Return the elliptical orbit of a shaft from its phasors in x and y.
+    """Return the elliptical orbit of a shaft from its displacement phasors in x and y, µm 0-pk.
 
     The motion x + iy is the sum of a forward and a backward circle (Childs 1993, section 1.9). The
     semi-axes are the sum and the difference of their radii.

@@ -1,4 +1,4 @@
-"""Broad-band vibration of a segment, and vibration of its newest parts.
+"""Broad-band vibration of a segment, and vibration of the parts of its last seconds.
 
 The standards of the ISO 20816 family evaluate broad-band displacement of shafts and velocity of
 bearings. Limits for fast changes use the newest parts of a segment: they show a step and its
@@ -21,7 +21,7 @@ from core.spectra.lines import SegmentSettings
 from core.units import hz_from_rpm
 
 MAX_PARTS = 4
-"""Largest number of parts per hop; 3 s each by default."""
+"""Largest number of parts into which the last hop of a segment is divided; 3 s each by default."""
 
 PART_TURNS = 4.0
 """Smallest number of turns in a part. The main lobe of Hann's taper then reaches half an order from
@@ -44,7 +44,8 @@ class Overall:
         Largest displacement of each shaft from its mean position, S_max of ISO 20816-1, annex B;
         NaN unless both directions are displacements.
     velocity_mm_s_rms : (n_channels,)
-        Velocity in the band, with the transducer's response compensated; zero for a key-phase.
+        Velocity in the band of `SegmentSettings`, with the transducer's response compensated; zero
+        for a key-phase.
     """
 
     peak_to_peak_um: FloatArray
@@ -53,7 +54,7 @@ class Overall:
 
 
 class OverallTransform:
-    """Computation of the broad-band vibration of one unit's segments.
+    """Computation of the broad-band vibration of a segment of one unit.
 
     Parameters
     ----------
@@ -129,7 +130,7 @@ class RecentVibration:
 
 @dataclass(frozen=True)
 class RecentReadings:
-    """Readings of one bearing over a short time that ends at `time_ns`, by quantity."""
+    """Readings of one bearing, by quantity, over a few seconds that end at `time_ns` (UTC)."""
 
     time_ns: int
     readings: Mapping[str, Reading]
@@ -138,13 +139,15 @@ class RecentReadings:
 def parts_of(
     n_samples: int, hop_samples: int, turn_samples: float
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Return the start and stop indices of the parts of a segment, each (n_parts,).
+    """Return the first sample of each part of a segment and the first sample after it, (n_parts,).
 
     The parts cover the last hop of the segment. A part has at least `PART_TURNS` turns and may
     therefore begin earlier.
 
     Parameters
     ----------
+    n_samples
+        Samples of the segment.
     hop_samples
         Samples between the starts of consecutive segments.
     turn_samples

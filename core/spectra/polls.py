@@ -1,4 +1,4 @@
-"""Polls of a monitoring rack: vectors of a unit at one moment, as a segment without bins.
+"""Polls of a monitoring rack: a unit's vibration vectors at one moment, as a segment without bins.
 
 A block of a rack has one sample for each poll and one row for each quantity that the rack reports
 for a channel: amplitudes zero-to-peak in the channel's engineering unit, phases in degrees,
@@ -45,7 +45,7 @@ AMPLITUDE_PARTS = (
     VectorPart.VORTEX_AMPLITUDE,
     VectorPart.OVERALL,
 )
-"""Parts with an amplitude detector. The overall amplitude is recorded but not evaluated."""
+"""Quantities that are amplitudes. The overall amplitude is recorded but not evaluated."""
 
 
 @dataclass(frozen=True)
@@ -57,20 +57,21 @@ class VectorRow:
 
     @property
     def id(self) -> str:
-        """Name of the row in register maps."""
+        """Id of the row in register maps: channel id, dot, quantity."""
         return f"{self.channel}.{self.part}"
 
 
 @dataclass(frozen=True)
 class PollSettings:
-    """Averaging of polls to results.
+    """Settings for averaging the polls of a rack.
 
     Parameters
     ----------
     n_polls
-        Polls in the averaging window; 60 polls of 5 s are five minutes.
+        Number of polls in the averaging window; 60 polls every 5 s are five minutes.
     hop_polls
-        Polls between results, at most `n_polls`; vibration limits are evaluated at each result.
+        Number of polls from one result to the next, at most `n_polls`; vibration limits are
+        evaluated at each result.
     min_polls
         Number of polls with a changed vector below which a result is uncertain; 2 to `n_polls`.
     """
@@ -81,7 +82,7 @@ class PollSettings:
 
 
 class PollTransform(KeptSegments):
-    """Transform of a rack's polls to segments without bins.
+    """Transform of a rack's polls to segments without bins, which it keeps for averaging.
 
     Parameters
     ----------
@@ -92,7 +93,7 @@ class PollTransform(KeptSegments):
     settings
         Settings of speed and vortex; lengths of segments are not used.
     averaging
-        Averaging of polls to results.
+        Numbers of averaged polls; by default those of `PollSettings`.
 
     Raises
     ------
@@ -125,7 +126,7 @@ class PollTransform(KeptSegments):
         }
 
     def add(self, window: Window) -> Segment:
-        """Convert the only sample of a window to a segment and keep it."""
+        """Convert a window with a single sample (one poll) to a segment, keep it and return it."""
         speed = running_speed(self._unit, window.slow, _NO_LINES, _NO_LINES, self._settings)
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
         order_hz = turn_hz * np.array([1.0, self._settings.vortex_order])
@@ -172,7 +173,7 @@ class PollTransform(KeptSegments):
     def _of_channels(
         self, part: VectorPart, window: Window, least: float = -math.inf
     ) -> tuple[FloatArray, tuple[Quality, ...]]:
-        """Return the values of a part, (n_channels,), zero if not usable, and their qualities."""
+        """Return values and qualities of a quantity, (n_channels,); unusable values are zero."""
         found = [self._row_of(channel.id, part, window, least) for channel in self._unit.channels]
         return np.array([value for value, _ in found]), tuple(quality for _, quality in found)
 

@@ -16,7 +16,7 @@ from core.spectra.speed import KeyPhase, Speed, SpeedSource
 
 
 class RunoutVerdict(StrEnum):
-    """Whether a slow-roll vector was subtracted; if not, the reason."""
+    """Statement that a slow-roll vector was subtracted (`APPLIED`), or the reason why not."""
 
     APPLIED = "applied"
     NO_VECTOR = "no_vector"
@@ -39,16 +39,18 @@ def take_off_runout(
     Parameters
     ----------
     phasor_um_pk
-        1× phasor of one segment, relative to its first sample.
+        1× phasor of one segment; its phase is that of the signal at the segment's first sample.
+    vector
+        Slow-roll vector of the channel; None if not measured.
     probe
         Serial number or mark of the installed probe.
     shaft_angle_rad
-        Shaft angle at the first sample, from the passage of the mark at the pick-up; None without a
-        key-phase.
+        Angle that the shaft has turned, at the first sample, since its mark passed the pick-up;
+        None without a key-phase.
 
     Returns
     -------
-    The phasor, and whether the vector was subtracted.
+    The corrected or unchanged phasor, and whether the vector was subtracted.
     """
     verdict = runout_verdict(vector, probe, rated_speed_rpm, shaft_angle_rad is not None)
     if vector is None or shaft_angle_rad is None or verdict is not RunoutVerdict.APPLIED:
@@ -60,7 +62,7 @@ def take_off_runout(
 def runout_verdict(
     vector: SlowRollVector | None, probe: str, rated_speed_rpm: float, has_key_phase: bool
 ) -> RunoutVerdict:
-    """Return whether a slow-roll vector is applicable to a probe; if not, the first reason."""
+    """Return `APPLIED` if a slow-roll vector is applicable to a probe, else the reason why not."""
     if vector is None:
         return RunoutVerdict.NO_VECTOR
     if vector.probe != probe:
@@ -79,12 +81,12 @@ def without_runout(
     speed: Speed,
     key_phase: KeyPhase | None,
 ) -> tuple[ComplexArray, Mapping[str, RunoutVerdict]]:
-    """Subtract the applicable slow-roll vectors from the 1× phasors.
+    """Return 1× phasors from which the applicable slow-roll vectors are subtracted.
 
     Parameters
     ----------
     order1_um_pk
-        (n_channels,) phasors at exactly `speed`, relative to the segment's first sample.
+        (n_channels,) phasors at exactly `speed`, with the phases at the segment's first sample.
     rows
         Rows of the shaft channels.
 

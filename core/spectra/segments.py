@@ -1,4 +1,4 @@
-"""Segments: each window of samples is transformed once; averages are computed elsewhere."""
+"""Transform of sample windows to segments, and the segments kept for averaging."""
 
 import cmath
 import copy
@@ -58,7 +58,7 @@ class Evidence(StrEnum):
 
 @dataclass(frozen=True)
 class Segment:
-    """Transformed segment of a unit's samples, or one poll of its rack.
+    """Fourier-transformed segment of a unit's samples, or one poll of its rack.
 
     Parameters
     ----------
@@ -71,19 +71,22 @@ class Segment:
     bin_phasors_um_pk
         (n_channels, n_lines) displacement phasors at the bins above zero; None for a poll.
     order_frequency_hz
-        (2,) exact frequencies of 1× and of the vortex; without a vortex peak, its nominal order.
+        (2,) exact frequencies of 1× and of the vortex; without a vortex peak, the nominal frequency
+        of the vortex.
     has_vortex_peak
-        Whether a line shared by shaft and bearings has a peak in the vortex band, averaged up to
-        this segment.
+        Whether the spectra averaged up to this segment have a peak, shared by shaft and bearing, in
+        the vortex band.
     order_phasors_um_pk
         (n_channels, 2) displacement phasors at exactly `order_frequency_hz`, finite also if not
         usable; amplitudes if the phase is unknown. Runout is subtracted from 1× if possible.
     order_quality
-        (2, n_channels) qualities of the order phasors.
-    order_usable, has_phase : (2, n_channels)
-        Whether each order phasor is usable, and whether its phase is known.
+        (2, n_channels) qualities of `order_phasors_um_pk`.
+    order_usable : (2, n_channels)
+        Whether each of these phasors is usable.
+    has_phase : (2, n_channels)
+        Whether the phase of each of these phasors is known.
     at_mark_um_pk : (n_channels,)
-        1× phasors relative to the passage of the shaft's mark; None without a key-phase.
+        1× phasors with the phase at the passage of the shaft's mark; None without a key-phase.
     runout
         Whether runout was subtracted from 1×, by shaft channel.
     overall
@@ -122,17 +125,17 @@ class Segment:
         return bool(few) and self.channel_quality[row] == CLIPPED
 
     def line_quality(self, row: int, line: int) -> Quality:
-        """Return a channel's quality at a line; a few clipped samples make it only uncertain."""
+        """Return a channel's quality at a line: only uncertain if the channel `is_grazed`."""
         return uncertain(Reason.CLIPPED) if self.is_grazed(row) else self.order_quality[line][row]
 
     @cached_property
     def spans_um_pp(self) -> tuple[Reading, ...]:
-        """Broad-band peak-to-peak displacement of each channel."""
+        """Broad-band peak-to-peak displacement of each channel in µm; missing for polls."""
         return self._of_channels(None if self.overall is None else self.overall.peak_to_peak_um)
 
     @cached_property
     def velocities_mm_s_rms(self) -> tuple[Reading, ...]:
-        """Broad-band rms velocity of each channel."""
+        """Broad-band rms velocity of each channel in mm/s; missing for polls."""
         return self._of_channels(None if self.overall is None else self.overall.velocity_mm_s_rms)
 
     def _of_channels(self, values: FloatArray | None) -> tuple[Reading, ...]:
@@ -140,7 +143,7 @@ class Segment:
         return tuple(self.reading((row,), value) for row, value in enumerate(each))
 
     def reading(self, rows: Sequence[int], value: float) -> Reading:
-        """Return a value derived from channels with their worst quality; missing if one is bad."""
+        """Return a value with the channels' worst quality; missing for a bad channel or a NaN."""
         qualities = [self.channel_quality[row] for row in rows]
         if any(quality.level is Level.BAD for quality in qualities):
             return missing(worst(qualities).reason)
@@ -155,13 +158,14 @@ class KeptSegments:
     Parameters
     ----------
     n_segments
-        Number of segments of a full average.
+        Number of segments in a full averaging window.
     min_segments
         Number of independent segments below which a result is uncertain.
     segment_samples, hop_samples
         Samples per segment, and between the starts of consecutive segments.
     result_samples
-        Results are due at the first segment that ends at or after each multiple of this.
+        Results are due at the first segment that ends at or after each multiple of this number of
+        samples.
     n_rows
         Number of rows of a block.
 
@@ -192,7 +196,7 @@ class KeptSegments:
         self.segments.clear()
 
     def snapshot(self) -> "KeptSegments":
-        """Return a copy that later segments do not change."""
+        """Return a copy of the object, which later segments do not change."""
         found = copy.copy(self)
         found.segments = self.segments.copy()
         return found
@@ -240,9 +244,10 @@ class SegmentTransform(KeptSegments):
         self._bearing_rows = [[ids.index(i) for i in b.channels] for b in unit.bearings]
 
     def add(self, window: Window) -> Segment:
-        """Transform a window to a segment, keep it, and drop segments outside the averaging window.
+        """Transform a window to a segment, keep it for averaging, and return it.
 
-        They are dropped before the vortex search: after a gap they may be arbitrarily old.
+        Segments outside the averaging window are dropped before the vortex search: after a gap they
+        may be arbitrarily old.
         """
         self.drop_before(window.first_index - self.n_segments * self.hop_samples)
         samples: FloatArray = window.samples.astype(np.float64)
@@ -306,7 +311,7 @@ class SegmentTransform(KeptSegments):
         mean: FloatArray,
         speed: Speed,
     ) -> tuple[Quality, ...]:
-        """Return the qualities after checks of signal and level; failed transducers are bad."""
+        """Return the channel qualities after checks of signal and level; bad for failed sensors."""
         turning, limits = speed.rpm.value is not None, self._settings.sensors
         turn_hz = hz_from_rpm(speed.rpm.value or self._unit.rated_speed_rpm)
         turn_samples = round(self._unit.rate_hz / turn_hz)
@@ -375,7 +380,7 @@ class SegmentTransform(KeptSegments):
     def _vortex_hz(
         self, turn_hz: float, bins: ComplexArray, usable: npt.NDArray[np.bool_]
     ) -> float | None:
-        """Return the vortex frequency, or None; averaged, as one segment resolves it poorly."""
+        """Return the vortex frequency in the spectra averaged up to now; None without a vortex."""
         low, high = self._settings.vortex_band
         band_hz = (low * turn_hz, high * turn_hz)
         # one more bin on each side, to distinguish a peak from the flank of a line outside
@@ -407,7 +412,7 @@ def _power(phasors: ComplexArray, counted: npt.NDArray[np.bool_]) -> FloatArray:
 
 
 def _factors(channels: Sequence[Channel], frequency_hz: FloatArray) -> ComplexArray:
-    """Return displacement factors (n_channels, n_lines), computed once for identical channels."""
+    """Return the `displacement_factor` of each channel at each frequency, (n_channels, n_lines)."""
     kinds = [(c.measurand, c.direction, c.response, c.delay_s) for c in channels]
     alike = dict(zip(kinds, channels, strict=True))
     factors = {kind: displacement_factor(channel, frequency_hz) for kind, channel in alike.items()}

@@ -24,13 +24,14 @@ HYSTERESIS = 0.2
 """Hysteresis of pulse detection, to each side of the middle, as a fraction of the pulse height."""
 
 MIN_PULSES = 4
-"""Smallest number of pulses, three turns; with fewer, an irregular pulse would not be noticed."""
+"""Smallest number of pulses in a segment; with fewer, an irregular pulse would not be noticed."""
 
 MAX_DEPARTURE_TURNS = 0.02
-"""Largest deviation of a pulse from uniform rotation, in turns; 7°."""
+"""Largest deviation of a pulse from uniform rotation, in turns (7°)."""
 
 ODD_TURN = (0.75, 1.5)
-"""Shortest and longest turn as a fraction of the median; beyond, a pulse is extra or missing."""
+"""Limits of the time between two pulses, relative to the median; outside, a pulse is extra or
+missing."""
 
 OUTER_TURN = 1.1
 """Largest distance, in turns, of the first and the last pulse from the ends of the segment."""
@@ -40,7 +41,8 @@ LINE_SEARCH = (0.85, 1.15)
 
 
 KEY_PHASE_TOLERANCE = 0.02
-"""Largest relative difference of key-phase and speed channel; the latter is often no better."""
+"""Largest relative difference of the speeds by key-phase and speed channel; also the half-width of
+the error of a speed channel that is not confirmed by the 1× line."""
 
 LINE_SPREAD = 0.35
 """Standard uncertainty of an interpolated line frequency in bins, at a noise floor as strong as the
@@ -55,7 +57,8 @@ class KeyPhase:
     Parameters
     ----------
     shaft_angle_rad
-        Shaft angle at the first sample, from the passage of the mark at the pick-up, 0 to 2π.
+        Angle that the shaft has turned, at the first sample, since its mark passed the pick-up;
+        0 to 2π.
     speed_rpm
         Mean speed over the segment.
     u_relative
@@ -73,7 +76,7 @@ class KeyPhase:
 
 @dataclass(frozen=True)
 class _Line:
-    """Speed from the frequency of the 1× line, with its relative standard uncertainty."""
+    """Running speed by the frequency of the 1× line, and its relative standard uncertainty."""
 
     rpm: float
     u_relative: float
@@ -90,10 +93,12 @@ class SpeedSource(StrEnum):
 
 @dataclass(frozen=True)
 class Speed:
-    """Running speed in r/min; missing at standstill.
+    """Running speed and its source.
 
     Parameters
     ----------
+    rpm
+        Speed in r/min; missing at standstill.
     budget
         Uncertainty budget; None for the rated speed and for a speed contradicted by another source.
     """
@@ -119,9 +124,11 @@ def running_speed(
     Parameters
     ----------
     slow
-        Readings of the slow channels in the same window.
-    frequency_hz, shaft_power : (n_lines,)
-        Summed power of the shaft channels, searched for the 1× line.
+        Mean reading of each slow channel over the segment, by id.
+    frequency_hz : (n_lines,)
+        Frequencies of the bins; empty for a rack.
+    shaft_power : (n_lines,)
+        Spectral power summed over the shaft channels, which is searched for the 1× line.
     key_phase
         Rotation from the key-phase; None without exactly one pulse per turn.
     """
@@ -154,7 +161,7 @@ def running_speed(
 
 
 def _pulsed(key_phase: KeyPhase | None, slow_rpm: Reading | None) -> Reading | None:
-    """Return the key-phase speed, uncertain if contradicted by the speed channel."""
+    """Return the key-phase speed, uncertain if contradicted by the speed channel, or None."""
     if key_phase is None:
         return None
     other_rpm = slow_rpm.value if slow_rpm is not None else None
@@ -171,6 +178,7 @@ def _budget(
     """Return the uncertainty budget of a speed measured by key-phase or speed channel.
 
     The uncertainty of a speed channel follows from its agreement with the 1× line, if available.
+    None if the speed is not good, or if the key-phase has no stated uncertainty.
     """
     if speed.value is None or speed.quality != GOOD:
         return None
@@ -208,7 +216,7 @@ def _line(
 
 
 def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | None:
-    """Fit a uniform rotation to the key-phase pulses of a segment.
+    """Return the uniform rotation fitted to the key-phase pulses of a segment.
 
     Parameters
     ----------
@@ -242,7 +250,7 @@ def read_key_phase(signal: FloatArray, rate_hz: float) -> KeyPhase | None:
 
 
 def rising_edges(signal: FloatArray) -> FloatArray:
-    """Return the positions at which a signal rises through the middle between its extremes.
+    """Return the positions at which a signal rises through the middle of its range.
 
     Parameters
     ----------

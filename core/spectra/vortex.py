@@ -1,4 +1,4 @@
-"""Roundness of the shaft orbit at one line, and frequency of the part-load vortex."""
+"""Roundness of the shaft orbit at one spectral line, and frequency of the part-load vortex."""
 
 from collections.abc import Sequence
 
@@ -9,10 +9,10 @@ from core.spectra.lines import peak_frequency_hz
 
 
 def roundness(spectrum: CrossSpectrum, line: int) -> float:
-    """Return the roundness of an orbit: 1 forward circle, 0 straight line, -1 backward circle.
+    """Return the roundness of the shaft orbit at the spectral line with index `line`.
 
-    In forward motion u_y lags u_x by 90°, and the imaginary part of their cross-spectrum is
-    positive.
+    1 is a forward circle, 0 a straight line or no motion, -1 a backward circle. In forward motion,
+    u_y lags u_x by 90°, and the imaginary part of their cross-spectrum is positive.
     """
     matrix = spectrum.matrix[line]
     whole = float(matrix[SHAFT_X, SHAFT_X].real + matrix[SHAFT_Y, SHAFT_Y].real)
@@ -22,7 +22,7 @@ def roundness(spectrum: CrossSpectrum, line: int) -> float:
 def vortex_frequency_hz(
     spectra: Sequence[CrossSpectrum], band_hz: tuple[float, float]
 ) -> float | None:
-    """Return the frequency of the strongest line of coherent shaft and bearing motion in a band.
+    """Return the frequency in Hz of the strongest line shared by shaft and bearing in a band.
 
     The shaft's power is weighted by its coherence with the bearing's motion, corrected for the bias
     of few segments, and summed over directions and bearings. A line of one probe alone (runout,

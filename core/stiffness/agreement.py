@@ -1,7 +1,7 @@
-"""Agreement of the estimators of one bearing.
+"""Comparison of the results of different stiffness estimators for one bearing.
 
 Errors of the gains and of the bracket's stiffness are common to all estimators and cancel in the
-comparison. All other stated errors can explain a difference.
+comparison. All other uncertainties in the budgets can explain a difference.
 """
 
 import itertools
@@ -32,7 +32,7 @@ COMMON = frozenset({SHAFT_GAIN, BEARING_GAIN, BRACKET})
 
 
 def disagree(first: Budget, second: Budget) -> bool:
-    """Whether two results of one quantity differ by more than their uncertainty."""
+    """Whether two results of one quantity differ by more than their uncertainties allow."""
     lines = [line for line in (*first.lines, *second.lines) if line.name not in COMMON]
     random = [line for line in lines if line.kind is Kind.RANDOM]
     spread = math.hypot(*(line.contribution for line in random))
@@ -58,10 +58,12 @@ def contradicting(
     ----------
     budgets
         Uncertainty budgets of all stiffnesses and dampings, by quantity.
+    found
+        Result of `dynamic`, or None.
     orders
-        Cross-spectrum at the order lines.
+        Cross-spectrum at the lines of 1× and of the vortex.
     lines
-        Index of each line in `orders`, by the prefix of its quantities.
+        Index of each line in `orders`, by the prefix of its quantities, "order1" or "vortex".
     """
     doubted: set[str] = set()
     for row, (axes, along) in enumerate((("xx", SHAFT_X), ("yy", SHAFT_Y))):
@@ -105,7 +107,7 @@ def _without_cross_coupling(budget: Budget) -> Budget:
 
 
 def _combined(budgets: Sequence[Budget], factors: FloatArray, covariance: FloatArray) -> Budget:
-    """Return the budget of a linear combination of coefficients."""
+    """Return the budget of the sum of four coefficients, each multiplied by its factor."""
     random = math.sqrt(float(factors @ covariance @ factors))
     systematic = zip(
         *([line for line in b.lines if line.kind is Kind.SYSTEMATIC] for b in budgets), strict=True

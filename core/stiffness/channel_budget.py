@@ -28,7 +28,7 @@ from core.uncertainty import (
 def amplitude_budget(
     amplitude_um_pk: float, phasors_um_pk: ComplexArray, systematic: tuple[BudgetLine, ...]
 ) -> Budget | None:
-    """Return the uncertainty budget of the rms amplitude of phasors (n,), µm 0-pk."""
+    """Return the uncertainty budget of the rms amplitude of phasors (n,), µm 0-pk; None if zero."""
     if amplitude_um_pk == 0.0:
         return None
     power = np.abs(phasors_um_pk) ** 2
@@ -136,7 +136,7 @@ def roundness_budget(
 def frequency_budget(
     frequency_hz: float, each_hz: FloatArray, speed: Speed | None
 ) -> Budget | None:
-    """Return the uncertainty budget of the mean frequency of a line, from its scatter and speed.
+    """Return the uncertainty budget of the mean frequency of a line, from scatter and speed error.
 
     Parameters
     ----------

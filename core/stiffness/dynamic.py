@@ -27,15 +27,16 @@ MIN_LINES = 12
 """Smallest number of usable lines for a result."""
 
 MAX_INERTIA_SHARE = 0.8
-"""Largest ratio of inertia to stiffness of a bracket with fitted mass, at the highest line."""
+"""Limit of a fitted mass: largest ratio of the bracket's inertia force to its spring force at the
+highest line."""
 
 MAX_MASS_STD = 0.5
 """Largest standard uncertainty of a fitted mass as a fraction of the largest plausible mass of the
 bracket. Beyond it the lines do not determine the mass, and there is no result."""
 
 STIFFNESS, MASS, DAMPING, DELAY = range(4)
-"""Changes of the bracket's dynamic stiffness: relative stiffness, mass in kg, damping in N·s/m, and
-delay of the bearing channels in s."""
+"""Indices of the bracket properties that can change: relative stiffness, mass in kg, damping in
+N·s/m, and delay of the bearing channels in s."""
 
 
 @dataclass(frozen=True)
@@ -51,19 +52,21 @@ class DynamicStiffness:
         Random covariance of the coefficients of each row.
     changes : (4, 2, 4)
         Change of the coefficients per unit of `STIFFNESS`, `MASS`, `DAMPING` and `DELAY`.
-    bracket_mass_kg, bracket_mass_std_kg
-        Mass of the bracket used in the fit; its random standard uncertainty if the mass was fitted
-        with the film, else 0.
-    delay_s, delay_std_s
-        Apparent delay of the bearing channels, fitted together with the bracket's mass, and its
-        random standard uncertainty.
+    bracket_mass_kg
+        Mass of the bracket, given or fitted together with the film.
+    bracket_mass_std_kg
+        Random standard uncertainty of a fitted mass; 0 for a given mass.
+    delay_s
+        Apparent delay of the bearing channels, fitted together with the bracket's mass.
+    delay_std_s
+        Random standard uncertainty of `delay_s`; infinite if the delay could not be fitted.
     delay_per_damping
         Change of `delay_s` per N·s/m of the bracket's damping.
     coherence : (2,)
-        Multiple coherence of each bearing channel with the shaft's motion through the fitted film,
-        over the weighted lines; 0 to 1.
+        Fraction of the power of each bearing channel that the shaft's motion explains through the
+        fitted film, over the weighted lines; 0 to 1.
     coherence_segments : (2,)
-        Number of independent segments with which a single line's coherence is equally certain.
+        Number of independent segments that would make a coherence at a single line equally certain.
     lack_of_fit : (2,)
         About 1 if stiffness and damping are constant over frequency, as modelled; else larger.
     frequency_hz : (n_used,)
@@ -96,7 +99,7 @@ class DynamicStiffness:
 
     @property
     def c_n_s_per_m(self) -> FloatArray:
-        """Damping coefficients, (2, 2)."""
+        """Damping coefficients, (2, 2); rows and columns as for `k_n_per_m`."""
         return self.coefficients[:, 2:]
 
     @property
@@ -112,7 +115,7 @@ def dynamic_stiffness(
     settings: DynamicSettings,
     n_integrations: tuple[int, int] = (2, 2),
 ) -> DynamicStiffness | Reason:
-    """Estimate a film's coefficients, or return the reason why there is no result.
+    """Return a film's coefficients fitted to a spectrum, or the reason why there is no result.
 
     An unknown mass of the bracket is fitted with the film, one mass for both directions.
 
@@ -124,8 +127,8 @@ def dynamic_stiffness(
         Lowest and highest 1× frequency measured in these segments.
     n_integrations
         Number of integrations of v_x and v_y to displacement: 2 for acceleration, 1 for velocity,
-        0. At very high coherence the residual is the integration error; the correlation of its
-        lines affects only the stated uncertainty.
+        0 for displacement. At very high coherence the residual is the integration error; the number
+        affects only the stated uncertainty.
 
     Raises
     ------
@@ -184,7 +187,7 @@ def _bracket_changes(bracket: BracketDynamics, fit: FilmFit) -> BracketChanges:
 
 
 def _with_mass(bracket: BracketDynamics, fit: FilmFit) -> BracketDynamics | None:
-    """Return the bracket with the mass fitted to the residual; None if it is not determined."""
+    """Return the bracket with a mass fitted to the residual force; None if it cannot be fitted."""
     found = _bracket_changes(bracket, fit).estimate([MASS])
     if found is None:
         return None

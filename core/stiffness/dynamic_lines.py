@@ -17,18 +17,18 @@ from core.spectra.cross_spectrum import (
 
 MAX_LEAKAGE = 0.005
 """Largest fraction of a line's shaft power that may be leakage from stronger lines. Leakage
-contains runout, and it is integrated with the wrong frequency."""
+contains runout and is integrated with the wrong frequency."""
 
 N_BLOCKS = 4
-"""Number of parts of the quiet band; the shaft may move in some of them."""
+"""Number of parts of the quiet band, each with its own noise floor."""
 
 SAME_FLOOR = 3.0
-"""Largest difference from the floor of the quietest part, in standard deviations."""
+"""Largest difference of averaged parts from the floor of the quietest, in standard deviations."""
 
 
 @dataclass(frozen=True)
 class DynamicSettings:
-    """Band, lines, weighting and evidence of the `dynamic` estimator.
+    """Settings of the `dynamic` estimator: band, probe noise and required evidence.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class DynamicSettings:
     min_signal_share
         Smallest fraction of the shaft's weighted power that is not noise, in the worst direction.
     min_coherence
-        Smallest multiple coherence of bearing with shaft motion over the used lines, unbiased.
+        Smallest `coherence` of a `DynamicStiffness` in each direction.
     max_relative_uncertainty
         Largest random standard uncertainty of a direct stiffness, relative to the larger direct
         stiffness; beyond it the excitation is insufficient.
@@ -69,7 +69,7 @@ class DynamicSettings:
 def used_lines(
     spectrum: CrossSpectrum, turn_hz: tuple[float, float], settings: DynamicSettings
 ) -> npt.NDArray[np.int64]:
-    """Return the indices of the lines with broadband shaft motion and bearing motion."""
+    """Return the indices of the lines between harmonics that have motion and little leakage."""
     power = np.diagonal(spectrum.matrix, axis1=1, axis2=2).real
     used = _between_harmonics_of(settings.band_hz, spectrum, turn_hz, settings)
     used &= np.all(power > 0.0, axis=1)
@@ -139,7 +139,7 @@ def little_leakage(shaft_power: FloatArray, lines: slice = slice(None)) -> npt.N
 
 
 def conditional_power(matrix: ComplexArray, given: ComplexArray, cross: ComplexArray) -> FloatArray:
-    """Return the power of signals that is not coherent with two inputs, (n_lines, n).
+    """Return the power of n signals that is not coherent with two inputs, (n_lines, n).
 
     Parameters
     ----------
@@ -180,7 +180,8 @@ def probe_noise_power(
 
     Returns
     -------
-    (2,) in µm², zero without lines in the quiet band; and relative standard uncertainties, (2,).
+    Power of each probe's noise, (2,) in µm², zero without lines in the quiet band; and its relative
+    standard uncertainty, (2,), zero if the power is known.
     """
     if settings.probe_noise_um2_per_hz is not None:
         bin_hz = float(spectrum.frequency_hz[1] - spectrum.frequency_hz[0])

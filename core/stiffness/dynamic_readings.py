@@ -32,8 +32,8 @@ from core.uncertainty import (
 )
 
 MAX_LACK_OF_FIT = 3.0
-"""Largest lack of fit. Beyond it the film is not constant over the band, or the bracket is excited
-directly."""
+"""Largest lack of fit of a good result. Above this value, stiffness and damping of the film vary
+over the band, or the bracket is excited directly."""
 
 RESOLUTION = 0.001
 """Half-width of the error of `dynamic` from tapering, relative to a row's direct coefficient. A
@@ -67,9 +67,9 @@ def dynamic_readings(
     turn_hz
         Lowest and highest 1× frequency in these segments.
     quality
-        Quality of the input; without a spectrum, its reason is that of the missing readings.
+        Quality of the input; without a spectrum, all readings are missing for its reason.
     n_integrations
-        Number of integrations of v_x and v_y to displacement.
+        Number of integrations of v_x and v_y to displacement, as in `dynamic_stiffness`.
     """
     if spectrum is None:
         return dict.fromkeys(NAMES, missing(quality.reason)), {}, None
@@ -120,7 +120,7 @@ def _damping_half_width(
 
 
 def _fit_quality(found: DynamicStiffness, max_delay_s: float, damping: float) -> Quality:
-    """Return the quality of the fit: uncertain with a channel delay or a poor fit."""
+    """Return the quality of the fit: uncertain if it shows a channel delay or is poor."""
     sure = coverage_factor((), 1.0 - FALSE_ALARM)
     limits_s = max_delay_s + abs(found.delay_per_damping) * damping
     if abs(found.delay_s) > limits_s + sure * found.delay_std_s:
@@ -134,9 +134,9 @@ def _fit_quality(found: DynamicStiffness, max_delay_s: float, damping: float) ->
 def _evidence(
     found: DynamicStiffness, bearing: Bearing, damping: float, quality: Quality
 ) -> dict[str, Budgeted]:
-    """Return coherence, lack of fit, number of lines, delay and bracket mass, with budgets.
+    """Return coherence, lack of fit, number of lines, delay and bracket mass with their budgets.
 
-    A fitted mass is proportional to the given stiffness of the bracket.
+    The error of the given bracket stiffness enters a fitted mass in proportion.
     """
     evidence: dict[str, Budgeted] = {}
     for axis, coherence, n_segments, lack_of_fit in zip(

@@ -1,4 +1,4 @@
-"""Table of the film stiffness estimators, check of their signs, and choice of the preferred one."""
+"""Table of the stiffness estimators, check of their results' signs, and choice of the best."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -10,15 +10,18 @@ from core.quality import Reading, Reason, missing, worst
 
 @dataclass(frozen=True)
 class EstimatorEntry:
-    """Quantities that an estimator reports for a direction, with "xx" or "yy" for axes.
+    """Names of the quantities that an estimator reports for a direction.
 
     Parameters
     ----------
     label
-        Displayed name.
-    stiffness, damping, coherence
-        Names of the quantities with a placeholder ``{axes}``, or ``{axis}`` ("x" or "y") for the
-        coherence. No damping for equation (5), which does not separate it from stiffness.
+        Displayed name of the estimator.
+    stiffness
+        Name with a placeholder ``{axes}`` for "xx" or "yy".
+    damping
+        Name as for `stiffness`; None for equation (5), which includes damping in stiffness.
+    coherence
+        Name with a placeholder ``{axis}`` for "x" or "y".
     """
 
     label: str
@@ -27,7 +30,7 @@ class EstimatorEntry:
     coherence: str
 
     def names(self, axes: str) -> tuple[str, ...]:
-        """Return the names of stiffness and, if reported, damping of a direction."""
+        """Return the names of stiffness and, if reported, damping for axes "xx" or "yy"."""
         return tuple(
             name.format(axes=axes) for name in (self.stiffness, self.damping) if name is not None
         )
@@ -63,7 +66,7 @@ ESTIMATORS: Mapping[Estimator, EstimatorEntry] = {
 }
 
 TRANSFERS = {line: Estimator(f"transfer_{line}") for line in LINES}
-"""`transfer` estimators by the prefix of their line."""
+"""`transfer` estimator of each line, by the prefix of the line's quantities."""
 
 DYNAMIC_COEFFICIENTS = tuple(
     tuple(
@@ -76,7 +79,7 @@ DYNAMIC_COEFFICIENTS = tuple(
 """Names of the coefficients of `dynamic`, (2, 4) as in `DynamicStiffness.coefficients`."""
 
 MODEL_DOUBTS = frozenset({Reason.POOR_FIT, Reason.CHANNEL_DELAY, Reason.ESTIMATORS_DISAGREE})
-"""Reasons for which the model of an estimator may be wrong, whatever the scatter of its results."""
+"""Quality reasons which mean that the model of an estimator may be wrong."""
 
 
 def preferred_stiffness(
@@ -84,12 +87,16 @@ def preferred_stiffness(
 ) -> tuple[Reading, Estimator | None]:
     """Return the stiffness of the first good estimator by preference, else the first with a value.
 
-    Values with few segments are not used: in a single segment, any noise is coherent. If the model
-    of a preferred estimator is doubted, its substitute is uncertain for the same reason, because
-    the cause may affect both.
+    Values with few segments are not used: in a single segment, any noise is coherent. If an earlier
+    estimator is not good for one of `MODEL_DOUBTS`, the chosen stiffness gets the same quality,
+    because the cause may affect both.
 
     Parameters
     ----------
+    readings
+        Readings by quantity.
+    preference
+        Estimators in order of preference.
     axes
         "xx" or "yy".
 
@@ -115,7 +122,7 @@ def preferred_stiffness(
 
 
 def signs_checked(readings: Mapping[str, Reading]) -> dict[str, Reading]:
-    """Replace readings with a reversed sign by missing readings with the reason `polarity`.
+    """Return the readings, with those of wrong sign replaced by missing ones, reason `polarity`.
 
     Direct stiffness and damping of a film are positive. If one transducer of a direction is
     reversed, the ratio of bearing to shaft motion changes its sign, and both become negative.
@@ -146,7 +153,9 @@ def signs_checked(readings: Mapping[str, Reading]) -> dict[str, Reading]:
 
 
 def is_reversed(readings: Mapping[str, Reading], axes: str) -> bool | None:
-    """Whether a transducer of a direction is reversed, by the best estimator with a result.
+    """Whether a transducer of a direction is reversed, according to the signs of its stiffness.
+
+    The first of `dynamic`, `transfer` of the vortex and `transfer` of 1× with a result decides.
 
     Parameters
     ----------
@@ -169,7 +178,7 @@ def is_reversed(readings: Mapping[str, Reading], axes: str) -> bool | None:
 
 
 def _is_negative(reading: Reading) -> bool:
-    """Whether a value is below zero by more than its uncertainty."""
+    """Whether a value and its 95 % interval, if known, are below zero."""
     if reading.value is None:
         return False
     return (reading.value if reading.interval_95 is None else reading.interval_95[1]) < 0.0

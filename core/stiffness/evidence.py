@@ -1,4 +1,4 @@
-"""Evidence for a stiffness at a spectral line: coherence and excitation."""
+"""Evidence required for a stiffness at a spectral line: coherence and excitation."""
 
 from dataclasses import dataclass
 
@@ -7,10 +7,10 @@ from core.spectra.cross_spectrum import CrossSpectrum
 from core.spectra.lines import SegmentSettings
 
 CHANCE = 1e-6
-"""Probability that independent noise reaches the coherence required for a stiffness."""
+"""Probability that independent noise reaches the coherence of `chance_coherence`."""
 
 MAX_RUNOUT_SHARE = 0.25
-"""Largest runout as a fraction of the shaft's amplitude; beyond it runout hides the motion."""
+"""Largest runout in a line as a fraction of the shaft's amplitude, for a usable shaft motion."""
 
 
 def chance_coherence(n_segments: float) -> float:
@@ -34,7 +34,7 @@ class EvidenceSettings(SegmentSettings):
     ----------
     min_coherence
         Smallest squared coherence of shaft and bearing motion for a stiffness. At 0.9, equation (5)
-        is 5 % too high if the incoherent part is noise of the bearing line.
+        is 5 % too high if the incoherent part is noise of the bearing channel.
     min_coverage
         Fraction of the possible segments below which a result is marked uncertain.
     """
@@ -51,10 +51,14 @@ def line_excitation(
     min_coherence: float = 0.9,
     runout_um_pk: float = 0.0,
 ) -> Reason:
-    """Return whether a line has enough motion for equation (5) and `transfer`; else the reason.
+    """Return OK if a line has enough motion for equation (5) and `transfer`, else the reason.
 
     Parameters
     ----------
+    line
+        Index of the line in the spectrum.
+    shaft, bearing
+        Indices of the two compared channels in the spectrum.
     min_coherence
         Smallest squared coherence of shaft and bearing motion.
     runout_um_pk

@@ -1,7 +1,7 @@
-"""Fitted film: its coherence, its random covariance, and bracket changes from its residual.
+"""Coherence and random covariance of a fitted film, and bracket changes from the residual force.
 
-Every estimate is linear in ``Σ_lines w Σ_segments conj(f u) e``, with the residual force e and the
-influence f u on the estimate, a linear form of the shaft's motion u.
+Every estimate is a linear function of ``Σ_lines w Σ_segments conj(f u) e``, with the weight w of a
+line, the residual force e, and the influence f of the shaft's motion u on the estimate.
 """
 
 from collections.abc import Sequence
@@ -32,7 +32,8 @@ PART_PRODUCTS: FloatArray = np.array(
         (0.0, 0.0, 0.0),
     ]
 ).T
-"""Correlation of real and imaginary parts of `FilmFit._parts` 0, 1 and 2 bins apart, (3, 12)."""
+"""Correlation between lines 0, 1 and 2 bins apart, (3, 12), of the real and imaginary parts of
+`FilmFit._parts`."""
 
 EACH_ROW = np.array([[0], [1]])
 BOTH_ROWS = np.array([[0, 1]])
@@ -52,7 +53,7 @@ class FilmFit:
     smoothing : (n_lines, n_lines)
         Matrix from `core.stiffness.film_fit.smoother`.
     smear_share : (n_lines, 2)
-        Integration error as a fraction of the bearing's power.
+        Power of the integration error as a fraction of the bearing's power.
     n_segments
         Number of independent segments.
     floor_std : (2,)
@@ -74,12 +75,12 @@ class FilmFit:
 
     @cached_property
     def film(self) -> ComplexArray:
-        """Dynamic stiffness of the film, (n_lines, 2, 2)."""
+        """Dynamic stiffness of the film in N/m, (n_lines, 2, 2)."""
         return self.equations.film(self.unknowns)
 
     @cached_property
     def residual(self) -> FloatArray:
-        """Power of the residual force, (n_lines, 2)."""
+        """Power of the residual force in (N/m)² µm², (n_lines, 2)."""
         return self.equations.residual(self.unknowns)
 
     @property
@@ -91,7 +92,7 @@ class FilmFit:
 
     @property
     def coherence_segments(self) -> FloatArray:
-        """Number of segments with which a single line's coherence is equally certain, (2,).
+        """Number of segments that makes a single line's coherence as certain as `coherence`, (2,).
 
         The unexplained fraction is residual over total power. Its error comes from each line's
         residual and power, with relative errors of ``1 / √n`` that are correlated by their ratio.
@@ -108,10 +109,10 @@ class FilmFit:
 
     @property
     def lack_of_fit(self) -> FloatArray:
-        """Coherence of the residual with the shaft's motion, relative to chance, (2,).
+        """Ratio of the residual's coherence with the shaft's motion to that by chance, (2,).
 
-        Its mean is 1 if stiffness and damping are constant over the lines: the residual is then
-        correlated with the shaft only by chance, according to `n_segments`.
+        The expected value is 1 if stiffness and damping are constant over the lines: the residual
+        is then correlated with the shaft only by chance, according to `n_segments`.
         """
         equations, ratio = self.equations, self.equations.ratio[:, np.newaxis, np.newaxis]
         # moments of the residual with (u_1, u_2, iω u_1, iω u_2): real part, then ratio × imaginary
@@ -145,7 +146,7 @@ class FilmFit:
         influences : (n_groups, n_rows, n_lines, n, 2)
             Influence of the shaft's motion on the estimates, through the residual of each row.
         rows : (n_groups or 1, n_rows)
-            Indices of the rows of `influences`.
+            Force direction of each row of `influences`: 0 for x, 1 for y.
         """
         parts = (influences @ self._parts[rows]).view(np.float64)
         of_rows = correlated_sum(parts, self.lines, PART_PRODUCTS).sum(axis=1)
@@ -160,7 +161,7 @@ class FilmFit:
 
     @cached_property
     def _parts(self) -> ComplexArray:
-        """Independent parts of the errors per influence, (2, n_lines, 2, 6).
+        """Six independent parts of the error per unit of influence, (2, n_lines, 2, 6).
 
         Integration errors of neighbouring lines cancel in the part of an influence in phase with a
         row's force. Their sizes use smoothed powers, which are free of the scatter of single lines.
@@ -189,7 +190,7 @@ class FilmFit:
         return np.concatenate(parts, axis=-1)
 
     def _smoothed(self, power: FloatArray) -> FloatArray:
-        """Return the power smoothed by local regression of its logarithm, along the first axis."""
+        """Return a power spectrum (n_lines, ...), smoothed by local regression of its logarithm."""
         smooth: FloatArray = np.exp(self.smoothing @ np.log(power))
         return smooth
 
@@ -207,12 +208,14 @@ def _hermitian_root(shaft: ComplexArray) -> ComplexArray:
 
 @dataclass(frozen=True)
 class BracketEstimate:
-    """Estimated changes of the bracket.
+    """Estimated changes of properties of the bracket.
 
     Parameters
     ----------
-    value, std : (n,)
-        Estimates and their random standard uncertainties.
+    value : (n,)
+        Estimates.
+    std : (n,)
+        Random standard uncertainties of the estimates.
     influences : (2, n_lines, n, 2)
         Influence of the shaft's motion on the estimates, through the residual of each row.
     """
@@ -226,8 +229,8 @@ class BracketEstimate:
 class BracketChanges:
     """Changes of the bracket's dynamic stiffness, and their estimation from the residual.
 
-    One Gauss-Newton step. It uses the shaft's motion through the fitted film instead of the
-    bearing's motion, whose noise would bias the estimates.
+    The estimation is one Gauss-Newton step. It uses the shaft's motion through the fitted film
+    instead of the bearing's motion, whose noise would bias the estimates.
 
     Parameters
     ----------
@@ -266,13 +269,13 @@ class BracketChanges:
         return information
 
     def follow(self, change: int, fitted: Sequence[int]) -> FloatArray:
-        """Return the response of the fitted changes to a unit of another change, (n_fitted,)."""
+        """Return the shift of fitted changes per unit of another, unfitted change, (n_fitted,)."""
         information = self._information
         step = np.linalg.solve(information[np.ix_(fitted, fitted)], information[fitted, change])
         return np.asarray(-step, dtype=np.float64)
 
     def estimate(self, fitted: Sequence[int]) -> BracketEstimate | None:
-        """Estimate the fitted changes jointly, all others fixed; None if they are inseparable."""
+        """Return joint estimates of the fitted changes; None if the data do not separate them."""
         information = self._information[np.ix_(fitted, fitted)]
         if not np.all(np.linalg.eigvalsh(information) > 0.0):
             return None
@@ -292,8 +295,10 @@ class BracketChanges:
 
         Parameters
         ----------
-        fitted, influences
-            Indices of the fitted changes, and the influences on their estimates.
+        fitted
+            Indices of the fitted changes.
+        influences
+            Influences on the estimates of these changes, as in `BracketEstimate`.
         """
         through = self.per[fitted].transpose(1, 2, 0)[:, np.newaxis, np.newaxis] @ influences
         for row in (0, 1):

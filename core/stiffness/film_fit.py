@@ -17,10 +17,11 @@ from core.spectra.cross_spectrum import BEARING_X
 from core.stiffness.dynamic_lines import conditional_power
 
 MIN_SHARE = 0.05
-"""Smallest fraction of motion in the shaft spectra; below, the noise-free part may be singular."""
+"""Smallest fraction of motion in the shaft spectra. With less, the spectra without noise may be
+singular."""
 
 ROUNDING = 1e-12
-"""Relative residual power of noise-free signals, from rounding."""
+"""Residual power of noise-free signals, due to rounding, as a fraction of the force's power."""
 
 SMOOTHING_REACH_BINS = 6
 """Number of bins to each side over which the residual spectrum is smoothed for the weights."""
@@ -33,7 +34,9 @@ N_UNKNOWNS = 4
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """Normal equations of each line; unknowns are stiffness and damping times `omega_unit`, N/m.
+    """Normal equations of the fit at each line.
+
+    The unknowns are stiffness and damping times `omega_unit`, both in N/m.
 
     Parameters
     ----------
@@ -69,7 +72,7 @@ class NormalEquations:
 
     @property
     def cross(self) -> ComplexArray:
-        """Cross-spectra of the bearing with the conjugated shaft, (n_lines, 2, 2)."""
+        """Cross-spectra of the bearing's with the shaft's (conjugated) motion, (n_lines, 2, 2)."""
         return self.matrix[:, BEARING_X:, :BEARING_X]
 
     @cached_property
@@ -94,22 +97,22 @@ class NormalEquations:
 
     @cached_property
     def force_power(self) -> FloatArray:
-        """Power of the bracket's force, for each row, (n_lines, 2)."""
+        """Power of the bracket's force in (N/m)² µm², for each row, (n_lines, 2)."""
         bearing = self.matrix[:, BEARING_X:, BEARING_X:]
         power = np.diagonal(bearing, axis1=1, axis2=2).real
         return np.asarray(np.abs(self.bracket_n_per_m[:, np.newaxis]) ** 2 * power)
 
     def moment(self, stiffness_n_per_m: ComplexArray) -> FloatArray:
-        """Return the moments of the shaft's motion with the force of brackets.
+        """Return the moments (..., n_lines, 2, 4) of the shaft's motion with the force of brackets.
 
-        Dynamic stiffnesses (..., n_lines) give moments (..., n_lines, 2, 4).
+        `stiffness_n_per_m` holds the dynamic stiffnesses of the brackets, (..., n_lines).
         """
         cross = stiffness_n_per_m[..., np.newaxis, np.newaxis] * self.cross
         scale = self.ratio[:, np.newaxis, np.newaxis]
         return np.concatenate([cross.real, scale * cross.imag], axis=-1)
 
     def solve(self, weight: FloatArray, right: FloatArray) -> FloatArray:
-        """Solve for the unknowns of both rows, (..., 2, 4).
+        """Return the unknowns of both rows that solve the normal equations, (..., 2, 4).
 
         Parameters
         ----------
@@ -141,7 +144,7 @@ class NormalEquations:
         return film
 
     def signal_share(self, weight: FloatArray) -> float:
-        """Return the fraction of motion in the weighted shaft spectra, worst direction and row."""
+        """Return the smallest fraction of motion in the weighted shaft spectra of any direction."""
         noise, motion = ((weight.T @ power).tolist() for power in self._powers)
         return min(1.0 - _largest_share(*row) for row in zip(noise, motion, strict=True))
 
@@ -164,7 +167,7 @@ def _gram(shaft: ComplexArray, ratio: FloatArray) -> FloatArray:
 
 
 def _largest_share(part: Sequence[float], whole: Sequence[float]) -> float:
-    """Return the largest ratio of two quadratic forms, symmetric (2, 2) matrices laid out flat."""
+    """Return the largest ratio of two quadratic forms, given as flat symmetric 2 × 2 matrices."""
     determinant = whole[0] * whole[3] - whole[1] ** 2
     if not determinant > ROUNDING * whole[0] * whole[3]:
         return 1.0
@@ -176,10 +179,10 @@ def _largest_share(part: Sequence[float], whole: Sequence[float]) -> float:
 
 
 def line_weights(equations: NormalEquations, smoothing: FloatArray) -> FloatArray | None:
-    """Return the reciprocal residual spectra as weights, (n_lines, 2), iterated with the film fit.
+    """Return the weights of the lines, (n_lines, 2): reciprocals of the smoothed residual power.
 
-    The first weights are from the bearing's power that is incoherent with the shaft, times the
-    coherence.
+    Fit and weights are iterated. The first weights are the reciprocals of the bearing's power that
+    is incoherent with the shaft, times the coherence.
 
     Parameters
     ----------
@@ -188,7 +191,7 @@ def line_weights(equations: NormalEquations, smoothing: FloatArray) -> FloatArra
 
     Returns
     -------
-    None if the shaft hardly moves.
+    None if the fraction of motion in the shaft spectra is below `MIN_SHARE`.
     """
     bearing = equations.matrix[:, BEARING_X:, BEARING_X:]
     rest = conditional_power(bearing, equations.shaft, equations.cross)
@@ -226,6 +229,6 @@ def smoother(lines: tuple[int, ...]) -> FloatArray:
 
 
 def _smoothed(smoothing: FloatArray, residual: FloatArray, force_power: FloatArray) -> FloatArray:
-    """Return the residual smoothed in the logarithm, as spectra of transducer noise are steep."""
+    """Return the residual power, smoothed as logarithm because noise spectra are steep."""
     smooth: FloatArray = np.exp(smoothing @ np.log(np.maximum(residual, ROUNDING * force_power)))
     return smooth

@@ -1,4 +1,4 @@
-"""Order line of a bearing: amplitudes, phases, equation (5) and `transfer`, with evidence."""
+"""Readings of a bearing at 1× or at the vortex: amplitudes, phases, equation (5), `transfer`."""
 
 import cmath
 import math
@@ -58,12 +58,13 @@ AMPLITUDES = {
 
 
 QualityOf = Callable[..., Quality | Reading]
-"""Function that returns the quality of a line of channels, or a missing reading with a reason."""
+"""Function of channel indices that returns the worst quality of the line in these channels, or a
+missing reading with the reason."""
 
 
 @dataclass(frozen=True)
 class OrderLine:
-    """Order line of one bearing, averaged over segments or polls.
+    """Spectral line of one bearing at 1× or at the vortex, averaged over segments or polls.
 
     Parameters
     ----------
@@ -77,13 +78,18 @@ class OrderLine:
         Cross-spectrum at the bins, for the noise floor around the line; None for polls.
     min_segments
         Smallest number of independent segments or polls for `transfer`.
-    phasors_um_pk, usable, has_phase : (n, 4)
-        For each segment or poll: the line's phasor, whether it is usable, whether its phase is
-        known.
-    at_mark_um_pk, has_mark : (n, 4)
-        1× phasors relative to the passage of the shaft's mark, and whether they are known.
+    phasors_um_pk : (n, 4)
+        Phasors of the line in each segment or poll.
+    usable : (n, 4)
+        Whether each phasor is usable.
+    has_phase : (n, 4)
+        Whether the phase of each phasor is known.
+    at_mark_um_pk : (n, 4)
+        1× phasors with the phase at the passage of the shaft's mark.
+    has_mark : (n, 4)
+        Whether each value of `at_mark_um_pk` is known.
     floors_um_pk
-        Line amplitude of each transducer's own noise, for (u_x, u_y, v_x, v_y).
+        Amplitude that each transducer's own noise gives the line, for (u_x, u_y, v_x, v_y).
     round_shafts
         Indices of the shaft channels whose runout was subtracted at 1×.
     """
@@ -109,14 +115,14 @@ class OrderLine:
         return float(self.orders.frequency_hz[self.at])
 
     def n_segments(self, first: int, last: int) -> int:
-        """Return the number of segments with two channels usable; for polls, of changed polls."""
+        """Return the number of segments, or changed polls, in which two channels are usable."""
         if self.bins is not None:
             return int(self.orders.n_segments[first, last])
         both = self.usable[:, first] & self.usable[:, last]
         return int(changed_polls(*np.abs(self.phasors_um_pk[both][:, [first, last]]).T).sum())
 
     def readings(self, quality_of: QualityOf) -> dict[str, Budgeted]:
-        """Return amplitudes, roundness, coherence, equation (5) and `transfer`, by quantity."""
+        """Return amplitudes, roundness, coherence and stiffnesses with budgets, by quantity."""
         found = {
             f"{name}_um_pk": self._amplitude(place, quality_of(place))
             for name, place in AMPLITUDES.items()
@@ -127,16 +133,16 @@ class OrderLine:
         return found
 
     def phases(self, quality_of: QualityOf) -> dict[str, Budgeted]:
-        """Return the phases of the mean 1× vectors from the mark, deg, positive if leading."""
+        """Return the phases of the mean 1× vectors, deg, positive if leading the shaft's mark."""
         return {
             f"{name}_phase_deg": self._phase(place, quality_of(place))
             for name, place in AMPLITUDES.items()
         }
 
     def axes_quality(self, rotation_sense: int) -> Quality:
-        """Return the quality of the axes: good unless shaft or bearing whirl against the rotation.
+        """Return the quality of the channels' axes: not good if the whirl contradicts the rotation.
 
-        Only lines above the noise floor are checked.
+        Only motion above the noise floor is checked.
         """
         return worst(
             self._pair_quality(x, y, rotation_sense)
@@ -154,7 +160,7 @@ class OrderLine:
         return bool((self.usable & self.has_phase).all(axis=1).any())
 
     def _runout_um_pk(self, place: int) -> float:
-        """Return the largest runout in a channel's line; the vortex line is free of runout."""
+        """Return the largest runout in the line of a channel, µm 0-pk; zero for the vortex."""
         is_shaft = place in (SHAFT_X, SHAFT_Y)
         free = not is_shaft or self.line != ORDER1 or place in self.round_shafts
         return 0.0 if free else self.bearing.runout_um_pk
@@ -316,20 +322,20 @@ class OrderLine:
         return Reason.OK if few and reason is Reason.FEW_SEGMENTS else reason
 
     def _common(self, shaft: int, bearing: int) -> tuple[FloatArray, FloatArray]:
-        """Return shaft and bearing amplitudes where both are usable and the shaft moves."""
+        """Return both amplitudes of the polls with usable channels and shaft motion, each (n,)."""
         amplitudes = np.abs(self.phasors_um_pk)
         both = self.usable[:, shaft] & self.usable[:, bearing] & (amplitudes[:, shaft] > 0.0)
         return amplitudes[both, shaft], amplitudes[both, bearing]
 
     def _across(self, shaft: int) -> float:
-        """Return the ratio of transverse shaft motion to motion in a direction; 1 if unknown."""
+        """Return the ratio of transverse shaft amplitude to that of a channel; 1 if unknown."""
         power = self.orders.power[self.at]
         across = SHAFT_Y if shaft == SHAFT_X else SHAFT_X
         along, beside = float(power[shaft, across]), float(power[across, shaft])
         return (beside / along) ** 0.5 if along > 0.0 else 1.0
 
     def _stands_out(self, place: int) -> bool:
-        """Whether the line exceeds the noise floor around it, which excludes the order lines."""
+        """Whether a channel's line exceeds the noise floor of the bins around it; no for polls."""
         if self.bins is None:
             return False
         lines_hz = self.orders.frequency_hz
@@ -342,7 +348,7 @@ NOT_MEASURED: Budgeted = (missing(Reason.NOT_MEASURED), None)
 
 
 def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
-    """Return the frequency of a line to mark in a spectrum; None without a line in its band.
+    """Return the frequency in Hz at which a spectrum shows a line; None without one in its band.
 
     Parameters
     ----------
@@ -354,7 +360,7 @@ def marked_hz(readings: Mapping[str, Reading], line: str) -> float | None:
 
 
 def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: FloatArray) -> float:
-    """Return the median power of a channel around a line, µm².
+    """Return the median power of a channel's bins around a line, µm².
 
     Parameters
     ----------
@@ -375,14 +381,14 @@ def floor_power(bins: CrossSpectrum, place: int, line_hz: float, lines_hz: Float
 def other_line_hz(
     bins: CrossSpectrum, turn_hz: float, band_hz: tuple[float, float], min_line_to_floor: float
 ) -> float | None:
-    """Return the frequency of a coherent line of shaft and bearing below 1×, off the vortex band.
+    """Return the frequency in Hz of a coherent line below 1× outside the vortex band.
 
     Parameters
     ----------
     bins
         Cross-spectrum at evenly spaced frequencies.
     band_hz
-        Vortex band.
+        Vortex band, which is left out.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Film stiffness at one line and its uncertainty budget: equation (5) and `transfer`."""
+"""Film stiffness at one line by equation (5) and `transfer`, with uncertainty budgets."""
 
 import math
 from collections.abc import Callable
@@ -68,7 +68,7 @@ def effective_stiffness_n_per_m(
 
 
 def motion_across(spectrum: CrossSpectrum, line: int, shaft: int) -> complex:
-    """Return the ratio of coherent transverse shaft motion to that in a direction; 1 if unknown."""
+    """Return the ratio of coherent motion across a shaft channel to that along it; 1 if unknown."""
     across = SHAFT_Y if shaft == SHAFT_X else SHAFT_X
     power = float(spectrum.power[line, shaft, across])
     return complex(spectrum.matrix[line, across, shaft]) / power if power > 0.0 else 1.0
@@ -86,8 +86,8 @@ def ratio_budget(
 ) -> Budget | None:
     """Return the stiffness by equation (5), ``|X_b| / |U| k_b``, with its uncertainty budget.
 
-    The incoherent part may be in either amplitude: the ratio may be high or low by 1/γ - 1.
-    Equation (5) neglects the bracket's inertia; the budget contains its largest effect.
+    The incoherent part may be in either amplitude, so the ratio may be too high or too low by the
+    fraction 1/γ - 1. The budget contains the largest effect of the neglected bracket inertia.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def polls_ratio_budget(
     shaft_um_pk, bearing_um_pk : (n_polls,)
         Amplitudes of the same polls; shaft amplitudes are positive.
     coherence
-        Squared coherence of shaft and bearing; without phases, the smallest accepted for waveforms.
+        Squared coherence of shaft and bearing; if it is unknown, the smallest accepted one.
     n_effective
         Effective number of independent polls.
     runout_um_pk
@@ -176,8 +176,8 @@ def _ratio_lines(
 ) -> tuple[BudgetLine, ...]:
     """Return the systematic contributions to equation (5).
 
-    `runout_of_um_pk` is the runout and the shaft's amplitude; `coherence` is the name of its
-    contribution and the squared coherence.
+    `runout_of_um_pk` holds the runout and the shaft's amplitude; `coherence` holds the name of the
+    budget line for incoherence and the squared coherence.
     """
     runout_um_pk, shaft_um_pk = runout_of_um_pk
     inertia = bracket.max_mass_kg * (2.0 * math.pi * frequency_hz) ** 2 / bracket.stiffness_n_per_m
@@ -192,14 +192,14 @@ def _ratio_lines(
 
 
 def changed_polls(shaft_um_pk: FloatArray, bearing_um_pk: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return a mask of the polls that differ from the previous poll in an amplitude, (n_polls,)."""
+    """Return a mask, (n_polls,), of the polls with an amplitude unlike that of the poll before."""
     changed = np.ones(shaft_um_pk.size, dtype=np.bool_)
     changed[1:] = (np.diff(shaft_um_pk) != 0.0) | (np.diff(bearing_um_pk) != 0.0)
     return changed
 
 
 def mass_half_width_kg(bracket: BracketDynamics, accuracy: BearingAccuracy) -> float:
-    """Return the half-width of the bracket's mass; the largest plausible mass if it is unknown."""
+    """Return the half-width of the error of the bracket's mass; its largest value if unknown."""
     share = 1.0 if bracket.mass_kg is None else accuracy.bracket_mass
     return share * bracket.max_mass_kg
 
@@ -207,7 +207,7 @@ def mass_half_width_kg(bracket: BracketDynamics, accuracy: BearingAccuracy) -> f
 def damping_half_width_n_s_per_m(
     bracket: BracketDynamics, mass_kg: float, accuracy: BearingAccuracy
 ) -> float:
-    """Return the half-width of the bracket's damping."""
+    """Return the half-width of the error of the bracket's damping, for a bracket mass."""
     return 2.0 * accuracy.bracket_damping * math.sqrt(bracket.stiffness_n_per_m * mass_kg)
 
 
@@ -221,7 +221,7 @@ def transfer_budgets(
     n_segments: float | None = None,
     runout_um_pk: float = 0.0,
 ) -> tuple[Budget, Budget] | None:
-    """Return stiffness in N/m and damping in N·s/m of a film by `transfer`, with their budgets.
+    """Return the budgets, with values, of stiffness (N/m) and damping (N·s/m) by `transfer`.
 
     The H1 estimate with the shaft's motion as input is not biased by bearing noise. It contains one
     direction only: with cross-coupling, it gives ``k_xx + k_xy · u_y / u_x``.
@@ -255,7 +255,7 @@ def transfer_budgets(
     any_phase = abs(film) * (1.0 + 1.0j)  # of unknown phase: real or imaginary
 
     def budget(value: float, std: float, part: Callable[[complex], float]) -> Budget:
-        """Return the budget of a linear function of the film's dynamic stiffness."""
+        """Return the budget of `part`, a linear function of the film's dynamic stiffness."""
         return Budget(
             value,
             (

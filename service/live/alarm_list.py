@@ -1,4 +1,4 @@
-"""`AlarmList`: list of alarms for API, metrics and reports, and its counts."""
+"""`AlarmList`: list of all alarms for API, metrics and reports, and numbers of alarms by state."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ class AlarmCount:
     n_danger
         Number of active alarms at danger level that are not hidden.
     n_unacknowledged
-        Number of alarms that are not hidden, with an unacknowledged newest occurrence.
+        Number of alarms that are not hidden and whose newest occurrence is not acknowledged.
     n_hidden
         Number of alarms that are shelved, suppressed or out of service.
     n_unjudged
-        Number of alarms neither active nor hidden, without a current condition.
+        Number of alarms that are neither active nor hidden, and whose condition is now unknown.
     """
 
     n_active: int
@@ -37,7 +37,7 @@ class AlarmCount:
 
 
 def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> AlarmCount:
-    """Return the number of alarms by state."""
+    """Return the number of alarms by state; `is_judged` as in `AlarmList`."""
     shown = [alarm for alarm in alarms if alarm.state not in HIDDEN]
     return AlarmCount(
         n_active=sum(alarm.level is not None for alarm in shown),
@@ -49,21 +49,21 @@ def count_of(alarms: Sequence[Alarm], is_judged: Callable[[Alarm], bool]) -> Ala
 
 
 class AlarmList(Protocol):
-    """List of all alarms, from `AlarmEngine` in this process or from states of other processes."""
+    """List of all alarms, from `AlarmEngine` in this process or states of other processes."""
 
     @property
     def revision(self) -> int:
-        """Revision number; changes with every change of an alarm."""
+        """Revision number of the list; changes whenever an alarm changes."""
         ...
 
     @property
     def chatter_rule(self) -> ChatterRule:
-        """Definition of chattering alarms."""
+        """Number of occurrences within a time that makes an alarm count as chattering."""
         ...
 
     @property
     def alarms(self) -> Sequence[Alarm]:
-        """All alarms, in any state."""
+        """All alarms in all states, including hidden ones."""
         ...
 
     def alarm(self, id_: str) -> Alarm:
@@ -71,11 +71,11 @@ class AlarmList(Protocol):
         ...
 
     def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether the condition of an alarm is currently known."""
+        """Return whether the condition of an alarm is currently known to be true or false."""
         ...
 
     def is_chattering(self, alarm: Alarm) -> bool:
-        """Return whether an alarm was raised too often recently."""
+        """Return whether an alarm was recently raised too often, by `chatter_rule`."""
         ...
 
     def count(self) -> AlarmCount:
@@ -85,7 +85,7 @@ class AlarmList(Protocol):
 
 @dataclass(frozen=True)
 class EvidenceStatus:
-    """Number of evidence bundles since the start, and the present write error or None."""
+    """Numbers of evidence bundles since the service started; present write error or None."""
 
     error: str | None
     n_waiting: int

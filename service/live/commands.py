@@ -1,4 +1,4 @@
-"""Commands of operators and engineers to the measuring process, and their errors."""
+"""Commands of operators and engineers to the measuring process, and the errors they can cause."""
 
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -13,7 +13,7 @@ from service.store.baselines import BaselineEntry, BaselineStep, StoredStep, Ver
 
 @dataclass(frozen=True)
 class FilmPlace:
-    """Film of a bearing, with the estimator of its stiffness."""
+    """Identification of a bearing's oil film: unit, bearing id, and estimator of the stiffness."""
 
     unit: str
     bearing: str
@@ -21,36 +21,36 @@ class FilmPlace:
 
 
 class BaselineRefusedError(ValueError):
-    """An action does not fit the state of the baselines; the message states why."""
+    """An action is not possible in the present state of the baselines; the message says why."""
 
 
 @dataclass(frozen=True)
 class Accept:
-    """Put a baseline version in force."""
+    """Put a version of a baseline in force; readings are then compared with this version."""
 
     version: int
 
 
 @dataclass(frozen=True)
 class Reject:
-    """Withdraw a baseline version; it is never put in force automatically again."""
+    """Reject a version of a baseline, even if in force; it is not put in force automatically."""
 
     version: int
 
 
 @dataclass(frozen=True)
 class Freeze:
-    """Stop learning of baselines of a bearing."""
+    """Stop learning new baselines of a bearing."""
 
 
 @dataclass(frozen=True)
 class Thaw:
-    """Resume learning of baselines of a bearing."""
+    """Resume learning new baselines of a bearing."""
 
 
 @dataclass(frozen=True)
 class Renew:
-    """Learn a new baseline after a machine event such as an overhaul, without older readings."""
+    """Learn a new baseline from readings after `from_ns`, the time of an overhaul or the like."""
 
     from_ns: int
 
@@ -67,17 +67,21 @@ def baseline_step(
     reason: str,
     now_ns: int,
 ) -> StoredStep:
-    """Return the baseline step to store for an action.
+    """Return the entry of the baseline history to store for an action.
 
     Parameters
     ----------
+    versions
+        Present state of the bearing's baselines.
     entries
         All baselines of the bearing.
+    actor, reason
+        Who ordered the action, and why; stored with the entry.
 
     Raises
     ------
     BaselineRefusedError
-        If the action does not fit the state of the baselines.
+        If the action is not possible in the present state of the baselines.
     """
     version: int | None = versions.in_force
     from_ns: int | None = None
@@ -133,12 +137,12 @@ def _require_acceptable(
 
 
 class UnreadableCommandError(Exception):
-    """The command cannot be read by this version of the program."""
+    """A stored command cannot be decoded by this version of the program."""
 
 
 @dataclass(frozen=True)
 class AlarmCommand:
-    """Action on an alarm."""
+    """Command to apply an action to the alarm with an id."""
 
     alarm: str
     action: Action
@@ -146,7 +150,7 @@ class AlarmCommand:
 
 @dataclass(frozen=True)
 class BaselineCommand:
-    """Action on the baselines of a bearing."""
+    """Command to apply an action to the baselines of a bearing, with actor and stated reason."""
 
     place: FilmPlace
     action: BaselineAction
@@ -156,7 +160,7 @@ class BaselineCommand:
 
 @dataclass(frozen=True)
 class ReferenceCommand:
-    """Notice that a 1× reference of a unit was stored."""
+    """Notice to the process that a 1× reference of a unit was stored."""
 
     unit: str
 
@@ -179,7 +183,7 @@ _REFERENCE = TypeAdapter(ReferenceCommand)
 
 
 def encoded(command: OperatorCommand) -> tuple[str, str]:
-    """Return the kind and the JSON document of a command."""
+    """Return the kind of a command (the name of its class or action) and its JSON document."""
     if isinstance(command, ReferenceCommand):
         return ReferenceCommand.__name__, _REFERENCE.dump_json(command).decode()
     kind = type(command.action).__name__
@@ -190,7 +194,7 @@ def encoded(command: OperatorCommand) -> tuple[str, str]:
 
 
 def decoded(kind: str, document: str) -> OperatorCommand:
-    """Return the command of a kind and a JSON document.
+    """Return the command from kind and JSON document, as returned by `encoded`.
 
     Raises
     ------
@@ -210,11 +214,11 @@ def decoded(kind: str, document: str) -> OperatorCommand:
 
 
 class NotAvailableError(Exception):
-    """The data exist only in the process that analyses the unit; the message names the data."""
+    """Requested data exist only in the process that analyses the unit; the message names them."""
 
 
 class CommandFailedError(Exception):
-    """The command was not carried out or not stored; the message states which."""
+    """A command was not carried out or not stored; `title` and message state which and why."""
 
     def __init__(self, title: str, detail: str) -> None:
         super().__init__(detail)

@@ -20,7 +20,7 @@ RECENT_DAYS = 7.0
 
 @dataclass(frozen=True)
 class ReadingCounts:
-    """Number of readings of the last `RECENT_DAYS`; each count includes the following ones.
+    """Numbers of stiffness readings of a film in the last `RECENT_DAYS` days, by usability.
 
     Parameters
     ----------
@@ -29,9 +29,10 @@ class ReadingCounts:
     n_settled
         Readings in a settled operating state.
     n_complete
-        Settled readings with stiffness and condition, in the direction with fewer readings.
+        Settled readings with stiffness and operating condition, in the direction (x or y) with
+        fewer such readings.
     n_judged
-        Readings with a verdict on the film.
+        Readings with a verdict on the film, in the direction with fewer such readings.
     """
 
     n_at_speed: int
@@ -47,12 +48,14 @@ class LearningProgress:
     Parameters
     ----------
     since_ns, until_ns
-        Learning period; None before the first reading.
+        Start and end of the learning period, UTC nanoseconds; None before the first reading.
+    is_over
+        Whether the learning period has ended.
     n_readings, n_days
-        Number of usable readings, and of days with such readings, in the direction with fewer
-        readings; None after a baseline was learned in this period.
+        Number of usable readings, and of days with such readings, in the direction (x or y) with
+        fewer readings; None after a baseline was learned in this period.
     recent
-        Counts of the newest readings.
+        Numbers of readings in the last `RECENT_DAYS` days.
     """
 
     since_ns: int | None
@@ -71,7 +74,7 @@ def learning_progress(
     settings: FilmAlarmSettings,
     now_ns: int,
 ) -> LearningProgress:
-    """Return the progress of learning; ``entries`` are all baselines of the bearing."""
+    """Return the progress of learning a baseline; ``entries`` are all baselines of the bearing."""
     recent = _recent(store, place, settings, now_ns)
     since_ns = versions.renewed_ns
     if since_ns is None:
@@ -93,7 +96,7 @@ def learning_progress(
 def _counts(
     store: FilmStore, place: FilmPlace, since_ns: int, until_ns: int, settings: FilmAlarmSettings
 ) -> tuple[int, int]:
-    """Return the number of usable readings and of days with such readings."""
+    """Return `LearningProgress.n_readings` and `n_days` over a learning period."""
     found = store.history(
         FilmQuery(place.unit, place.bearing, place.estimator, since_ns, until_ns + 1)
     )
@@ -122,6 +125,6 @@ def _recent(
 
 
 def _complete(found: FilmHistory, settings: FilmAlarmSettings) -> list[npt.NDArray[np.bool_]]:
-    """Return for each direction whether readings have stiffness and condition (n,)."""
+    """Return masks of the readings with stiffness and operating condition, (n,) per direction."""
     is_known = settings.baseline.settings().is_known(found.history.conditions)
     return [is_known & (outcome == ReadingOutcome.MEASURED) for outcome in found.history.outcome]

@@ -13,14 +13,14 @@ from core.samples.gaps import SampleAccount
 from service.live.samples import BlockHistory
 
 HELD_S = 10.0
-"""Duration of the samples held for each unit, seconds."""
+"""Duration of the newest samples held for each unit, in seconds."""
 
 HELD_SAMPLES = 2_000_000
 """Maximum number of held samples over all channels of a unit."""
 
 
 class LinkState(StrEnum):
-    """State of the link to a unit."""
+    """State of the link to the device of a unit."""
 
     CONNECTING = "connecting"
     CONNECTED = "connected"
@@ -30,20 +30,22 @@ class LinkState(StrEnum):
 
 @dataclass(frozen=True)
 class UnitStatus:
-    """Status of the link and of the samples of a unit.
+    """Status of the link to a unit's device, and of the samples received from it.
 
     Parameters
     ----------
     reason
-        Reason why the unit is not connected, or None.
+        Reason why the device is not connected, or None.
     since_ns
-        Start of the present link state.
+        Start of the present link state, UTC nanoseconds since 1970.
     last_sample_ns
-        Time of the newest sample by the device clock.
+        End of the newest block by the time stamps of its samples, UTC nanoseconds since 1970.
     received_s
-        Monotonic time of arrival of the newest sample.
+        Arrival time of the newest block by a monotonic clock, s; None before the first block.
+    account
+        Balance of the samples that the device offered.
     clock
-        Offset and drift of the device clock, if known.
+        Offset and drift of the device clock; None if unknown.
     stamp_fault
         Reason why the time stamp of the newest block was not used, or None.
     n_failed
@@ -63,10 +65,12 @@ class UnitStatus:
 
 @dataclass(frozen=True)
 class CurrentBearing:
-    """Newest result of a bearing; without values in its readings if not current.
+    """Newest result of a bearing; if it is not current, all readings are missing.
 
     Parameters
     ----------
+    assessment
+        Newest result, current or not; None before the first result.
     age_s
         Age of the newest result in seconds; None before the first result.
     """
@@ -79,7 +83,7 @@ class CurrentBearing:
 
 
 class LiveView:
-    """Newest state of all units; the analysis writes, the API reads, in one event loop.
+    """Newest state of all units, written by the analysis and read by the API in one event loop.
 
     Parameters
     ----------
@@ -101,12 +105,12 @@ class LiveView:
         self.unstored_reason: str | None = None
 
     def note_unstored(self, n_findings: int, reason: str) -> None:
-        """Count findings that are lost because they could not be stored."""
+        """Add to the number of findings lost because they could not be stored; keep the reason."""
         self.n_unstored += n_findings
         self.unstored_reason = reason
 
     def set_link(self, unit: str, state: LinkState, reason: str | None = None) -> bool:
-        """Set the state of a link; return whether it changed."""
+        """Set the state of a unit's link and its reason; return whether the state changed."""
         before = self._status[unit]
         if state is LinkState.NOT_CONNECTED:
             before = self._status[unit] = replace(before, n_failed=before.n_failed + 1)
@@ -120,7 +124,7 @@ class LiveView:
     def set_received(
         self, block: SampleBlock, account: SampleAccount, sampled_s: float | None = None
     ) -> None:
-        """Set the newest block of a unit; ``sampled_s`` is its arrival time, by default now."""
+        """Set the newest block of a unit; ``sampled_s`` is its monotonic arrival time, else now."""
         if block.unit not in self._blocks:
             most = HELD_SAMPLES // max(block.counts.shape[0], 1)
             self._blocks[block.unit] = BlockHistory(min(round(HELD_S * block.rate_hz), most))
@@ -135,27 +139,27 @@ class LiveView:
         )
 
     def set_assessment(self, assessment: Assessment, sampled_s: float | None = None) -> None:
-        """Set the newest result; ``sampled_s`` is the arrival of its samples, by default now."""
+        """Set the newest result; ``sampled_s`` is its samples' monotonic arrival time, else now."""
         self.revision += 1
         key = (assessment.unit, assessment.bearing)
         since_s = self._clock.monotonic_s() if sampled_s is None else sampled_s
         self._assessments[key] = (since_s, assessment)
 
     def status(self, unit: str) -> UnitStatus:
-        """Return the status of the samples of a unit."""
+        """Return the status of the link and the samples of a unit."""
         return self._status[unit]
 
     def blocks(self, unit: str) -> list[SampleBlock]:
-        """Return the held blocks of a unit, oldest first, current or not."""
+        """Return the held blocks of a unit, oldest first; they may be out of date."""
         return list(self._blocks.get(unit, ()))
 
     def newest_block(self, unit: str) -> SampleBlock | None:
-        """Return the newest block of a unit, current or not; None before the first block."""
+        """Return the newest block of a unit, possibly out of date; None before the first block."""
         blocks = self.blocks(unit)
         return blocks[-1] if blocks else None
 
     def why_no_samples(self, unit: str) -> Reason | None:
-        """Return the reason why the samples of a unit are not current; None if they are current."""
+        """Return the reason why a unit's samples are out of date; None if they are current."""
         return self._why_not_current(unit, self.data_age_s(unit))
 
     def data_age_s(self, unit: str) -> float | None:
@@ -164,12 +168,12 @@ class LiveView:
         return None if received_s is None else self._clock.monotonic_s() - received_s
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """Return the newest result of a bearing, current or not; None before the first result."""
+        """Return the newest result of a bearing, possibly out of date; None before the first."""
         entry = self._assessments.get((unit, bearing))
         return entry[1] if entry else None
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:
-        """Return the newest result of a bearing, without values if it is not current."""
+        """Return the newest result of a bearing; all readings are missing if it is out of date."""
         entry = self._assessments.get((unit, bearing))
         age_s = None if entry is None else self._clock.monotonic_s() - entry[0]
         reason = self._why_not_current(unit, age_s)

@@ -1,4 +1,4 @@
-"""Newest samples of a unit, and windows of samples with gaps filled by NaN."""
+"""Newest sample blocks of a unit, and windows of their samples with NaN in place of gaps."""
 
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,7 +18,7 @@ class BlockHistory:
     Parameters
     ----------
     n_samples
-        Number of samples per channel to hold; at most one more block is held.
+        Smallest number of samples per channel to hold, once received.
     """
 
     def __init__(self, n_samples: int) -> None:
@@ -31,7 +31,7 @@ class BlockHistory:
         return iter(self._blocks)
 
     def add(self, block: SampleBlock) -> bool:
-        """Add a block and drop old blocks; return False for a repeated block."""
+        """Add a block and drop old blocks; return False, without adding, for a repeated block."""
         if self._blocks:
             newest = self._blocks[-1]
             if block.epoch == newest.epoch and block.stop_index <= newest.stop_index:
@@ -50,11 +50,11 @@ class SampleWindow:
     Parameters
     ----------
     samples
-        Samples of each channel, by id (n_samples,); NaN for missing or bad samples.
+        Samples of each channel, (n_samples,) in its unit, by id; NaN for missing or bad samples.
     slow
-        Mean of each slow channel.
+        Mean of each slow channel, by id.
     quality
-        Worst quality of each channel over the blocks, by id.
+        Worst quality of each channel over all blocks of the window, by id.
     """
 
     epoch: int
@@ -70,7 +70,7 @@ class SampleWindow:
         return None if channel is None else self.samples.get(channel)
 
     def mean_of(self, slow_channel: str | None) -> Reading:
-        """Return the mean reading of a slow channel; missing without such a channel."""
+        """Return the mean of a slow channel; a missing reading for None or an unknown channel."""
         return self.slow.get(slow_channel or "", missing(Reason.NOT_MEASURED))
 
 
@@ -81,14 +81,14 @@ def sample_window(
     n_samples: int,
     stamp: SampleBlock | None = None,
 ) -> SampleWindow:
-    """Return the window of samples from a list of blocks.
+    """Return the window of `n_samples` samples from `first_index` on.
 
     Parameters
     ----------
     blocks
         At least one block, oldest first, all of one epoch; they may extend beyond the window.
     rows
-        Row of each channel in the blocks, by id.
+        Row in the blocks of each channel to return, by id.
     stamp
         Block whose time stamp determines the start time; by default, the oldest block.
     """
@@ -115,14 +115,14 @@ def sample_window(
 def newest_blocks(
     blocks: Sequence[SampleBlock], n_samples: int
 ) -> tuple[list[SampleBlock], int, int]:
-    """Return the blocks of the newest samples, and the first index and number of the samples.
+    """Return the blocks with the newest samples, the samples' first index, and their number.
 
     Parameters
     ----------
     blocks
         At least one block, oldest first.
     n_samples
-        Requested number of samples; fewer are returned if fewer are held.
+        Requested number of samples; the returned number is smaller if the blocks have fewer.
     """
     newest = blocks[-1]
     since = newest.stop_index - n_samples

@@ -1,4 +1,4 @@
-"""`UnitState`: state of a unit as its process publishes it through the database."""
+"""`UnitState`: state of a unit, published in the database by the process that analyses the unit."""
 
 import zlib
 from collections.abc import Mapping
@@ -20,16 +20,16 @@ from core.uncertainty import Budget
 from service.live.live_view import UnitStatus
 
 MAX_BYTES = 16_000_000
-"""Maximum size of a decompressed document; many times the size for the largest unit."""
+"""Maximum size in bytes of a decompressed document, many times that of the largest unit."""
 
 
 class UnreadableStateError(Exception):
-    """The published state is damaged, or from another version of the program."""
+    """A published state of a unit is damaged, or from another version of the program."""
 
 
 @dataclass(frozen=True)
 class BearingState:
-    """Newest result of a bearing, without arrays."""
+    """Newest result of a bearing: an `Assessment` without spectrum, orbit and recent values."""
 
     time_ns: int
     window: AveragingWindow
@@ -46,7 +46,7 @@ class BearingState:
 
 @dataclass(frozen=True)
 class FilmState:
-    """Newest reading of a film and its findings."""
+    """Newest reading of an oil film, and its finding in each direction (x, y)."""
 
     reading: FilmReading
     findings: tuple[FilmFinding, FilmFinding]
@@ -61,9 +61,9 @@ class UnitState:
     alarms
         All alarms of the unit.
     judged, chattering
-        Ids of the alarms whose condition is known, and of the chattering alarms.
+        Ids of the alarms whose condition is now known, and of the chattering alarms.
     baselines
-        Baseline version in force, by bearing.
+        Baseline version in force, by bearing id.
     """
 
     bearings: Mapping[str, BearingState]
@@ -80,14 +80,17 @@ class UnitSigns:
 
     Parameters
     ----------
-    data_age_s, result_ages_s
-        Age of the newest samples, and of the newest result of each bearing.
+    data_age_s
+        Age of the newest samples in seconds; None before the first.
+    result_ages_s
+        Age of the newest result in seconds, by bearing id.
     n_unstored
         Number of findings that the process could not store.
     store_error
-        Present error of the database in the process, or None.
+        Present error of the database in the process that analyses the unit, or None.
     said_s
-        Monotonic time of this state in the process; None in states of older versions.
+        Monotonic time of the process at which the state was published; None in states of older
+        versions.
     """
 
     status: UnitStatus
@@ -105,7 +108,7 @@ _SIGNS = TypeAdapter(tuple[UnitSigns], config=_WITH_NAN)
 
 
 def packed_state(state: UnitState) -> bytes:
-    """Return a state as a compressed document."""
+    """Return the state as a zlib-compressed JSON document."""
     return zlib.compress(_STATE.dump_json((state,)), level=1)
 
 
@@ -128,7 +131,7 @@ def unpacked_state(document: bytes) -> UnitState:
 
 
 def written_signs(signs: UnitSigns) -> str:
-    """Return the frequently changing state as JSON."""
+    """Return the continuously changing state as a JSON document."""
     return _SIGNS.dump_json((signs,)).decode()
 
 
