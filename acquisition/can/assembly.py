@@ -21,8 +21,8 @@ from core.samples.axis import Epochs, SampleAxis
 from core.units import NS_PER_S
 
 MAX_UNSURE_S = 1.0
-"""Longest delay of samples, s. Samples that stay late for longer show that others were lost, or
-that the device had stopped."""
+"""Longest time, s, for which samples may stay late by the host's clock. A longer delay shows that
+other samples were lost, or that the device had stopped."""
 
 _OTHER_LOSS_S = 0.25
 """Increase of the delay, s, that shows a further loss of samples."""

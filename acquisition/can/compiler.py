@@ -1,4 +1,4 @@
-"""Compilation of settings, calibration and DBC into a plan; reports mismatches at the start."""
+"""Compilation of settings, calibration and DBC file, if they match, into a decoding plan."""
 
 from collections.abc import Mapping
 

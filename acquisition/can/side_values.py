@@ -1,4 +1,4 @@
-"""Side values with their validity in samples; raw blocks of samples with side values."""
+"""Side values (slow values, OK bits, time stamps) by sample; raw blocks of samples with them."""
 
 import itertools
 from bisect import bisect_right
@@ -30,7 +30,7 @@ _US_PER_S = 1_000_000
 _START = itemgetter(0)
 
 _Entry = tuple[int, float, int | None]
-"""First sample, value, validity in samples; None if the quantity `HOLD` sets the validity."""
+"""First sample, value, and validity in samples (None if the quantity `HOLD` sets it)."""
 
 
 class SideTable:
@@ -57,7 +57,7 @@ class SideTable:
             del entries[0]
 
     def forget_before(self, index: int) -> None:
-        """Delete the values that no sample from an index on needs."""
+        """Delete the values that were replaced at or before a sample index."""
         for entries in self._entries.values():
             del entries[: max(0, bisect_right(entries, index, key=_START) - 1)]
 
@@ -67,11 +67,14 @@ class SideTable:
         return None if entry is None or index >= self._stop(entry) else entry[1]
 
     def cuts(self, first: int, stop: int) -> list[int]:
-        """Return the sample indices between two samples at which any value starts or expires."""
+        """Return the sample indices between `first` and `stop` where a value starts or expires."""
         return sorted({index for index in self._changes(first, stop) if first < index < stop})
 
     def stamp_ns(self, index: int) -> int | None:
-        """Return the UTC time of a sample by the last device time stamp; None without a stamp."""
+        """Return the UTC time of a sample in ns since 1970; None without a device time stamp.
+
+        The time is extrapolated from the last time stamp up to the sample.
+        """
         seconds = self._entries.get(SECONDS, [])
         for start, second, _ in reversed(seconds[: bisect_right(seconds, index, key=_START)]):
             part = self._entry(MICROSECONDS, start)
@@ -122,7 +125,13 @@ class RawBlockBuilder:
         self._rejected.clear()
 
     def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[RawBlock]:
-        """Return raw blocks of instants of one epoch in index order, arrived by `arrived_ns`."""
+        """Return the raw blocks of sample instants of one epoch, which are in index order.
+
+        Parameters
+        ----------
+        arrived_ns
+            Arrival of the last instant, UTC in ns since 1970.
+        """
         blocks = []
         if instants:  # the last instant has the smallest delay
             self._stamps.add(instants[-1].epoch, instants[-1].stop_index, arrived_ns)

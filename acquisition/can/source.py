@@ -29,10 +29,10 @@ _PAUSE_S = 0.1
 """Time without new samples, s, after which samples held for a longer block are delivered."""
 
 _MAX_DOUBT_S = 2 * MAX_UNSURE_S
-"""Time beyond `stale_after_s` in which the clock must confirm samples; two attempts fit."""
+"""Time, s, beyond `stale_after_s` within which the clock must confirm samples: two attempts."""
 
 _MIN_STALE_INSTANTS = 3
-"""Minimum time without a new sample before a bus is stale, in sample instants."""
+"""Lower limit of the effective `CanSettings.stale_after_s`, in periods of sample instants."""
 
 
 class CanSource:
@@ -78,7 +78,7 @@ class CanSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the bus; close it on exit of the context.
+        """Open the bus and yield sample blocks; close the bus on exit of the context.
 
         Raises
         ------

@@ -27,7 +27,7 @@ class FifoPiece:
     counters
         (n_samples,) counter of each sample, modulo 65536; None if the device has no counter.
     counts
-        (n_channels, n_samples) int16 counts.
+        (n_channels, n_samples) int16 counts; n_channels is 1 for the queue of one channel.
     """
 
     counters: npt.NDArray[np.int64] | None
@@ -44,7 +44,8 @@ class FifoLayout:
     """Addresses of the queues and format of their records.
 
     A record of an interleaved queue is a sample counter, if the device has one, and one sample of
-    each channel. A queue of one channel holds the counter of its first sample, then samples.
+    each channel. A queue of one channel holds the counter of its first sample, then its
+    samples.
 
     Parameters
     ----------
@@ -64,7 +65,7 @@ class FifoLayout:
 
     @property
     def record_registers(self) -> int:
-        """Registers of an interleaved record, or of one channel's counter and one sample."""
+        """Number of registers of an interleaved record, or of the counter and one sample."""
         n_samples = self.n_channels if self.kind is FifoKind.INTERLEAVED else 1
         return n_samples + self.has_counter
 
@@ -76,7 +77,7 @@ class FifoLayout:
         return MAX_FIFO_REGISTERS - 1
 
     def decode(self, data: bytes) -> FifoPiece:
-        """Decode one reading of one queue.
+        """Return the samples in one reading of one queue.
 
         Raises
         ------

@@ -29,7 +29,8 @@ class ConfinedProcess:
     Parameters
     ----------
     silence_s
-        Timeout of a read from ``output``, after which it raises TimeoutError; None for no timeout.
+        Timeout in seconds of a read from ``output``; the read then raises TimeoutError. None for no
+        timeout.
 
     Attributes
     ----------
@@ -94,7 +95,7 @@ class ConfinedProcess:
 
 
 def confine(memory_bytes: int) -> None:
-    """Limit the memory, CPU time and file size of this process."""
+    """Limit the address space of this process, its CPU time, and the size of files it writes."""
     for kind, limit in (
         (resource.RLIMIT_AS, memory_bytes),
         (resource.RLIMIT_CPU, CPU_S),

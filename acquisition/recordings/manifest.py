@@ -63,7 +63,10 @@ class ManifestPart(BaseModel):
 
 
 class RecordedChannel(ManifestPart):
-    """Recorded waveform channel; its measurand determines its engineering unit."""
+    """Recorded waveform channel; its measurand determines its engineering unit.
+
+    Other fields are those of :class:`core.samples.calibration.ChannelCalibration`.
+    """
 
     id: Name
     measurand: Measurand
@@ -168,9 +171,11 @@ class Progress:
     Parameters
     ----------
     n_passed
-        Samples per channel so far, including gaps within an epoch.
-    epoch, stop_index
-        Epoch of the last block, and sample index after its end; epoch None before the first block.
+        Number of samples per channel so far, including gaps within an epoch.
+    epoch
+        Epoch of the last block; None before the first block.
+    stop_index
+        Sample index after the end of the last block; 0 before the first block.
     """
 
     n_passed: int = 0

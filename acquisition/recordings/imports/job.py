@@ -108,6 +108,10 @@ class CsvLayout:
 
     Parameters
     ----------
+    delimiter
+        Character between columns.
+    decimal
+        Decimal separator.
     header_line
         Number of the line with the headings, counted from 1; earlier lines are skipped.
     """
@@ -123,10 +127,14 @@ class ImportJob:
 
     Parameters
     ----------
-    rate_hz, block_samples
-        Values of the unit; see :class:`core.samples.calibration.UnitCalibration`.
-    channels, slow
-        Columns in the order of the channels of the unit.
+    rate_hz
+        Sampling rate of the unit.
+    channels
+        Columns of the waveform channels, in the order of the unit.
+    slow
+        Columns of the slow channels, in the order of the unit.
+    block_samples
+        Block length in samples; see :class:`core.samples.calibration.UnitCalibration`.
     bus
         Bus to read from a CAN log; empty for a log of a single bus.
     """

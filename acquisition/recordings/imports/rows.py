@@ -85,7 +85,7 @@ class Indexer:
         self._last_ns = 0
 
     def stretches(self, times_ns: TimeArray) -> Iterator[Stretch]:
-        """Divide the next rows into ranges without a gap, counted from the first of these rows.
+        """Divide the next rows of a file into ranges without a gap, counted from the first time.
 
         Raises
         ------

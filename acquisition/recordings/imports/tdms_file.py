@@ -26,7 +26,7 @@ _UNFINISHED = 2**64 - 1
 
 
 def tdms_file(path: Path) -> SeriesFile:
-    """Open a TDMS file; columns are named by group and channel, times are waveform properties."""
+    """Open a TDMS file; columns are named by group and channel, times from waveform properties."""
     stream = path.open("rb")  # not a path: npTDMS would use an index file beside it
     _require_whole(stream)
     file = library("nptdms", "TDMS").TdmsFile.open(stream, raw_timestamps=True)
