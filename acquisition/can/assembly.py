@@ -53,7 +53,7 @@ class FrameAssembler:
     Parameters
     ----------
     begun_ns
-        Start of this adapter, UTC ns since 1970; 0 for a log file, so that epochs are reproducible.
+        Start time of this source, UTC ns since 1970; 0 for a log file, for reproducible epochs.
     device_waits
         Whether the device sends only while the host listens, for example in a replay; its pauses
         then do not start a new epoch.
@@ -83,7 +83,7 @@ class FrameAssembler:
         self._begin_count()
 
     def _begin_count(self) -> None:
-        """Reset the state for a new epoch."""
+        """Drop incomplete and unconfirmed samples and side values, at the start of a new epoch."""
         self._epoch = self._axis.epoch
         self._sets.begin()
         self._held: list[Instant] = []
@@ -108,7 +108,7 @@ class FrameAssembler:
         return ""
 
     def listen(self) -> None:
-        """Note that the bus was opened; without counters this starts a new epoch."""
+        """Record that the bus was opened; without counters, a new epoch starts."""
         if self._plan.counted:
             return
         if self._next > 0:

@@ -124,7 +124,7 @@ class WaveformDecoder:
         Parameters
         ----------
         frames
-            For each waveform message, its frame of every instant.
+            Frames of all instants, one sequence for each waveform message.
 
         Returns
         -------

@@ -79,9 +79,10 @@ class Plan:
     n_slow
         Number of slow channels.
     hold_samples
-        Validity in samples of a message with counter but no waveforms; None if a signal sets it.
+        Number of samples for which a message with counter but no waveforms is valid; None if a
+        signal contains the number.
     hold_s
-        Validity in seconds of a message with neither waveforms nor counter.
+        Time for which a message with neither waveforms nor counter is valid.
 
     Attributes
     ----------
@@ -125,7 +126,7 @@ class Plan:
 
 
 class Refusal(StrEnum):
-    """Reason for refusing a frame or its samples; a value is the name of a counter of refusals."""
+    """Reason for refusing a frame or its samples; values name the counts of refusals."""
 
     INCOMPLETE = "incomplete_frames"
     WRONG_LENGTH = "wrong_length"

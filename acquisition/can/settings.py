@@ -77,7 +77,7 @@ class CanSettings:
         Counter signals of the messages, at most one per message. Either all waveform messages have
         a counter, or none; without counters, the host counts the frames.
     counter_counts
-        Unit of the counters: "samples" or "frames".
+        What the counters count: "samples" or "frames".
     frame_samples
         Signals with the number of valid samples in a multi-sample frame, if it varies.
     epoch
@@ -91,10 +91,10 @@ class CanSettings:
     microseconds
         Signal with the microseconds within this second; None without `seconds`.
     hold_samples
-        Validity of a message without waveforms, in samples from its counter value on: a number, or
-        the signal with the number.
+        Number of samples, from its counter value on, for which a message without waveforms is
+        valid; or the signal that contains this number.
     hold_s
-        Validity in seconds of a message with neither waveforms nor counter.
+        Time for which a message with neither waveforms nor counter is valid.
     stale_after_s
         Longest time without a new complete sample before the link counts as lost; above 0.
     stamps

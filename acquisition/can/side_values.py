@@ -36,7 +36,7 @@ _Entry = tuple[int, float, int | None]
 class SideTable:
     """Table of the side values of one epoch by quantity and sample index.
 
-    Each value is valid for a limited number of samples; after them the quantity has no value.
+    Each value is valid for a limited number of samples; afterwards the quantity has no value.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -48,7 +48,7 @@ class SideTable:
         self._entries: dict[str | int, list[_Entry]] = {key: [] for key in self._plan.quantities}
 
     def set(self, key: str | int, start: int, value: float, hold: int | None) -> None:
-        """Store a value of a quantity from the sample `start` on, valid for `hold` samples."""
+        """Store a value, valid for `hold` samples from sample `start` on (None: see `_Entry`)."""
         entries = self._entries[key]
         at = bisect_right(entries, start, key=_START)
         replaces = at > 0 and entries[at - 1][0] == start
@@ -125,7 +125,7 @@ class RawBlockBuilder:
         self._rejected.clear()
 
     def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[RawBlock]:
-        """Return the raw blocks of sample instants of one epoch, which are in index order.
+        """Return the raw blocks of sample instants, given in index order and of one epoch.
 
         Parameters
         ----------

@@ -111,9 +111,7 @@ class SlcanBus(slcanBus):
 
     @classmethod
     def require_speed(cls, bitrate: int | None, data_bitrate: int | None) -> None:
-        """Check that slcan has the bit rates, in bit/s; None is not checked.
-
-        Without this check python-can would report a lost link.
+        """Check that slcan has the bit rates in bit/s; python-can would report a lost link.
 
         Raises
         ------

@@ -21,7 +21,7 @@ from core.samples.calibration import UnitCalibration
 from core.units import ns_from_s
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
-"""Function that opens a bus for frames of these ids, as `acquisition.can.bus.open_bus`."""
+"""Function that opens a bus for frames of given ids, such as `acquisition.can.bus.open_bus`."""
 
 _LOOK_S = 0.2
 
@@ -73,7 +73,7 @@ class CanSource:
 
     @property
     def refused_frames(self) -> Mapping[str, int]:
-        """Number of refused frames since the start, by reason."""
+        """Number of refused frames since the start of the source, by reason."""
         return {reason.value: n for reason, n in self._assembler.refused.items() if n}
 
     @asynccontextmanager

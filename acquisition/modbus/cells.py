@@ -105,9 +105,9 @@ class Cell:
         return N_BYTES[self.type] // 2
 
     def start(self, base: int) -> int:
-        """Return the first address of the cell on the wire, counted from 0."""
+        """Return the first address of the cell on the wire, for a map that starts at `base`."""
         return self.address - base
 
     def stop(self, base: int) -> int:
-        """Return the address after the last address of the cell on the wire."""
+        """Return the address on the wire after the cell, for a map that starts at `base`."""
         return self.start(base) + self.n_places

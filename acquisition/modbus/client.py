@@ -48,7 +48,7 @@ _BUSY_WAIT_S = 0.05
 
 
 class ModbusClient:
-    """Client of one Modbus device with its connection; a closed client can be opened again.
+    """Client of one Modbus device, with one connection at a time; it can be reopened after closing.
 
     The connection is closed after a wrong or missing reply, so that a late reply is never mistaken
     for the reply to the next request. Transaction ids continue across connections, because a

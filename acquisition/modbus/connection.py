@@ -1,4 +1,4 @@
-"""`ReplyProtocol`: requests in flight on a connection; `SerialLine`: transport of a serial port."""
+"""`ReplyProtocol`: exchange of requests and replies; `SerialLine`: transport of a serial port."""
 
 import asyncio
 import errno
@@ -27,7 +27,7 @@ def reason_of(error: OSError | EOFError) -> str:
 
 
 class SilenceError(LinkError):
-    """The device did not reply within the timeout."""
+    """Error of a device that did not reply within the timeout."""
 
 
 class ReplyProtocol(asyncio.Protocol):

@@ -13,7 +13,7 @@ from core.samples.axis import ClockTolerance, Epochs, SampleAxis, signed_distanc
 from core.units import ns_from_s
 
 WRAP = 1 << 16
-"""Samples after which the 16-bit counter of a queue wraps to 0."""
+"""Number of samples after which the 16-bit counter of a queue wraps to 0."""
 
 _TOLERANCE = ClockTolerance(step_s=0.5)
 """Largest difference between a device's sample count and the host's clock: half a second."""
@@ -27,7 +27,7 @@ _MAX_DRIFT = 1e-3
 _MAX_EPOCHS = 2
 
 _MAX_APART = 1024
-"""Maximum difference of the counters of two channels; their queues are not read at once."""
+"""Maximum difference of the counters of two queues, in samples; the queues are read in turn."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,9 @@ class SamplePlace:
 class CountedSamples:
     """Converter of a 16-bit sample counter to sample indices, also across connections.
 
-    The host's clock shows how often the counter has wrapped.
-
-    A counter jump that matches the time since the last sample is a gap; its length is exact even
-    if the counter has wrapped several times. Any other jump starts a new epoch: the device has
-    restarted its counter, or has stopped sampling for a while.
+    The host's clock shows how often the counter has wrapped. A counter jump that matches the time
+    since the last sample is a gap of exactly known length. Any other jump starts a new epoch: the
+    device has restarted its counter, or has stopped sampling for a while.
 
     Parameters
     ----------
@@ -59,13 +57,13 @@ class CountedSamples:
         self._drained_ns = 0
 
     def note_drained(self, now_s: float) -> None:
-        """Record that the queue was empty at a monotonic time: all later samples are newer."""
+        """Record that the queue was empty at `now_s`: samples read later were measured after it."""
         self._drained_ns = ns_from_s(now_s)
 
     def is_ambiguous(self, now_s: float) -> bool:
         """Whether the counter may have advanced by half its period since the last sample.
 
-        Old samples in the queue could then be mistaken for new ones, and must be discarded.
+        Samples in the queue are then of unknown age, and must be discarded.
         """
         now_ns = ns_from_s(now_s)
         return self._axis.index is not None and not self._is_within_half_a_wrap(now_ns)
@@ -130,7 +128,7 @@ class UncountedSamples:
         return SamplePlace(self._epochs.number, first)
 
     def has_lost(self, now_s: float) -> bool:
-        """Whether samples have been lost by a monotonic time at which the queue is empty."""
+        """Whether samples have been lost by `now_s` (monotonic); the queue must then be empty."""
         return self._delay.late_s(now_s - self._next / self._rate_hz, now_s) > self._tolerance_s
 
 

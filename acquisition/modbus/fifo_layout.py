@@ -44,8 +44,7 @@ class FifoLayout:
     """Addresses of the queues and format of their records.
 
     A record of an interleaved queue is a sample counter, if the device has one, and one sample of
-    each channel. A queue of one channel holds the counter of its first sample, then its
-    samples.
+    each channel. A queue of one channel holds the counter of its first sample, then samples.
 
     Parameters
     ----------
@@ -65,7 +64,7 @@ class FifoLayout:
 
     @property
     def record_registers(self) -> int:
-        """Number of registers of an interleaved record, or of the counter and one sample."""
+        """Registers of one interleaved record; for one queue per channel, of counter and sample."""
         n_samples = self.n_channels if self.kind is FifoKind.INTERLEAVED else 1
         return n_samples + self.has_counter
 

@@ -15,7 +15,7 @@ _POLYNOMIAL, _CRC_START = 0xA001, 0xFFFF
 
 
 class PendingRequest(NamedTuple):
-    """Request that awaits its reply, with unit id of the device and transaction id (TCP only)."""
+    """Request in flight, with the unit id of the device and the transaction id (TCP only)."""
 
     request: ReadRequest
     unit: int

@@ -28,7 +28,7 @@ class MapError(ConfigError):
 class ReadPlan:
     """Ranges of registers or bits to read in one poll, in order, each by one request.
 
-    Cells are located by their byte position in the concatenated contents of the ranges.
+    Cells, at addresses from `base` on, are located in the concatenated contents of the ranges.
     """
 
     spans: tuple[Span, ...]

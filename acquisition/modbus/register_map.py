@@ -30,8 +30,8 @@ class FlagCheck:
         Bits that are evaluated; 1 for a cell of a single bit. The status number is the masked
         content divided by `lowest_bit`.
     set_means
-        "bad": the value is bad if any masked bit is set. "ok": it is bad
-        unless all masked bits are set. None: the status number decides.
+        "bad": the value is bad if any masked bit is set. "ok": the value is bad unless all masked
+        bits are set. None: the status number decides.
     ok_values
         Status numbers of a good value, instead of `set_means`; all other numbers are bad.
     clipped_values
@@ -52,7 +52,7 @@ class FlagCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class ScaleRegister:
-    """Register with the full scale of a value: value = raw / divisor * register."""
+    """Register with the full scale of a value: number = raw number / divisor * register."""
 
     cell: Cell
     divisor: float = 32767.0

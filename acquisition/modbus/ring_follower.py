@@ -58,7 +58,7 @@ class RingReader:
         raise kind(f"{self.where}: {fault}") from fault
 
     async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> list[Slot]:
-        """Read the ring positions of these sequence numbers, without checking the slots.
+        """Read the slots at the ring positions of sequence numbers, without checking the slots.
 
         Returns
         -------
@@ -94,7 +94,7 @@ class RingFollower:
     calibration
         Calibration of the unit; the device must have its channels, slow channels and rate.
     begun_ns
-        Start of this adapter, UTC ns since 1970.
+        Start time of this source, UTC ns since 1970; for the numbers of the epochs.
     """
 
     def __init__(self, reader: RingReader, calibration: UnitCalibration, begun_ns: int) -> None:

@@ -44,10 +44,7 @@ class RingSettings(LinkSettings):
 
 
 class RingSource:
-    """Sample source of one unit that reads a block ring.
-
-    After a reconnection it continues with the slot after the last slot read.
-    """
+    """Sample source of one unit that reads a block ring; keeps its position across connections."""
 
     def __init__(self, settings: RingSettings, calibration: UnitCalibration, clock: Clock) -> None:
         self._settings = settings

@@ -66,9 +66,9 @@ class PolledSlowValues:
             self._raise_bug()
 
     def current(self) -> Mapping[str, Reading]:
-        """Return the newest reading of each slow channel by channel id.
+        """Return the newest reading (value and quality) of each slow channel, by channel id.
 
-        If the newest poll is too old, each reading is a missing value with its reason.
+        If the newest poll is too old, or none has succeeded, readings are missing, with a reason.
         """
         self._raise_bug()
         if self._newest is None:

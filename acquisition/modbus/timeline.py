@@ -15,7 +15,7 @@ longer run means that the device was reset."""
 
 
 class Refusal(StrEnum):
-    """Reason for refusing the samples of a slot; a value is the name of a sample counter."""
+    """Reason for refusing the samples of a slot; values name the counts of refused samples."""
 
     TORN = "torn_slot"
     DAMAGED = "damaged_slot"

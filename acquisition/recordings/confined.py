@@ -34,8 +34,10 @@ class ConfinedProcess:
 
     Attributes
     ----------
-    input, output
-        Standard input and output of the child.
+    input
+        Stream to the standard input of the child.
+    output
+        Stream from the standard output of the child.
 
     Raises
     ------
@@ -60,7 +62,7 @@ class ConfinedProcess:
             self.input, self.output = ours.makefile("wb"), ours.makefile("rb")
 
     def exit_code(self) -> int:
-        """Wait for the end of the child; return its exit code, -N after signal N."""
+        """Wait for the end of the child; return its exit code, -N if signal N ended it."""
         return self._process.wait()
 
     def is_running(self) -> bool:

@@ -44,7 +44,7 @@ MAX_INDEX = 2**53
 """Maximum sample index and maximum epoch number; exact in double precision."""
 
 MAX_REJECTIONS = 32
-"""Maximum number of rejections, one per reason, before a block."""
+"""Maximum number of rejection entries, one per reason, before a block."""
 
 MAX_REASON_LENGTH = 64
 
@@ -65,7 +65,7 @@ class ManifestPart(BaseModel):
 class RecordedChannel(ManifestPart):
     """Recorded waveform channel; its measurand determines its engineering unit.
 
-    Other fields are those of :class:`core.samples.calibration.ChannelCalibration`.
+    Calibration fields are those of :class:`core.samples.calibration.ChannelCalibration`.
     """
 
     id: Name
@@ -269,7 +269,7 @@ def manifest_text(manifest: Manifest) -> str:
 
 
 def checksum_of(document: dict[str, object]) -> str:
-    """Return the SHA-256 of all values except the checksum, independent of order and spacing."""
+    """Return the SHA-256 of all values but the checksum, independent of key order and spacing."""
     rest = {name: value for name, value in document.items() if name != "checksum"}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("ascii")).hexdigest()

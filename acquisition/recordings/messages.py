@@ -158,7 +158,7 @@ class BlockLayout:
         ]
 
     def runs(self, message: Message) -> Iterator[SampleBlock]:
-        """Yield the blocks in a message; blocks without a gap between them are joined.
+        """Yield the sample blocks in a message; blocks without a gap between them are joined.
 
         Raises
         ------
@@ -216,7 +216,7 @@ def follows(
 ) -> npt.NDArray[np.bool_]:
     """Return a mask (n_blocks,): whether a block follows the previous one without a gap.
 
-    A rejection before a block counts as a gap.
+    Rejected samples before a block count as a gap. False for the first block.
     """
     found = np.zeros(len(rows), dtype=np.bool_)
     found[1:] = rows["epoch"][1:] == rows["epoch"][:-1]
@@ -246,7 +246,7 @@ the frame is CAN FD, data length in bytes, and the data padded with zeros."""
 
 
 def frames_message(frames: Frames, done: float) -> Message:
-    """Return a message with CAN frames; `done` is the fraction of the file read so far."""
+    """Return a message with CAN frames; `done` is the fraction of the file that has been read."""
     return {"kind": "frames", "done": done}, frames.tobytes()
 
 

@@ -40,9 +40,9 @@ class Recording:
     def raw_blocks(
         self, first_block: int = 0, stop_block: int | None = None
     ) -> Generator[RawBlock]:
-        """Yield the blocks as written, from number `first_block` up to `stop_block` (excluded).
+        """Yield the blocks as written, from `first_block` to `stop_block` (excluded; None for all).
 
-        None as `stop_block` yields all blocks to the end.
+        The first block of the recording has number 0.
         """
         for run in self.runs(first_block, stop_block):
             yield from cells_of(run)

@@ -167,10 +167,7 @@ def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[RawBlock, flo
 
 
 def imported_frames(path: Path, job: ImportJob) -> Generator[tuple[Frames, float]]:
-    """Yield batches of frames of a CAN log, each with the fraction of the log read so far.
-
-    Errors are those of :func:`imported_blocks`.
-    """
+    """Yield the frames of a CAN log in batches, as :func:`imported_blocks` yields blocks."""
     for message in _imported(path, job, "frames"):
         yield frames_of(message), _done(message)
 

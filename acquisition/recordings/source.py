@@ -108,7 +108,7 @@ def _listed(ids: Iterable[str]) -> str:
 
 
 class RecordingSource:
-    """Source of the calibrated blocks of a recording, paced in time or as fast as possible.
+    """Source of the calibrated blocks of a recording, paced by a clock or as fast as possible.
 
     A paced recording runs from the first connection on: samples due without a connection are
     lost, and the sample index jumps. Without pacing, a new connection continues at the block after

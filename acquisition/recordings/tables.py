@@ -99,8 +99,8 @@ def _writer(path: Path, schema: Any, **options: Any) -> Any:
 def parquet_file(path: Path, schema: Any, n_rows: int, rows_per_group: int) -> Iterator[Any]:
     """Open a Parquet file, check that its footer matches the manifest, and yield the file.
 
-    Only for use in the confined child:
-    pyarrow allocates the size stated in a page header, up to 2 GB for a page of 64 kB.
+    Only for use in the confined child, because pyarrow allocates the size stated in a page header:
+    up to 2 GB for a page of 64 kB.
 
     Raises
     ------

@@ -141,7 +141,7 @@ class RecordingWriter:
                 self._write_blocks()
 
     def write_block(self, block: SampleBlock) -> None:
-        """Append a block of a source, one raw block per cell.
+        """Append a sample block, with one raw block for each of its cells.
 
         Slow values measured by another device are included; a missing value is recorded as NaN.
 

@@ -1,4 +1,4 @@
-"""Conversion of HDF5, TDMS and MDF files to rows; their columns can be read in any order."""
+"""Conversion of HDF5, TDMS and MDF files, read column by column, to rows."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -234,7 +234,7 @@ def require_one(found: Sequence[Any], place: ColumnName, known: Sequence[str]) -
 
 
 def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
-    """Return whether all columns hold counts with the gain of the calibration of their channel.
+    """Whether all columns hold counts whose gain is that in the calibration of their channel.
 
     Parameters
     ----------

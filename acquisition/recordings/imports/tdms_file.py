@@ -70,7 +70,7 @@ def _series(channel: Any) -> Series:
 
 
 def _per_count(channel: Any) -> float | None:
-    """Return the value of one count of an int16 channel with a linear scale through 0, or None."""
+    """Return the value of one count of an int16 channel with linear scale through 0; else None."""
     get = channel.properties.get
     linear = get("NI_Number_Of_Scales") == 1 and get(_SCALE + "Scale_Type") == "Linear"
     if not linear or get(_SCALE + "Linear_Y_Intercept") != 0.0:

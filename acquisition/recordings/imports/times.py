@@ -28,7 +28,7 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
     Parameters
     ----------
     start_ns
-        Origin of "elapsed" times, UTC in nanoseconds.
+        Origin of "elapsed" times, UTC in nanoseconds since 1970; None if it is not known.
 
     Raises
     ------
