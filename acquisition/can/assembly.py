@@ -37,7 +37,7 @@ _FAST_WINDOWS = 2
 """Successive windows with too many frames that show a fault; a clock step causes only one."""
 
 _WIDE = 1 << 32
-"""Smallest modulus of a counter, in samples, that does not wrap while the adapter is stopped."""
+"""Smallest modulus of a counter, in samples, that does not wrap while the program is stopped."""
 
 
 class FrameAssembler:
@@ -262,7 +262,7 @@ class FrameAssembler:
         self._begin_timing()
 
     def _lose_held(self) -> None:
-        """Drop the held samples, because other samples are missing among them."""
+        """Drop the held samples, because samples were lost at an unknown place among them."""
         n_instants = max(1, round(self._least_late_s / self._instant_s))
         n_lost = n_instants * self._plan.samples_per_frame
         n_held = sum(instant.n_samples for instant in self._held)

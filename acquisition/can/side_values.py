@@ -1,4 +1,4 @@
-"""Side values (slow values, OK bits, time stamps) by sample; raw blocks of samples with them."""
+"""Side values (slow values, OK bits, time stamps) by sample; raw blocks with side values."""
 
 import itertools
 from bisect import bisect_right

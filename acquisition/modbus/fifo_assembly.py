@@ -19,7 +19,7 @@ _TOLERANCE = ClockTolerance(step_s=0.5)
 """Largest difference between a device's sample count and the host's clock: half a second."""
 
 _MAX_REPEATED = 31
-"""Maximum number of repeated samples in a queue from which reading does not remove them."""
+"""Maximum number of samples read again from a queue, if reading does not remove samples."""
 
 _MAX_DRIFT = 1e-3
 """Relative error by which the rate of a device without counter may be too low."""

@@ -36,7 +36,7 @@ class Timeline:
     accepted slot. A single inconsistent slot is refused. Two successive slots that are consistent
     with each other show that the counters were reset, and start a new epoch. Up to eight slots with
     consistent index and time are refused without a new epoch: only their sequence number is wrong.
-    Time stamps are otherwise not used here; `BlockAssembler` checks them for all adapters.
+    Time stamps are otherwise not used here; `BlockAssembler` checks those of all sources.
     """
 
     def __init__(self, layout: RingLayout, epochs: Epochs) -> None:

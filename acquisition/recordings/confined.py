@@ -62,7 +62,7 @@ class ConfinedProcess:
             self.input, self.output = ours.makefile("wb"), ours.makefile("rb")
 
     def exit_code(self) -> int:
-        """Wait for the end of the child; return its exit code, -N if signal N ended it."""
+        """Wait for the end of the child; return its exit code, or -N after an end by signal N."""
         return self._process.wait()
 
     def is_running(self) -> bool:
