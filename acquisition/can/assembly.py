@@ -21,8 +21,8 @@ from core.samples.axis import Epochs, SampleAxis
 from core.units import NS_PER_S
 
 MAX_UNSURE_S = 1.0
-"""Longest delay of samples, s. Samples that stay late for longer show that others were lost, or
-that the device had stopped."""
+"""Longest time, s, for which samples may stay late by the host's clock. A longer delay shows that
+other samples were lost, or that the device had stopped."""
 
 _OTHER_LOSS_S = 0.25
 """Increase of the delay, s, that shows a further loss of samples."""
@@ -37,7 +37,7 @@ _FAST_WINDOWS = 2
 """Successive windows with too many frames that show a fault; a clock step causes only one."""
 
 _WIDE = 1 << 32
-"""Smallest modulus of a counter, in samples, that does not wrap while the adapter is stopped."""
+"""Smallest modulus of a counter, in samples, that does not wrap while the program is stopped."""
 
 
 class FrameAssembler:
@@ -53,7 +53,7 @@ class FrameAssembler:
     Parameters
     ----------
     begun_ns
-        Start of this adapter, UTC ns since 1970; 0 for a log file, so that epochs are reproducible.
+        Start time of this source, UTC ns since 1970; 0 for a log file, for reproducible epochs.
     device_waits
         Whether the device sends only while the host listens, for example in a replay; its pauses
         then do not start a new epoch.
@@ -83,7 +83,7 @@ class FrameAssembler:
         self._begin_count()
 
     def _begin_count(self) -> None:
-        """Reset the state for a new epoch."""
+        """Drop incomplete and unconfirmed samples and side values, at the start of a new epoch."""
         self._epoch = self._axis.epoch
         self._sets.begin()
         self._held: list[Instant] = []
@@ -108,7 +108,7 @@ class FrameAssembler:
         return ""
 
     def listen(self) -> None:
-        """Note that the bus was opened; without counters this starts a new epoch."""
+        """Record that the bus was opened; without counters, a new epoch starts."""
         if self._plan.counted:
             return
         if self._next > 0:
@@ -262,7 +262,7 @@ class FrameAssembler:
         self._begin_timing()
 
     def _lose_held(self) -> None:
-        """Drop the held samples, because other samples are missing among them."""
+        """Drop the held samples, because samples were lost at an unknown place among them."""
         n_instants = max(1, round(self._least_late_s / self._instant_s))
         n_lost = n_instants * self._plan.samples_per_frame
         n_held = sum(instant.n_samples for instant in self._held)

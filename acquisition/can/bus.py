@@ -24,7 +24,10 @@ LINUX_ERROR_FRAMES = ("socketcan", "slcan", "gs_usb", "virtual")
 
 @contextmanager
 def foreign_errors_renamed(where: str) -> Iterator[None]:
-    """Convert exceptions of python-can, pyserial and the system to acquisition errors."""
+    """Convert exceptions of python-can, pyserial and the system to acquisition errors.
+
+    The messages begin with `where`, the name of the bus.
+    """
     try:
         yield
     except AcquisitionError:
@@ -38,13 +41,13 @@ def foreign_errors_renamed(where: str) -> Iterator[None]:
 
 
 def open_bus(settings: CanLinkSettings, ids: Iterable[int]) -> can.BusABC:
-    """Open a bus for listening.
+    """Open a CAN bus for listening, and return its python-can object.
 
     Parameters
     ----------
     ids
-        Frame ids to receive, both as standard and as extended ids, so that a wrong kind of id is
-        detected.
+        Frame ids to receive. Standard and extended ids of these numbers are received, so that a
+        wrong kind of id is detected.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Compilation of settings, calibration and DBC into a plan; reports mismatches at the start."""
+"""Compilation of settings, calibration and DBC file, if they match, into a decoding plan."""
 
 from collections.abc import Mapping
 
@@ -191,7 +191,7 @@ class _Compiler:
         return signal
 
     def _part_of(self, signal: DbcSignal, key: str) -> Part:
-        """Return the only part of a message that contains a signal."""
+        """Return the part that contains a signal; raise ConfigError if several parts contain it."""
         ids = signal.multiplexer_ids
         if len(ids) > 1 or (signal.message.multiplexer is not None and not ids):
             what = (

@@ -15,8 +15,8 @@ _SILENCE_S = 1.0
 """Silence, s, after which the first frame must also be confirmed; the device may have restarted."""
 
 JUMP_TOLERANCE = ClockTolerance(step_s=0.5, drift=0.05)
-"""Largest difference between the host's clock and a counter in a jump over a wrap or in a pause of
-the device; a drift below this share is a wrong rate, not a pause."""
+"""Largest difference between the host's clock and a counter that has wrapped or fallen behind; a
+larger one is a restart or a pause of the device. The drift allows for a wrong sampling rate."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class _CountedFrame:
 
 
 class CounterFollower:
-    """Unwrapper of frame counters of any width to one sample axis.
+    """Converter of frame counters of any width to sample indices on one axis.
 
     A frame close to the newest frame gets its sample index at once. A frame farther away is held
-    until a second frame confirms it. Both then show a gap if the counter increased, if the clock
+    until a second frame confirms it. The jump is a gap if the counter increased, if the clock
     matches a counter wrap, or if a device that reports restarts has reported none; otherwise the
     device has restarted its counter, and a new epoch begins.
 
@@ -45,6 +45,8 @@ class CounterFollower:
         Sample axis, at the first sample of the newest frame.
     refused
         Counts of refused frames; updated in place.
+    senders
+        Detector of a second sender of the frames; updated in place.
     """
 
     def __init__(

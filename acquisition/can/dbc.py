@@ -57,9 +57,9 @@ class DbcMessage:
     length
         Data length of the message's frames in bytes.
     multiplexer
-        Signal that selects the multiplexed signals; None without one.
+        Signal that selects the multiplexed signals; None if the message is not multiplexed.
     nested
-        Whether the message has several multiplexers or a multiplexed one; not supported.
+        Whether the message has more than one multiplexer signal; such messages are not supported.
     """
 
     def __init__(self, source: Message) -> None:
@@ -96,12 +96,14 @@ def frame_key(frame_id: int, extended: bool) -> int:
 
 
 def load_dbc(path: Path, text: str | None = None) -> dict[str, DbcMessage]:
-    """Read a DBC file.
+    """Return the messages of a DBC file.
 
     Parameters
     ----------
+    path
+        Path of the file, also for error messages.
     text
-        Content of the DBC; None to read the file.
+        Content of the file; None to read the file.
 
     Returns
     -------

@@ -23,8 +23,8 @@ class DuplicateSenderDetector:
     """Detector of two devices that send the same frame ids.
 
     Waveform frames of two devices contradict each other, and none of their samples are valid. The
-    detection is cleared after four windows with few contradictions, because two devices that send
-    alternately do not contradict each other in every window.
+    detection is cleared after four windows of 100 frames with few contradictions, because two
+    devices that send alternately do not contradict each other in every window.
     """
 
     def __init__(self) -> None:
@@ -47,7 +47,7 @@ class DuplicateSenderDetector:
         self._judge()
 
     def note_return(self) -> None:
-        """Note that a replaced counter sequence continues, which shows a second sender."""
+        """Record that an earlier counter sequence continues, which shows a second sender."""
         self._end_window(contrary=True)
 
     def _judge(self) -> None:
@@ -76,7 +76,7 @@ class Instant:
     Parameters
     ----------
     epoch
-        Epoch of the device's count.
+        Epoch of the sample index.
     index
         Index of the first sample.
     n_samples
@@ -133,11 +133,11 @@ class FrameSets:
         self._n_unusable = [0] * n_waves
 
     def refuse(self, wave: int) -> None:
-        """Count an unusable frame of a waveform message with counters."""
+        """Count a frame of wrong length of the waveform message with this number."""
         self._n_unusable[wave] += self._plan.samples_per_frame
 
     def open(self, index: int) -> None:
-        """Start the set of a sample index, also if its first frame is unusable."""
+        """Start the set of frames at a sample index, if not started, without adding a frame."""
         self.pending.setdefault(index, _Pending(self._plan.samples_per_frame))
 
     def lose(self, n_samples: int, n_dropped: int) -> None:
@@ -145,6 +145,8 @@ class FrameSets:
 
         Parameters
         ----------
+        n_samples
+            Number of samples lost.
         n_dropped
             Number of samples of complete sets that are dropped because of the loss.
         """
@@ -152,7 +154,7 @@ class FrameSets:
         self.pending = {index + n_samples: found for index, found in self.pending.items()}
 
     def add(self, frame: PlacedFrame, epoch: int) -> Instant | None:
-        """Add a frame to the set of its instant; return the instant if it is complete."""
+        """Add a frame to the set of its instant; return the instant if now complete, else None."""
         part, data, index = frame
         wave = part.wave
         if wave is None or not self._is_new(wave, index, data):
@@ -208,7 +210,7 @@ class FrameSets:
         return Instant(epoch, index, complete.n_samples, frames, rejected)
 
     def _rejected(self, index: int) -> dict[Refusal, int]:
-        """Return the refused samples in the gap before an index, by reason; the rest was lost."""
+        """Return the number of refused samples in the gap before an index, by reason."""
         n_jump = index - self.stop if self.stop >= 0 else 0
         incomplete = min(self._n_incomplete, n_jump)
         unusable = min(*self._n_unusable, n_jump - incomplete)

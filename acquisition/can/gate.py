@@ -9,7 +9,7 @@ from acquisition.can.plan import Plan, Refusal, RefusalCounts
 from acquisition.errors import LinkError
 
 Frame: TypeAlias = tuple[int, bytes | None]
-"""Frame key and data; data is None for an unusable frame."""
+"""Frame key and data; the data is None for a frame of wrong length."""
 
 
 class FrameGate:
@@ -29,7 +29,10 @@ class FrameGate:
         self._refused = refused
 
     def admit(self, message: Message) -> Frame | None:
-        """Return key and data of a frame; None for a frame of no configured message."""
+        """Return key and data of a frame of a configured message; None for any other frame.
+
+        The data is None if the frame has a wrong length.
+        """
         key = frame_key(message.arbitration_id, message.is_extended_id)
         shape = self._shapes.get(key)
         if shape is None or message.is_error_frame:

@@ -1,4 +1,4 @@
-"""Readers of signals in single and in joined frames; decoder of waveforms."""
+"""Readers of DBC signals in single and in concatenated frames; decoder of waveforms."""
 
 import struct
 from collections.abc import Callable, Sequence
@@ -20,7 +20,7 @@ ScalarReader: TypeAlias = Callable[[bytes], int | float]
 """Function that returns the unscaled value of one signal in one frame."""
 
 ColumnReader: TypeAlias = Callable[[bytes], npt.NDArray[Any]]
-"""Function that returns the unscaled values of one signal in joined frames, (n_frames,)."""
+"""Function that returns the (n_frames,) unscaled values of one signal in concatenated frames."""
 
 _BITS_PER_BYTE = 8
 _INTEGERS = {8: "b", 16: "h", 32: "i", 64: "q"}
@@ -28,7 +28,10 @@ _FLOATS = {32: "f", 64: "d"}
 
 
 def byte_offset(signal: DbcSignal) -> int | None:
-    """Return the first byte of a byte-aligned signal with a numpy type; None for other signals."""
+    """Return the position of a signal's first byte in its frame; None if numpy cannot read it.
+
+    numpy reads byte-aligned integers of 8, 16, 32 and 64 bits, and floats of 32 and 64 bits.
+    """
     source = signal.source
     offset, bit = divmod(source.start, _BITS_PER_BYTE)
     first_bit = _BITS_PER_BYTE - 1 if source.byte_order == "big_endian" else 0
@@ -49,7 +52,7 @@ def scalar_reader(signal: DbcSignal) -> ScalarReader:
 
 
 def column_reader(signal: DbcSignal) -> ColumnReader:
-    """Return a reader of a signal in joined frames; it uses numpy for byte-aligned signals.
+    """Return a reader of a signal in concatenated frames; numpy reads byte-aligned signals.
 
     The reader raises FrameError if cantools cannot decode a frame.
     """
@@ -90,8 +93,10 @@ class WaveChannel:
         Number of the channel's message among the waveform messages.
     columns
         Reader of each sample in a frame.
-    gain, offset
-        Engineering units = raw value * gain + offset.
+    gain
+        Engineering units per raw unit: value = raw value * gain + offset.
+    offset
+        Value in engineering units for the raw value 0.
     """
 
     wave: int
@@ -114,12 +119,12 @@ class WaveformDecoder:
     in_counts: bool
 
     def samples(self, frames: Sequence[Sequence[bytes]]) -> RawArray:
-        """Decode frames of consecutive instants.
+        """Return the samples in the frames of consecutive sample instants.
 
         Parameters
         ----------
         frames
-            For each waveform message, its frame of every instant.
+            Frames of all instants, one sequence for each waveform message.
 
         Returns
         -------
@@ -161,7 +166,8 @@ def wave_channel(
     Raises
     ------
     ConfigError
-        If unit, factor or full scale in the DBC do not match the channel, or differ in a channel.
+        If unit, factor or full scale in the DBC do not match the channel, or its signals differ in
+        their factors.
     """
     scalings = {_gain_and_offset(channel, calibration, signal) for signal in signals}
     if len(scalings) > 1:

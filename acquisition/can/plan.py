@@ -10,13 +10,14 @@ from acquisition.can.layout import ScalarReader, WaveformDecoder
 from core.samples.blocks import UNCOUNTED_LOSS as UNCOUNTED
 
 MAX_INSTANTS_PER_S = 1250.0
-"""Maximum rate of instants without counters: a second of clock drift is then less than half an
-instant, so that the clock shows the loss of a single instant."""
+"""Maximum number of sample instants per second without counters: the clock drift within a second
+is then less than half an instant, so that the clock shows the loss of a single instant."""
 
 EPOCH, OK_BITS, HOLD = "epoch", "ok_bits", "hold_samples"
 SECONDS, MICROSECONDS = "seconds", "microseconds"
 QUANTITIES = (EPOCH, OK_BITS, SECONDS, MICROSECONDS, HOLD)
-"""Side quantities by their key in the settings; slow values are identified by number."""
+"""Side quantities (values sent with the samples) by their key in the settings; the other side
+quantities are the slow values, with the number of the slow channel as key."""
 
 
 @dataclass(eq=False)
@@ -28,7 +29,7 @@ class Part:
     message
         Name of the message.
     wave
-        Number among the waveform messages; None if the part has no waveforms.
+        Number of the part among those with waveforms, from 0; None if it has no waveforms.
     counter
         Reader of the counter, in frames or samples; None without a counter.
     counter_step
@@ -37,8 +38,10 @@ class Part:
         Period of the counter in samples; 0 without a counter.
     n_samples
         Reader of the number of samples in a frame; None if the number is constant.
+    epoch
+        Reader of the epoch that the device reports; None without one.
     values
-        Side quantities with their readers.
+        Keys of the side quantities with their readers.
     """
 
     message: str
@@ -53,7 +56,7 @@ class Part:
 
 @dataclass(frozen=True)
 class MessagePlan:
-    """Decoding plan of the frames of one id.
+    """Decoding plan of the frames with one frame id.
 
     Parameters
     ----------
@@ -76,9 +79,10 @@ class Plan:
     n_slow
         Number of slow channels.
     hold_samples
-        Validity in samples of a message with counter but no waveforms; None if a signal sets it.
+        Number of samples for which a message with counter but no waveforms is valid; None if a
+        signal contains the number.
     hold_s
-        Validity in seconds of a message with neither waveforms nor counter.
+        Time for which a message with neither waveforms nor counter is valid.
 
     Attributes
     ----------
@@ -91,9 +95,10 @@ class Plan:
     quantities
         All side quantities of the messages.
     reports_epoch
-        Whether any message with a counter contains the epoch of the count.
+        Whether any message with a counter contains the epoch that the device reports.
     needs_header
-        Whether the epoch is in a message with a counter but no waveforms.
+        Whether the epoch is in a message with a counter but no waveforms; samples for which no
+        such message is valid are refused.
     """
 
     def __init__(
@@ -121,7 +126,7 @@ class Plan:
 
 
 class Refusal(StrEnum):
-    """Reason for refusing a frame or its samples; the values are names of counters."""
+    """Reason for refusing a frame or its samples; values name the counts of refusals."""
 
     INCOMPLETE = "incomplete_frames"
     WRONG_LENGTH = "wrong_length"

@@ -33,7 +33,7 @@ _JOIN_S = 10.0
 
 @dataclass(frozen=True)
 class Batch:
-    """Frames in order of arrival.
+    """Frames that were read together, in order of arrival.
 
     Parameters
     ----------
@@ -49,7 +49,9 @@ class Batch:
 
 
 class FrameReader:
-    """Reader thread from `start` to `stop`; `next_batch` raises an error that ended the thread.
+    """Thread that reads the frames of a bus, from `start` to `stop`.
+
+    If an error ends the thread, `next_batch` raises the error.
 
     Parameters
     ----------
@@ -179,7 +181,7 @@ class FrameReader:
             raise LinkError(f"{self._where}: the interface reports that it is in error")
 
     def _receive(self, bus: can.BusABC, frames: list[Frame], timeout_s: float) -> None:
-        """Append all received frames, after waiting for the first frame."""
+        """Append the received frames to `frames`; wait at most `timeout_s` for the first frame."""
         n_before, stamp_s = len(frames), 0.0
         try:
             while len(frames) < _MAX_BATCH:
@@ -199,7 +201,10 @@ class FrameReader:
                     self._stamp_fault = self._stamp_fault or fault
 
     def _next_message(self, bus: can.BusABC, timeout_s: float) -> can.Message | None:
-        """Return the next readable message; raise LinkError after too many unreadable messages."""
+        """Return the next message, or None at the timeout; malformed messages are skipped.
+
+        Raises LinkError after too many successive malformed messages, and for a faulty bus.
+        """
         judges_errors = self._settings.link.interface in LINUX_ERROR_FRAMES
         for _ in range(_MAX_NONSENSE):
             try:

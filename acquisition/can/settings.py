@@ -1,4 +1,4 @@
-"""Settings of a CAN source: bus, DBC, and meaning of the signals."""
+"""Settings of a CAN source: bus, DBC file, and meaning of the signals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,10 +16,12 @@ class CanLinkSettings:
         Interface of python-can: "socketcan", "slcan", "pcan", "kvaser", "vector", …
     channel
         Channel of the interface: "can0", "/dev/ttyACM0", "socket://192.0.2.17:4001".
-    bitrate, data_bitrate
-        Bit rates in bit/s; None keeps the rate of the interface, as required for socketcan.
+    bitrate
+        Bit rate in bit/s; None keeps the rate of the interface, as required for socketcan.
     fd
         Whether the bus carries CAN FD frames.
+    data_bitrate
+        Bit rate of the data phase of CAN FD frames, in bit/s; None keeps that of the interface.
     options
         Further arguments of python-can's interface, passed unchanged.
     """
@@ -37,14 +39,14 @@ class CanLinkSettings:
 
 @dataclass(frozen=True)
 class CanChannel:
-    """Waveform channel: one signal for each sample in a frame, in order of time.
+    """Waveform channel of a CAN device, with one signal for each sample in a frame.
 
     Parameters
     ----------
     unit
         Engineering unit of the channel: "um", "mm/s", "m/s2" or "V".
     signals
-        Signals as "Message.Signal".
+        Signals in order of time, each as "Message.Signal".
     """
 
     id: str
@@ -54,7 +56,7 @@ class CanChannel:
 
 @dataclass(frozen=True)
 class CanSlowChannel:
-    """Slow channel with its signal as "Message.Signal"."""
+    """Slow channel of a CAN device, and the signal of its values as "Message.Signal"."""
 
     id: str
     unit: str
@@ -70,25 +72,29 @@ class CanSettings:
     dbc
         Path of the DBC file.
     dbc_text
-        Content of the DBC if it is generated from a profile; None to read the file.
+        Content of the DBC file if generated from a profile; None to read the file.
     counters
         Counter signals of the messages, at most one per message. Either all waveform messages have
         a counter, or none; without counters, the host counts the frames.
     counter_counts
-        Unit of the counters: "samples" or "frames".
+        What the counters count: "samples" or "frames".
     frame_samples
         Signals with the number of valid samples in a multi-sample frame, if it varies.
     epoch
-        Signal that changes when the device restarts its counters.
+        Signal that changes when the device restarts its counters; None if there is none.
     ok_bits
-        Signal whose bit c, from the lowest, is set while waveform channel c is OK.
-    seconds, microseconds
-        Signals with the UTC time of the sample to which the message belongs.
+        Signal with one bit per waveform channel, channel 0 lowest, that is set while the channel is
+        OK; None if all channels are always OK.
+    seconds
+        Signal with the UTC time of the sample to which the message belongs, s since 1970; None to
+        use arrival times.
+    microseconds
+        Signal with the microseconds within this second; None without `seconds`.
     hold_samples
-        Validity of a message without waveforms, in samples from its counter value on: a number, or
-        the signal with the number.
+        Number of samples, from its counter value on, for which a message without waveforms is
+        valid; or the signal that contains this number.
     hold_s
-        Validity in seconds of a message with neither waveforms nor counter.
+        Time for which a message with neither waveforms nor counter is valid.
     stale_after_s
         Longest time without a new complete sample before the link counts as lost; above 0.
     stamps

@@ -1,4 +1,4 @@
-"""Side values with their validity in samples; raw blocks of samples with side values."""
+"""Side values (slow values, OK bits, time stamps) by sample; raw blocks with side values."""
 
 import itertools
 from bisect import bisect_right
@@ -30,13 +30,13 @@ _US_PER_S = 1_000_000
 _START = itemgetter(0)
 
 _Entry = tuple[int, float, int | None]
-"""First sample, value, validity in samples; None if the quantity `HOLD` sets the validity."""
+"""First sample, value, and validity in samples (None if the quantity `HOLD` sets it)."""
 
 
 class SideTable:
     """Table of the side values of one epoch by quantity and sample index.
 
-    Each value is valid for a limited number of samples; after them the quantity has no value.
+    Each value is valid for a limited number of samples; afterwards the quantity has no value.
     """
 
     def __init__(self, plan: Plan) -> None:
@@ -48,7 +48,7 @@ class SideTable:
         self._entries: dict[str | int, list[_Entry]] = {key: [] for key in self._plan.quantities}
 
     def set(self, key: str | int, start: int, value: float, hold: int | None) -> None:
-        """Store a value of a quantity from the sample `start` on, valid for `hold` samples."""
+        """Store a value, valid for `hold` samples from sample `start` on (None: see `_Entry`)."""
         entries = self._entries[key]
         at = bisect_right(entries, start, key=_START)
         replaces = at > 0 and entries[at - 1][0] == start
@@ -57,7 +57,7 @@ class SideTable:
             del entries[0]
 
     def forget_before(self, index: int) -> None:
-        """Delete the values that no sample from an index on needs."""
+        """Delete the values that were replaced at or before a sample index."""
         for entries in self._entries.values():
             del entries[: max(0, bisect_right(entries, index, key=_START) - 1)]
 
@@ -67,11 +67,14 @@ class SideTable:
         return None if entry is None or index >= self._stop(entry) else entry[1]
 
     def cuts(self, first: int, stop: int) -> list[int]:
-        """Return the sample indices between two samples at which any value starts or expires."""
+        """Return the sample indices between `first` and `stop` where a value starts or expires."""
         return sorted({index for index in self._changes(first, stop) if first < index < stop})
 
     def stamp_ns(self, index: int) -> int | None:
-        """Return the UTC time of a sample by the last device time stamp; None without a stamp."""
+        """Return the UTC time of a sample in ns since 1970; None without a device time stamp.
+
+        The time is extrapolated from the last time stamp up to the sample.
+        """
         seconds = self._entries.get(SECONDS, [])
         for start, second, _ in reversed(seconds[: bisect_right(seconds, index, key=_START)]):
             part = self._entry(MICROSECONDS, start)
@@ -122,7 +125,13 @@ class RawBlockBuilder:
         self._rejected.clear()
 
     def blocks(self, instants: Sequence[Instant], arrived_ns: int) -> list[RawBlock]:
-        """Return raw blocks of instants of one epoch in index order, arrived by `arrived_ns`."""
+        """Return the raw blocks of sample instants, given in index order and of one epoch.
+
+        Parameters
+        ----------
+        arrived_ns
+            Arrival of the last instant, UTC in ns since 1970.
+        """
         blocks = []
         if instants:  # the last instant has the smallest delay
             self._stamps.add(instants[-1].epoch, instants[-1].stop_index, arrived_ns)

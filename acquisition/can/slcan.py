@@ -71,7 +71,10 @@ class SlcanBus(slcanBus):
             raise
 
     def _recv_internal(self, timeout: float | None) -> tuple[Message | None, bool]:
-        """Return the next frame; raise FrameError for a line that is neither frame nor reply."""
+        """Return the next frame, or None at the timeout, and whether it passed the filter of ids.
+
+        Raises FrameError for a line that is neither a frame nor a reply.
+        """
         if not self._found:
             self._read_chunk(timeout)
         if not self._found:
@@ -108,7 +111,7 @@ class SlcanBus(slcanBus):
 
     @classmethod
     def require_speed(cls, bitrate: int | None, data_bitrate: int | None) -> None:
-        """Check the bit rates against those of slcan; python-can would report a lost link.
+        """Check that slcan has the bit rates in bit/s; python-can would report a lost link.
 
         Raises
         ------
@@ -175,7 +178,7 @@ def _parsed(line: bytes, ids: Container[int]) -> Message | None:
 
 
 def _state(line: bytes) -> Message | None:
-    """Return the error frame of a status line, or None; examples: "sb256256", "e1o"."""
+    """Return the error frame of a status line (examples: "sb256256", "e1o"); None without error."""
     kind, what = line[:1], line[1:2]
     if not line or kind in _ANSWERS:
         return None

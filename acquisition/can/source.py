@@ -21,7 +21,7 @@ from core.samples.calibration import UnitCalibration
 from core.units import ns_from_s
 
 BusOpener = Callable[[CanLinkSettings, Iterable[int]], can.BusABC]
-"""Function that opens a bus for frames of these ids, as `acquisition.can.bus.open_bus`."""
+"""Function that opens a bus for frames of given ids, such as `acquisition.can.bus.open_bus`."""
 
 _LOOK_S = 0.2
 
@@ -29,10 +29,10 @@ _PAUSE_S = 0.1
 """Time without new samples, s, after which samples held for a longer block are delivered."""
 
 _MAX_DOUBT_S = 2 * MAX_UNSURE_S
-"""Time beyond `stale_after_s` in which the clock must confirm samples; two attempts fit."""
+"""Time, s, beyond `stale_after_s` within which the clock must confirm samples: two attempts."""
 
 _MIN_STALE_INSTANTS = 3
-"""Minimum time without a new sample before a bus is stale, in sample instants."""
+"""Lower limit of the effective `CanSettings.stale_after_s`, in periods of sample instants."""
 
 
 class CanSource:
@@ -73,12 +73,12 @@ class CanSource:
 
     @property
     def refused_frames(self) -> Mapping[str, int]:
-        """Number of refused frames since the start, by reason."""
+        """Number of refused frames since the start of the source, by reason."""
         return {reason.value: n for reason, n in self._assembler.refused.items() if n}
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the bus; close it on exit of the context.
+        """Open the bus and yield sample blocks; close the bus on exit of the context.
 
         Raises
         ------

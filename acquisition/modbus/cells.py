@@ -54,7 +54,8 @@ class ByteOrder(StrEnum):
     """Byte order of a four-byte number in two registers; A is the most significant byte.
 
     The order of the words and the order of the bytes in each word can be reversed independently.
-    A single register has only a byte order. In a float64, the order of all four words is reversed.
+    In a single register, only the order of the bytes applies. In a float64, the order of all four
+    words is reversed.
     """
 
     ABCD = "ABCD"
@@ -85,7 +86,7 @@ class Cell:
     Parameters
     ----------
     address
-        Address as printed in the manual, counted from `RegisterMap.base`.
+        Address as printed in the manual; the first address there is `RegisterMap.base`.
     function
         1 (coils) or 2 (discrete inputs) for single bits, 3 (holding) or 4 (input registers).
     bit
@@ -100,13 +101,13 @@ class Cell:
 
     @property
     def n_places(self) -> int:
-        """Number of addresses of the cell: registers, or one bit for functions 1 and 2."""
+        """Number of addresses that the cell occupies: registers, or 1 for functions 1 and 2."""
         return N_BYTES[self.type] // 2
 
     def start(self, base: int) -> int:
-        """Return the first address of the cell on the wire, counted from 0."""
+        """Return the first address of the cell on the wire, for a map that starts at `base`."""
         return self.address - base
 
     def stop(self, base: int) -> int:
-        """Return the address after the last address of the cell on the wire."""
+        """Return the address on the wire after the cell, for a map that starts at `base`."""
         return self.start(base) + self.n_places

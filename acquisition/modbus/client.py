@@ -1,6 +1,6 @@
 """`ModbusClient`: read-only client of a Modbus device over TCP or RTU.
 
-pymodbus serves only the simulated devices; decision record 31 explains why.
+pymodbus is used for the simulated devices only; decision record 31 states the reasons.
 """
 
 import asyncio
@@ -48,7 +48,7 @@ _BUSY_WAIT_S = 0.05
 
 
 class ModbusClient:
-    """Client of one Modbus device with its connection; a closed client can be opened again.
+    """Client of one Modbus device, with one connection at a time; it can be reopened after closing.
 
     The connection is closed after a wrong or missing reply, so that a late reply is never mistaken
     for the reply to the next request. Transaction ids continue across connections, because a
@@ -59,9 +59,9 @@ class ModbusClient:
     Attributes
     ----------
     requests_in_flight
-        Maximum number of requests sent before the first reply. Starts at the configured number; 1
-        after the device has not answered several requests in order, or has closed the connection
-        twice in succession while several requests were in flight.
+        Maximum number of requests sent before the first reply: the configured number, reduced to 1
+        after several requests in flight had a wrong or missing reply, or after the device has
+        closed the connection twice in succession while several requests were in flight.
     """
 
     def __init__(self, settings: LinkSettings) -> None:
@@ -74,7 +74,7 @@ class ModbusClient:
 
     @property
     def where(self) -> str:
-        """Host and port, or path of the serial port; for messages."""
+        """Address of the device in error messages: host and port, or path of the serial port."""
         return str(self._settings.transport)
 
     @property
@@ -114,7 +114,7 @@ class ModbusClient:
         await self.require_device()
 
     async def require_device(self) -> None:
-        """Check that the device has the configured identity; no check without an identity.
+        """Check that the device has the configured identity; no effect if none is configured.
 
         Raises
         ------
@@ -137,16 +137,22 @@ class ModbusClient:
         self._protocol.close()
 
     async def read(self, address: int, count: int, function: int = READ_HOLDING_REGISTERS) -> bytes:
-        """Read one span; errors as `read_spans`, and ConfigError if the span is invalid."""
+        """Read `count` registers or bits from an address on; result as `read_spans`.
+
+        Raises
+        ------
+        LinkError, ConfigError
+            As `read_spans`; also ConfigError if function or address range are invalid.
+        """
         return await self.read_spans([Span(address, count, function)])
 
     async def read_spans(self, spans: Sequence[Span]) -> bytes:
-        """Read spans; a long span takes several requests, `requests_in_flight` at a time.
+        """Read ranges of registers or bits; a long range takes several requests.
 
         Returns
         -------
         bytes
-            Concatenated contents of the spans: registers as big-endian words, bits packed eight to
+            Concatenated contents of the ranges: registers as big-endian words, bits packed eight to
             a byte, the first bit least significant.
 
         Raises
@@ -161,7 +167,7 @@ class ModbusClient:
         return b"".join([reply[2:] for reply in await self._replies(requests)])
 
     async def read_fifos(self, addresses: Sequence[int]) -> list[bytes]:
-        """Read FIFO queues of 0 to 31 registers, as big-endian words; one queue for each address.
+        """Read one FIFO queue per address; return its 0 to 31 registers as big-endian words.
 
         Raises
         ------
@@ -197,7 +203,7 @@ class ModbusClient:
         return identity.misfit(found)
 
     async def _replies(self, requests: Sequence[ReadRequest]) -> list[memoryview]:
-        """Return the replies to requests, each from its function code on."""
+        """Return the PDUs of the replies to requests; repeat requests to a busy device."""
         replies: list[memoryview] = []
         while len(replies) < len(requests):
             burst = requests[len(replies) : len(replies) + self.requests_in_flight]
@@ -207,7 +213,7 @@ class ModbusClient:
         return replies
 
     async def _retry_busy(self, request: ReadRequest, reply: memoryview) -> memoryview:
-        """Repeat a request to a busy device for at most `timeout_s`."""
+        """Repeat a request while the device is busy, for at most `timeout_s`; return the reply."""
         for _ in range(int(self._settings.timeout_s / _BUSY_WAIT_S)):
             if reply[1] != BUSY:
                 break
@@ -218,7 +224,7 @@ class ModbusClient:
         raise exception_error(self.where, reply[1], request)
 
     async def _exchange(self, burst: Sequence[ReadRequest]) -> list[memoryview]:
-        """Send requests once; open a new connection first if connections are not kept."""
+        """Send requests once and return the replies; first connect if connections are not kept."""
         unit, transport = self._settings.device_id, self._settings.transport
         try:
             if not self.is_kept:

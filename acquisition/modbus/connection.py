@@ -1,4 +1,4 @@
-"""`ReplyProtocol`: requests in flight on a connection; `SerialLine`: transport of a serial port."""
+"""`ReplyProtocol`: exchange of requests and replies; `SerialLine`: transport of a serial port."""
 
 import asyncio
 import errno
@@ -19,7 +19,7 @@ _RECEIVE_BYTES = 1024
 
 
 def reason_of(error: OSError | EOFError) -> str:
-    """Return the cause of a failed connection, without the text of event loop and pyserial."""
+    """Return the cause of a failed connection, without text added by asyncio or pyserial."""
     code = error.errno if isinstance(error, OSError) else None
     if code == errno.EWOULDBLOCK:
         return "another program has the port"
@@ -27,11 +27,11 @@ def reason_of(error: OSError | EOFError) -> str:
 
 
 class SilenceError(LinkError):
-    """The device did not reply within the timeout."""
+    """Error of a device that did not reply within the timeout."""
 
 
 class ReplyProtocol(asyncio.Protocol):
-    """Connection to a device that matches replies to requests in the order of the requests.
+    """asyncio protocol of a connection to a device; matches replies to requests in order.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class ReplyProtocol(asyncio.Protocol):
             self._transport.close()
 
     async def exchange(self, burst: Sequence[PendingRequest], timeout_s: float) -> list[memoryview]:
-        """Send requests in one write; return the replies, each from its function code on.
+        """Send requests in one write; return the PDUs of their replies in the same order.
 
         Raises
         ------
@@ -95,7 +95,7 @@ class ReplyProtocol(asyncio.Protocol):
         self._transport = transport  # type: ignore[assignment]
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Fail a pending exchange at once with a LinkError."""
+        """End the current exchange, if any, with a LinkError."""
         self._fail(LinkError(f"{self._where}: {CLOSED}" + (f": {exc}" if exc else "")))
 
     def data_received(self, data: bytes) -> None:
@@ -111,7 +111,7 @@ class ReplyProtocol(asyncio.Protocol):
             self._fail(FrameError(f"{self._where}: {fault}: {shown}"))
 
     def _take(self, received: memoryview) -> int:
-        """Store complete replies; return the number of bytes that they occupy."""
+        """Store the complete replies in received bytes; return the number of bytes they occupy."""
         at = 0
         while self._in_flight:
             found = self._framing.take(received[at:], self._in_flight[0])
@@ -162,7 +162,7 @@ class SerialLine(asyncio.Transport):
         return not self._port.is_open
 
     def write(self, data: bytes | bytearray | memoryview) -> None:
-        """Write a request; the connection is lost if the port does not accept it at once."""
+        """Write the bytes of requests; close the port if it does not accept them at once."""
         try:
             self._port.write(data)
         except OSError as error:
@@ -189,7 +189,7 @@ class SerialLine(asyncio.Transport):
 
 
 def open_line(settings: SerialTransport, protocol: asyncio.Protocol) -> SerialLine:
-    """Open a serial port for exclusive use.
+    """Open a serial port for exclusive use; return its asyncio transport.
 
     Raises
     ------

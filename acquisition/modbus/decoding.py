@@ -1,4 +1,4 @@
-"""Decoding of the contents of all spans to the numbers of cells and the values of a map."""
+"""Decoding of the registers read in one poll to the numbers of cells and the values of a map."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,7 @@ from core.arrays import FloatArray
 
 
 class ValueState(IntEnum):
-    """State of a value as reported by a device; ordered from best to worst."""
+    """State of a polled value; the members are in order from the best state to the worst."""
 
     OK = 0
     CLIPPED = 1
@@ -25,18 +25,19 @@ class ValueState(IntEnum):
 
 @dataclass(frozen=True)
 class MapReading:
-    """Values of a register map from one poll.
+    """Values of one poll of a device, in the order of its register map.
 
     Parameters
     ----------
     values
-        (n_values,) values of the map, regardless of their state.
+        (n_values,) values in the units of their channels, also those whose state is not OK.
     states
-        State of each value.
+        (n_values,) state of each value.
     time_ns
         Device time, UTC ns since 1970; None if the map has no time or the time is invalid.
     alive
-        Bytes for the freshness check: the heartbeat, else the time, else all contents.
+        Bytes that change with each new measurement, to detect a device that has stopped measuring:
+        the heartbeat, else the device time, else the contents of all registers read.
     """
 
     values: FloatArray
@@ -46,7 +47,7 @@ class MapReading:
 
 
 class CellDecoder:
-    """Decoder of the numbers of cells from the contents of all spans of a read plan."""
+    """Decoder of the number in each cell from the registers and bits that a read plan reads."""
 
     def __init__(self, cells: Sequence[Cell], plan: ReadPlan) -> None:
         self._places: dict[Cell, tuple[tuple[int, ...], np.dtype[np.generic], int | None]] = {}
@@ -59,7 +60,7 @@ class CellDecoder:
             self._places[cell] = tuple(positions), np.dtype(DTYPES[cell.type]), cell.bit
 
     def numbers(self, content: bytes) -> Mapping[Cell, float]:
-        """Return the raw number of each cell, before scaling."""
+        """Return the unscaled number of each cell from the concatenated contents of all spans."""
         numbers = {}
         for cell, (positions, dtype, bit) in self._places.items():
             number = np.frombuffer(bytes([content[n] for n in positions]), dtype)[0].item()
@@ -68,12 +69,12 @@ class CellDecoder:
 
 
 class MapDecoder:
-    """Decoder of the values of a register map from the contents of all spans of its read plan.
+    """Decoder of one poll of a device to the values of its register map.
 
     Raises
     ------
     MapError
-        If its blocks and scale registers cannot be read as the map requires.
+        If cells that the map requires in one request cannot be read in one request.
     """
 
     def __init__(self, registers: RegisterMap) -> None:
@@ -83,7 +84,7 @@ class MapDecoder:
         self._time_cells = list(registers.time.cells()) if registers.time else []
 
     def read(self, content: bytes) -> MapReading:
-        """Decode one poll.
+        """Decode the contents read in one poll; return all values with their states.
 
         Parameters
         ----------
@@ -110,7 +111,7 @@ class MapDecoder:
 
 
 def _value(value: MapValue, numbers: Mapping[Cell, float]) -> float:
-    """Return a value in the unit of its channel; NaN if its scale or its range is zero."""
+    """Return a value in the unit of its channel; NaN if its scale register or its range is 0."""
     scaled = numbers[value.cell]
     if value.scale_register is not None:
         register = numbers[value.scale_register.cell]
@@ -126,7 +127,7 @@ def _value(value: MapValue, numbers: Mapping[Cell, float]) -> float:
 
 
 def _state(value: MapValue, numbers: Mapping[Cell, float], found: float) -> ValueState:
-    """Return the worst state of a value by its range, its invalid numbers and its flags."""
+    """Return the worst state that range, invalid numbers and status flags of a value indicate."""
     raw, span = numbers[value.cell], value.full_scale
     states = [flag_state(flag, int(numbers[flag.cell])) for flag in value.flags]
     if span is not None and not span.raw_minimum < raw < span.raw_maximum:
@@ -138,7 +139,7 @@ def _state(value: MapValue, numbers: Mapping[Cell, float], found: float) -> Valu
 
 
 def flag_state(flag: FlagCheck, word: int) -> ValueState:
-    """Return the state of a value by the content of its status register."""
+    """Return the state of a value that the content `word` of its status register indicates."""
     masked = word & flag.mask
     if flag.set_means is Meaning.BAD:
         return ValueState.FLAGGED if masked else ValueState.OK
@@ -151,7 +152,10 @@ def flag_state(flag: FlagCheck, word: int) -> ValueState:
 
 
 def byte_permutation(type_: NumberType, order: ByteOrder) -> list[int]:
-    """Return the byte positions of a number, most significant first; 0 is its first byte."""
+    """Return the position of each byte of a number on the wire, most significant byte first.
+
+    Position 0 is the first byte of the first register.
+    """
     n_words = N_BYTES[type_] // 2
     words = range(n_words)
     ordered = reversed(words) if order.low_word_first else words

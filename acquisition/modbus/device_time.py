@@ -13,7 +13,7 @@ CALENDAR_FIELDS = ("year", "month", "day", "hour", "minute", "second")
 _CENTURY = 2000
 
 _LATEST_S = 2.0**33
-"""Upper limit (year 2242), s since 1970; int64 nanoseconds since 1970 end in 2262."""
+"""Latest valid device time (year 2242), s since 1970; int64 nanoseconds since 1970 end in 2262."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +22,8 @@ class EpochTime:
 
     Parameters
     ----------
+    seconds
+        Cell of the seconds since 1970 UTC.
     parts
         Cell of the fraction; None if the device has whole seconds only.
     parts_per_s
@@ -44,7 +46,7 @@ class EpochTime:
             yield self.parts
 
     def time_ns(self, numbers: Sequence[float]) -> int | None:
-        """Return UTC ns since 1970 from the numbers of the cells; None for an invalid time."""
+        """Return UTC in ns since 1970 from the numbers of `cells`; None for an invalid time."""
         if not all(map(math.isfinite, numbers)) or numbers[0] <= 0.0:
             return None
         parts = numbers[1] / self.parts_per_s if self.parts is not None else 0.0
@@ -87,7 +89,7 @@ class CalendarTime:
             )
 
     def time_ns(self, numbers: Sequence[float]) -> int | None:
-        """Return UTC ns since 1970 from the numbers of the cells; None for an invalid time."""
+        """Return UTC in ns since 1970 from the numbers of `cells`; None for an invalid time."""
         part = dict(zip(self.fields, map(int, numbers), strict=True))
         part["year"] += _CENTURY if part["year"] < 100 else 0
         try:

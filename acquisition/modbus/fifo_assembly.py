@@ -13,13 +13,13 @@ from core.samples.axis import ClockTolerance, Epochs, SampleAxis, signed_distanc
 from core.units import ns_from_s
 
 WRAP = 1 << 16
-"""Samples after which the 16-bit counter of a queue wraps to 0."""
+"""Number of samples after which the 16-bit counter of a queue wraps to 0."""
 
 _TOLERANCE = ClockTolerance(step_s=0.5)
 """Largest difference between a device's sample count and the host's clock: half a second."""
 
 _MAX_REPEATED = 31
-"""Maximum number of repeated samples in a queue from which reading does not remove them."""
+"""Maximum number of samples read again from a queue, if reading does not remove samples."""
 
 _MAX_DRIFT = 1e-3
 """Relative error by which the rate of a device without counter may be too low."""
@@ -27,7 +27,7 @@ _MAX_DRIFT = 1e-3
 _MAX_EPOCHS = 2
 
 _MAX_APART = 1024
-"""Samples by which the queues of two channels may differ; they are read one after another."""
+"""Maximum difference of the counters of two queues, in samples; the queues are read in turn."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class SamplePlace:
 
 
 class CountedSamples:
-    """Unwrapper of a 16-bit sample counter by the host's clock; continues across connections.
+    """Converter of a 16-bit sample counter to sample indices, also across connections.
 
-    A counter jump that matches the time since the last sample is a gap; its length is exact even
-    if the counter has wrapped several times. Any other jump starts a new epoch: the device has
-    restarted its counter, or has stopped sampling for a while.
+    The host's clock shows how often the counter has wrapped. A counter jump that matches the time
+    since the last sample is a gap of exactly known length. Any other jump starts a new epoch: the
+    device has restarted its counter, or has stopped sampling for a while.
 
     Parameters
     ----------
@@ -57,19 +57,25 @@ class CountedSamples:
         self._drained_ns = 0
 
     def note_drained(self, now_s: float) -> None:
-        """Note that the queue is empty: all later samples are measured from now on."""
+        """Record that the queue was empty at `now_s`: samples read later were measured after it."""
         self._drained_ns = ns_from_s(now_s)
 
     def is_ambiguous(self, now_s: float) -> bool:
-        """Whether old samples could be mistaken for new ones after half a counter period.
+        """Whether the counter may have advanced by half its period since the last sample.
 
-        The content of the queue must then be discarded before the counter is used again.
+        Samples in the queue are then of unknown age, and must be discarded.
         """
         now_ns = ns_from_s(now_s)
         return self._axis.index is not None and not self._is_within_half_a_wrap(now_ns)
 
     def place(self, counter: int, now_s: float) -> SamplePlace | None:
-        """Return epoch and index of the next sample; None if the sample is repeated."""
+        """Return epoch and index of a sample by its counter; None if it was read before.
+
+        Parameters
+        ----------
+        now_s
+            Monotonic time of the reading, s.
+        """
         axis, now_ns = self._axis, ns_from_s(now_s)
         if axis.index is None:
             return self._put(counter, now_ns)
@@ -93,7 +99,7 @@ class CountedSamples:
 
 
 class UncountedSamples:
-    """Sample counter in the host for a device without one; a loss starts a new epoch.
+    """Counter of the samples received from a device without counter; a loss starts a new epoch.
 
     Losses are detected by the host's clock alone: the number of missing samples is unknown, so no
     samples are joined across a loss. A loss shorter than the tolerance is not detected.
@@ -117,18 +123,24 @@ class UncountedSamples:
         self._delay = LeastDelay(_MAX_DRIFT)
 
     def place(self, n_samples: int) -> SamplePlace:
-        """Return epoch and index of the first of the next samples."""
+        """Count the next `n_samples` samples; return epoch and index of the first of them."""
         first, self._next = self._next, self._next + n_samples
         return SamplePlace(self._epochs.number, first)
 
     def has_lost(self, now_s: float) -> bool:
-        """Whether samples have been lost; to be called when the queue is empty."""
+        """Whether samples have been lost by `now_s` (monotonic); the queue must then be empty."""
         return self._delay.late_s(now_s - self._next / self._rate_hz, now_s) > self._tolerance_s
 
 
 @dataclass(frozen=True)
 class PlacedSamples:
-    """Consecutive samples of all channels with epoch and index; counts (n_channels, n_samples)."""
+    """Consecutive samples of all channels, with epoch and index of the first sample.
+
+    Parameters
+    ----------
+    counts
+        (n_channels, n_samples) int16 counts.
+    """
 
     epoch: int
     first_index: int
@@ -143,12 +155,14 @@ class PlacedSamples:
 def place_records(
     piece: FifoPiece, samples: CountedSamples | UncountedSamples, now_s: float
 ) -> list[PlacedSamples]:
-    """Return the records of an interleaved queue with epoch and index, without repeated records.
+    """Return the samples of one reading of a queue as runs of consecutive sample indices.
+
+    Samples that were read before are left out.
 
     Raises
     ------
     LinkError
-        If the counter restarts more than once in a reading: it is not a sample counter.
+        If the counter restarts more than once in a reading, so that it cannot count samples.
     """
     if isinstance(samples, UncountedSamples):
         place = samples.place(piece.n_samples)
@@ -172,7 +186,7 @@ def _joined(places: Iterable[SamplePlace | None], counts: CountArray) -> Iterato
 
 
 class ChannelAssembly:
-    """Alignment of the queues of single channels by the counter of the first channel.
+    """Aligner of the samples of one queue per channel, by the counter in each queue.
 
     A sample is held until it has arrived in all channels; a loss in one channel is a gap in all.
     """

@@ -27,7 +27,7 @@ class FifoPiece:
     counters
         (n_samples,) counter of each sample, modulo 65536; None if the device has no counter.
     counts
-        (n_channels, n_samples) int16 counts.
+        (n_channels, n_samples) int16 counts; n_channels is 1 for the queue of one channel.
     """
 
     counters: npt.NDArray[np.int64] | None
@@ -64,7 +64,7 @@ class FifoLayout:
 
     @property
     def record_registers(self) -> int:
-        """Registers of an interleaved record, or of one channel's counter and one sample."""
+        """Registers of one interleaved record; for one queue per channel, of counter and sample."""
         n_samples = self.n_channels if self.kind is FifoKind.INTERLEAVED else 1
         return n_samples + self.has_counter
 
@@ -76,7 +76,7 @@ class FifoLayout:
         return MAX_FIFO_REGISTERS - 1
 
     def decode(self, data: bytes) -> FifoPiece:
-        """Decode one reading of one queue.
+        """Return the samples in one reading of one queue.
 
         Raises
         ------

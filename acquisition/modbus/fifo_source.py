@@ -31,12 +31,13 @@ class FifoSettings(LinkSettings):
     Parameters
     ----------
     poll_period_s
-        Delay after the queue has been emptied, above 0; much shorter than the queue's capacity.
+        Delay between emptying the queue and the next read, above 0; much shorter than the time in
+        which the queue fills.
     stale_after_s
         Longest time without a new sample, or without emptying the queue, before the link counts as
         lost.
     loss_tolerance_s
-        Shortest detectable loss of a device without counter; shorter losses look like jitter.
+        Shortest loss of samples that is detected without a counter; shorter ones look like jitter.
     """
 
     poll_period_s: float = 0.005
@@ -45,7 +46,7 @@ class FifoSettings(LinkSettings):
 
 
 class FifoSource:
-    """Sample source of one unit from FIFO queues.
+    """Sample source of one unit that reads FIFO queues.
 
     A read is never repeated, because it may remove samples. All slow values are NaN.
     """
@@ -74,7 +75,13 @@ class FifoSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link, as `SampleSource`; also LinkError if the link is too slow for the rate."""
+        """Open the link and yield blocks; see `SampleSource`.
+
+        Raises
+        ------
+        LinkError, ConfigError
+            As `SampleSource`; also LinkError if the link is too slow for the sampling rate.
+        """
         async with self._client.connected():
             await self._begin()
             self._freshness.opened(self._clock.monotonic_s())
@@ -146,7 +153,7 @@ class FifoSource:
         return place_records(pieces[0], samples, now_s)
 
     def _is_drained(self, pieces: list[FifoPiece]) -> bool:
-        """Whether the queues were emptied by this reading."""
+        """Whether a reading emptied the queues; always true if reading does not remove samples."""
         full = any(piece.n_samples >= self._layout.most_samples for piece in pieces)
         return not self._layout.removes or not full
 

@@ -1,7 +1,7 @@
 """Modbus framing over TCP and RTU: encodes requests and extracts replies from received bytes.
 
-The request determines its reply except for the register values; any other byte is an error.
-Parsing stops at the first error, because the position of the following replies is then unknown.
+A reply must match its request in all bytes except the data read; a mismatch is an error. Parsing
+stops at the first error, because the start of the next reply is then unknown.
 """
 
 import struct
@@ -15,7 +15,7 @@ _POLYNOMIAL, _CRC_START = 0xA001, 0xFFFF
 
 
 class PendingRequest(NamedTuple):
-    """Request in flight to a unit; the transaction id is used by TCP only."""
+    """Request in flight, with the unit id of the device and the transaction id (TCP only)."""
 
     request: ReadRequest
     unit: int
@@ -23,10 +23,10 @@ class PendingRequest(NamedTuple):
 
 
 class TcpFraming:
-    """Modbus TCP framing: MBAP header of transaction, protocol, length and unit."""
+    """Modbus TCP framing: header (transaction id, protocol id, length, unit id) before the PDU."""
 
     def frame(self, pending: PendingRequest) -> bytes:
-        """Return the frame of a request as bytes."""
+        """Return the bytes of the frame that carries a request."""
         pdu = pending.request.pdu
         return _MBAP.pack(pending.transaction, 0, len(pdu) + 1, pending.unit) + pdu
 
@@ -35,8 +35,8 @@ class TcpFraming:
 
         Returns
         -------
-        Length of the reply in bytes, and the reply from its function code on; None if the reply is
-        still incomplete.
+        Length of the reply frame in bytes, and the PDU in it (from the function code on); None if
+        the reply is still incomplete.
 
         Raises
         ------
@@ -59,15 +59,15 @@ class TcpFraming:
 
 
 class RtuFraming:
-    """Modbus RTU framing: unit before the PDU, CRC-16 after it."""
+    """Modbus RTU framing: the unit id before the PDU, a CRC-16 after the PDU."""
 
     def frame(self, pending: PendingRequest) -> bytes:
-        """Return the frame of a request as bytes."""
+        """Return the bytes of the frame that carries a request."""
         body = bytes((pending.unit,)) + pending.request.pdu
         return body + crc16(body).to_bytes(2, "little")
 
     def take(self, data: memoryview, pending: PendingRequest) -> tuple[int, memoryview] | None:
-        """Extract the reply to a request from received bytes, as `TcpFraming.take`."""
+        """Extract the reply to a request from received bytes; results as `TcpFraming.take`."""
         if len(data) < 2:
             return None
         if data[0] != pending.unit:

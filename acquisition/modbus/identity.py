@@ -9,7 +9,7 @@ from acquisition.modbus.requests import READ_HOLDING_REGISTERS
 
 @dataclass(frozen=True)
 class Identification:
-    """Basic identification objects of function 43/14; empty if the device does not report one."""
+    """Identification read by function 43/14; a text is empty if the device does not report it."""
 
     vendor: str
     product_code: str
@@ -31,7 +31,7 @@ class ExpectedIdentification:
     revision: str | None = None
 
     def misfit(self, found: Identification) -> str | None:
-        """Return a description of the first mismatch with an identification; None without one."""
+        """Return a description of the first field of `found` that differs; None if all match."""
         for field in fields(self):
             expected, value = getattr(self, field.name), getattr(found, field.name)
             if expected not in (None, value):
@@ -58,7 +58,7 @@ class ExpectedRegisters:
     function: int = READ_HOLDING_REGISTERS
 
     def misfit(self, content: bytes) -> str | None:
-        """Return a description of the mismatch with the read registers; None without one."""
+        """Return a description of how the register contents differ; None if they are equal."""
         expected = b"".join(word.to_bytes(2, "big") for word in self.words)
         if content == expected:
             return None

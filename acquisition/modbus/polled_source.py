@@ -1,6 +1,7 @@
 """`PolledSource`: sample source that polls the registers of a Modbus device.
 
-Each poll is a sample. Its index is the number of the clock tick: a missed poll is an exact gap.
+Each poll is one sample. Its index counts poll periods, so that missed polls are a gap of exactly
+their number.
 """
 
 from collections.abc import AsyncGenerator, AsyncIterator, Sequence
@@ -62,7 +63,7 @@ class MapReader:
         return self._decoder.read(await self.content())
 
     async def content(self) -> bytes:
-        """Read the concatenated contents of all spans, the argument of `MapDecoder.read`.
+        """Read all registers of the map; return their contents as `MapDecoder.read` needs them.
 
         Raises
         ------
@@ -98,7 +99,8 @@ class PolledSettings(LinkSettings):
         Time between polls, above 0; the reciprocal of the sampling rate.
     stale_after_s
         Longest time without a change of the device's heartbeat before the link counts as lost; at
-        least two poll periods. Without a heartbeat its time is used, else all contents.
+        least two poll periods. Without a heartbeat, the device time must change; without a device
+        time, any register.
     """
 
     poll_period_s: float = 1.0
@@ -106,13 +108,13 @@ class PolledSettings(LinkSettings):
 
 
 class PolledSource:
-    """Sample source of the samples, slow values and vectors of one unit from polled registers.
+    """Sample source that polls the samples, slow values and vectors of one unit.
 
     Parameters
     ----------
     rows
-        Id of the map value in each row of a block; one for each channel of the calibration. The
-        slow channels are matched by id; a slow channel without a map value is NaN.
+        Id of the map value of each channel, in the order of the calibration. Slow channels are
+        matched by id; a slow channel without a map value is NaN.
     """
 
     def __init__(
@@ -145,7 +147,7 @@ class PolledSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link and check identity and signature, as `SampleSource`."""
+        """Open the link, check identity and signature, and yield blocks; see `SampleSource`."""
         async with self._reader.connected():
             self._freshness.opened(self._clock.monotonic_s())
             async with aclosing(self._blocks()) as blocks:
@@ -184,9 +186,9 @@ class PolledSource:
 def vector_calibration(
     calibration: UnitCalibration, channels: Sequence[str], rows: Sequence[VectorRow]
 ) -> UnitCalibration:
-    """Return the calibration of a vector rack: one sample per poll, one channel per vector row.
+    """Return the calibration of a monitoring rack that reports vectors, with one channel per row.
 
-    Only gap rows have the limits of their transducer; the other rows are unlimited.
+    A block is one poll. Only gap rows have the limits of their transducer; other rows have none.
 
     Parameters
     ----------
@@ -194,6 +196,8 @@ def vector_calibration(
         Calibration of the unit's physical channels.
     channels
         Ids of the physical channels, in the order of the calibration.
+    rows
+        Channel and quantity of each row of a block.
 
     Raises
     ------
@@ -211,7 +215,7 @@ def vector_calibration(
 
 
 def slow_number(reading: MapReading, position: int) -> float:
-    """Return a slow value; NaN unless its state is OK."""
+    """Return the value at a position of the register map; NaN unless its state is OK."""
     is_ok = reading.states[position] is ValueState.OK
     return float(reading.values[position]) if is_ok else float("nan")
 

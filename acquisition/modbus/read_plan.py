@@ -1,4 +1,4 @@
-"""`ReadPlan`: minimum number of requests that read all cells of a register map."""
+"""`ReadPlan`: requests that read all cells of a register map, as few as possible."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ class MapError(ConfigError):
     Parameters
     ----------
     at
-        Path in the map: field names and element numbers.
+        Path of the faulty field in the map: field names and element numbers.
     """
 
     def __init__(self, message: str, *at: int | str) -> None:
@@ -26,16 +26,16 @@ class MapError(ConfigError):
 
 @dataclass(frozen=True)
 class ReadPlan:
-    """Spans in reading order, each read by one request.
+    """Ranges of registers or bits to read in one poll, in order, each by one request.
 
-    Cells are located by their byte position in the concatenated contents of the spans.
+    Cells, at addresses from `base` on, are located in the concatenated contents of the ranges.
     """
 
     spans: tuple[Span, ...]
     base: int
 
     def span_of(self, cell: Cell) -> Span:
-        """Return the span that contains a cell."""
+        """Return the range, read by one request, that contains a cell."""
         start, stop = cell.start(self.base), cell.stop(self.base)
         return next(
             span
@@ -44,7 +44,10 @@ class ReadPlan:
         )
 
     def place_of(self, cell: Cell) -> tuple[int, int]:
-        """Return the first byte of a cell in all contents, and its bit for functions 1 and 2."""
+        """Return the position of a cell's first byte in the concatenated contents, and its bit.
+
+        The bit is 0 for registers.
+        """
         span = self.span_of(cell)
         n_before = sum(s.n_bytes for s in self.spans[: self.spans.index(span)])
         places = cell.start(self.base) - span.address
@@ -58,7 +61,7 @@ Stretch = tuple[int, int]
 
 
 def plan_reads(registers: RegisterMap) -> ReadPlan:
-    """Return the read plan of a register map.
+    """Return the plan of the requests that read a register map in every poll.
 
     Raises
     ------
@@ -81,7 +84,7 @@ def plan_reads(registers: RegisterMap) -> ReadPlan:
 
 
 def plan_signature(registers: RegisterMap) -> ReadPlan:
-    """Return the read plan of a register map's signature."""
+    """Return the plan of the requests that read the signature cells of a register map."""
     return _plan(registers, [signature.cell for signature in registers.signature], ())
 
 
@@ -141,7 +144,10 @@ def _whole(stretches: Iterable[Stretch]) -> list[Stretch]:
 
 
 def _packed(stretches: Sequence[Stretch], max_gap: int, most: int) -> list[Stretch]:
-    """Merge adjacent ranges up to the maximum size; left to right gives the fewest requests."""
+    """Merge ranges with gaps up to `max_gap` into ranges of up to `most` addresses.
+
+    Merging from the lowest address on gives the fewest requests.
+    """
     packed: list[Stretch] = []
     for start, stop in stretches:
         if packed and start - packed[-1][1] <= max_gap and stop - packed[-1][0] <= most:

@@ -22,15 +22,16 @@ class Meaning(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class FlagCheck:
-    """Rule for the state of a value from a status register, by bits or by numbers.
+    """Rule that derives the state of a value from a status register, by bits or by a number.
 
     Parameters
     ----------
     mask
-        Bits that are evaluated. A number is the masked content, shifted right to the lowest bit of
-        the mask. 1 for a cell of a single bit.
+        Bits that are evaluated; 1 for a cell of a single bit. The status number is the masked
+        content divided by `lowest_bit`.
     set_means
-        "bad": the value is bad if any masked bit is set. "ok": it is bad unless all are set.
+        "bad": the value is bad if any masked bit is set. "ok": the value is bad unless all masked
+        bits are set. None: the status number decides.
     ok_values
         Status numbers of a good value, instead of `set_means`; all other numbers are bad.
     clipped_values
@@ -51,7 +52,7 @@ class FlagCheck:
 
 @dataclass(frozen=True, kw_only=True)
 class ScaleRegister:
-    """Register with the full scale of a value: value = raw / divisor * register."""
+    """Register with the full scale of a value: number = raw number / divisor * register."""
 
     cell: Cell
     divisor: float = 32767.0
@@ -63,8 +64,10 @@ class FullScale:
 
     Parameters
     ----------
-    minimum, maximum
-        Values at the ends of the range: numbers, or the cells that contain them.
+    minimum
+        Value at `raw_minimum`: a number, or the cell that contains the number.
+    maximum
+        Value at `raw_maximum`: a number, or the cell that contains the number.
     """
 
     minimum: float | Cell
@@ -75,15 +78,19 @@ class FullScale:
 
 @dataclass(frozen=True, kw_only=True)
 class MapValue:
-    """One value of a device: raw * scale + offset, after an optional scale register or range.
+    """One value of a device: value = number * scale + offset.
+
+    The number is the raw number, or the result of the scale register or full scale if given.
 
     Parameters
     ----------
     invalid_values
         Raw numbers that mark an invalid value; integers are compared by their bits: 0x8000 equals
         -32768. NaN is always invalid.
-    invalid_below, invalid_above
-        Limits of the raw number; a raw number outside them is invalid.
+    invalid_below
+        Lowest valid raw number.
+    invalid_above
+        Highest valid raw number.
     """
 
     id: str
@@ -110,7 +117,15 @@ class MapValue:
 
 @dataclass(frozen=True, kw_only=True)
 class Together:
-    """Block of registers that must be read in one request, as the manual requires."""
+    """Block of registers that must be read in one request, as the manual requires.
+
+    Parameters
+    ----------
+    address
+        Address of the first register as printed in the manual.
+    count
+        Number of registers.
+    """
 
     address: int
     count: int
@@ -132,20 +147,20 @@ class RegisterMap:
     Parameters
     ----------
     base
-        Number of the first register in the manual; examples: 0, 1, 40001.
+        Number that the manual gives to the first register of the device; examples: 0, 1, 40001.
     together
         Blocks of registers that must be read in one request.
     heartbeat
-        Cell that changes with each measurement of the device.
+        Cell that changes with each measurement of the device; None if the device has none.
     time
-        Cells with the time of the measurement by the device's clock.
+        Cells with the time of the measurement by the device's clock; None if the device has none.
     signature
         Cells with known numbers; they are checked on connecting, before any value is used.
     max_registers
         Maximum number of registers in one read, 1 to 125.
     max_gap
-        Maximum number of unconfigured registers between two cells that are read in one request. If
-        one of these registers does not exist, the whole read fails.
+        Two cells are read in one request if at most this number of unconfigured registers lies
+        between them. If one of these registers does not exist, the whole read fails.
     """
 
     values: tuple[MapValue, ...]

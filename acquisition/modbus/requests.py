@@ -19,7 +19,7 @@ BIT_FUNCTIONS = (READ_COILS, READ_DISCRETE_INPUTS)
 REGISTER_FUNCTIONS = (READ_HOLDING_REGISTERS, READ_INPUT_REGISTERS)
 SPAN_FUNCTIONS = (*BIT_FUNCTIONS, *REGISTER_FUNCTIONS)
 READ_FUNCTIONS = (*SPAN_FUNCTIONS, READ_FIFO_QUEUE, READ_IDENTIFICATION)
-"""The only function codes that are ever sent."""
+"""Function codes of all requests that can be sent; none of them writes to the device."""
 
 ADDRESS_SPACE = 0x10000
 MAX_REGISTERS_PER_READ = 125
@@ -99,7 +99,7 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class ReadRequest:
-    """Read request as a PDU.
+    """Modbus read request, given by its PDU.
 
     Raises
     ------
@@ -160,7 +160,7 @@ class ReadRequest:
 
 
 def _fifo_bytes(reply: memoryview) -> int:
-    """Return the length of a FIFO reply; its head contains the number of registers."""
+    """Return the length of a FIFO reply in bytes; that of its head while the head is incomplete."""
     if len(reply) < _FIFO_HEAD.size:
         return _FIFO_HEAD.size
     n_bytes: int
@@ -174,7 +174,7 @@ def _fifo_bytes(reply: memoryview) -> int:
 
 
 def _identification_bytes(reply: memoryview, expected: bytes) -> int:
-    """Return the minimum length of an identification reply by the objects received so far."""
+    """Return the minimum length of an identification reply in bytes, given its first bytes."""
     found = bytes(reply[1:3])
     if not expected.startswith(found):
         raise FrameError(f"MEI type and read code are {found.hex()}, not {expected.hex()}")
@@ -193,7 +193,7 @@ def _identification_bytes(reply: memoryview, expected: bytes) -> int:
 
 @lru_cache(maxsize=1024)  # the same spans are read in every poll
 def span_requests(span: Span) -> tuple[ReadRequest, ...]:
-    """Return the requests that read a span, in address order."""
+    """Return the requests that read a range of registers or bits, in address order."""
     step = _MAX_BITS_PER_READ if span.function in BIT_FUNCTIONS else MAX_REGISTERS_PER_READ
     return tuple(
         ReadRequest(_SPAN_REQUEST.pack(span.function, at, min(step, span.stop - at)))
@@ -202,19 +202,19 @@ def span_requests(span: Span) -> tuple[ReadRequest, ...]:
 
 
 def fifo_request(address: int) -> ReadRequest:
-    """Return the request for a FIFO queue (function 0x18).
+    """Return the request that reads the FIFO queue at an address (function 0x18).
 
     Raises
     ------
     ConfigError
-        If the address is invalid.
+        If the address is not 0 to 65535.
     """
     pointer = Span(address, 1)
     return ReadRequest(bytes((READ_FIFO_QUEUE,)) + pointer.address.to_bytes(2, "big"))
 
 
 def identification_request(first_object: int = 0) -> ReadRequest:
-    """Return the request for the basic objects of function 43/14 from `first_object` on."""
+    """Return the request for the basic identification (43/14) from object `first_object` on."""
     return ReadRequest(bytes((READ_IDENTIFICATION, _MEI, _READ_BASIC, first_object)))
 
 
@@ -224,7 +224,10 @@ def fifo_registers(reply: memoryview) -> bytes:
 
 
 def identification_objects(reply: memoryview) -> tuple[dict[int, bytes], int | None]:
-    """Return the objects of an identification by number, and the next object to request or None."""
+    """Return the objects in an identification reply by number, and the next object to request.
+
+    The next object is None if the identification is complete.
+    """
     _, _, _, _, more_follows, next_object, n_objects = _IDENTIFICATION_HEAD.unpack_from(reply)
     objects, at = {}, _IDENTIFICATION_HEAD.size
     for _ in range(n_objects):
@@ -235,7 +238,10 @@ def identification_objects(reply: memoryview) -> tuple[dict[int, bytes], int | N
 
 
 def exception_error(where: str, code: int, request: ReadRequest) -> AcquisitionError:
-    """Return the error of an exception code: LinkError if a later request can succeed."""
+    """Return the error for an exception reply: ConfigError if the request can never succeed.
+
+    Otherwise LinkError; `where` is the address of the device in the message.
+    """
     kind = ConfigError if code in _CONFIG_EXCEPTIONS else LinkError
     name = _EXCEPTIONS.get(code, "unknown")
     return kind(f"{where}: device answers exception {code} ({name}) to {request}")

@@ -1,4 +1,4 @@
-"""`RingFollower`: reads the new slots of a block ring; counts refused slots."""
+"""`RingFollower`: reader of the new slots of a block ring; counts refused samples."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from core.samples.blocks import Rejection
 from core.samples.calibration import UnitCalibration
 
 _N_TRIES = 4
-"""Reads of an invalid header before an error is raised; a header is written quickly."""
+"""Maximum number of attempts to read a valid header; the device may be writing the header."""
 
 
 class RingReader:
@@ -35,7 +35,7 @@ class RingReader:
 
     @property
     def where(self) -> str:
-        """Host and port, or path of the serial port; for messages."""
+        """Address of the device in error messages: host and port, or path of the serial port."""
         return self._client.where
 
     async def header(self) -> RingHeader:
@@ -58,12 +58,12 @@ class RingReader:
         raise kind(f"{self.where}: {fault}") from fault
 
     async def slots(self, layout: RingLayout, sequences: Sequence[int]) -> list[Slot]:
-        """Read the ring positions of these sequence numbers, without checking the slots.
+        """Read the slots at the ring positions of sequence numbers, without checking the slots.
 
         Returns
         -------
         list
-            Slot at the position of each sequence number.
+            Slot found at the ring position of each sequence number; it may be another slot.
         """
         spans: list[Span] = []
         for sequence in sequences:
@@ -92,9 +92,9 @@ class RingFollower:
     Parameters
     ----------
     calibration
-        Numbers of channels and slow channels, and the rate, that the device must have.
+        Calibration of the unit; the device must have its channels, slow channels and rate.
     begun_ns
-        Start of this adapter, UTC ns since 1970.
+        Start time of this source, UTC ns since 1970; for the numbers of the epochs.
     """
 
     def __init__(self, reader: RingReader, calibration: UnitCalibration, begun_ns: int) -> None:
@@ -141,7 +141,7 @@ class RingFollower:
         return 0 if self._header is None else max(0, ahead(self._header.newest, self._handled))
 
     async def poll(self) -> list[RawBlock]:
-        """Read the new slots in order; the oldest ones first if one poll cannot read all.
+        """Read new slots, oldest first, up to 0.5 s of samples; return the accepted samples.
 
         Raises
         ------
@@ -233,7 +233,10 @@ class RingFollower:
         return blocks
 
     def _judge(self, sequence: int, slot: Slot, header: RingHeader) -> int | Refusal | None:
-        """Return the index of the first sample; None if the slot is blank or of another turn."""
+        """Return the index of a slot's first sample, or the reason for refusing the slot.
+
+        None for a slot that is blank, or of another turn of the ring or another epoch.
+        """
         if slot.blank or _overwritten_or_old(slot, sequence, header.layout):
             return None
         if slot.damage:

@@ -64,7 +64,7 @@ class RingLayout:
 
     @cached_property
     def slot_type(self) -> np.dtype[Any]:
-        """Structured dtype of one slot; valid after `require_possible` only."""
+        """Structured numpy dtype of one slot; `require_possible` must be called first."""
         return np.dtype(
             [
                 ("head", ">u4", (6,)),
@@ -96,7 +96,7 @@ class RingLayout:
         return self.ring_address + sequence % self.n_slots * self.slot_stride
 
     def require_possible(self) -> None:
-        """Check the limits of all fields.
+        """Check that all fields of the layout are within their limits.
 
         Raises
         ------
@@ -119,7 +119,10 @@ class RingLayout:
 
 @dataclass(frozen=True)
 class RingHeader:
-    """Header of a ring: layout, epoch of the device, and sequence number of the newest slot."""
+    """Header of a ring: layout, epoch of the device, and sequence number of the newest slot.
+
+    A changed epoch means that the device has restarted its counters.
+    """
 
     layout: RingLayout
     epoch: int
@@ -164,14 +167,18 @@ def _possible_layout(*fields: int) -> RingLayout:
 
 @dataclass(frozen=True)
 class Slot:
-    """Decoded slot, not checked.
+    """Slot as decoded; checksum and counters are not checked yet.
 
     Parameters
     ----------
+    sequence
+        Sequence number of the slot, modulo 2**32.
+    first_index
+        Index of the first sample, modulo 2**32.
     ok_bits
         Bit c is set if the device reports channel c as OK.
     counts
-        (n_channels, samples_per_slot) int16 counts.
+        (n_channels, samples_per_slot) int16 counts of the A/D converter.
     trailer
         Low word of the sequence number, repeated after the samples.
     epoch
@@ -213,7 +220,7 @@ class Slot:
 
 
 def decode_slots(content: bytes, layout: RingLayout) -> list[Slot]:
-    """Decode consecutive slots from their concatenated registers."""
+    """Return the slots in the concatenated registers of consecutive slots."""
     records, view = np.frombuffer(content, layout.slot_type), memoryview(content)
     counts, n_bytes = records["counts"].astype(np.int16), records.itemsize
     columns = (records[name].tolist() for name in ("head", "slow", "trailer", "crc"))

@@ -1,4 +1,4 @@
-"""`RingSource`: sample source for a DAQ with a block ring in Modbus registers."""
+"""`RingSource`: sample source for a DAQ with a ring buffer of samples in Modbus registers."""
 
 from collections.abc import AsyncGenerator, AsyncIterator
 from contextlib import aclosing, asynccontextmanager
@@ -17,12 +17,12 @@ from core.samples.blocks import SampleBlock
 from core.samples.calibration import UnitCalibration
 
 _MIN_STALE_SLOTS = 3
-"""Minimum time without a new slot before a device is stale, in slot durations."""
+"""Lower limit of the effective `RingSettings.stale_after_s`, in slot durations."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RingSettings(LinkSettings):
-    """Settings of a Modbus device with a block ring.
+    """Settings of a Modbus device with a block ring (a ring buffer of slots of samples).
 
     Parameters
     ----------
@@ -31,9 +31,10 @@ class RingSettings(LinkSettings):
     base_address
         Register address of the header, counted from 0.
     poll_period_s
-        Longest time between polls, above 0; much shorter than the duration of the ring.
+        Longest time between polls, above 0; much shorter than the time span of the ring.
     stale_after_s
-        Longest time without a new usable sample before the link counts as lost; above 0.
+        Longest time without a new usable sample before the link counts as lost; above 0. At least
+        three slot durations are used.
     """
 
     function: int = READ_HOLDING_REGISTERS
@@ -43,7 +44,7 @@ class RingSettings(LinkSettings):
 
 
 class RingSource:
-    """Sample source of one unit from a block ring; a reconnection continues after the last slot."""
+    """Sample source of one unit that reads a block ring; keeps its position across connections."""
 
     def __init__(self, settings: RingSettings, calibration: UnitCalibration, clock: Clock) -> None:
         self._settings = settings
@@ -58,7 +59,7 @@ class RingSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link and check the header of the ring, as `SampleSource`."""
+        """Open the link, check the header of the ring, and yield blocks; see `SampleSource`."""
         async with self._client.connected():
             await self._identify()
             async with aclosing(self._blocks()) as blocks:

@@ -19,10 +19,10 @@ _CONFIG_RETRY_S = 15.0
 
 
 class PolledSlowValues:
-    """Newest slow values of one polled device.
+    """Poller of one device that keeps its newest slow values.
 
-    Unlike a source, it reopens a lost link itself, about once per poll period, because the unit
-    continues without these values.
+    Unlike a source, the poller reopens a lost link itself, about once per poll period, because the
+    unit continues without these values.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class PolledSlowValues:
 
     @asynccontextmanager
     async def watch(self) -> AsyncIterator[None]:
-        """Poll in a background task until the context exits; entry waits for the first poll."""
+        """Poll in a background task until the context exits; entry waits for the first attempt."""
         self._task = task = asyncio.create_task(self._run(), name="poll slow values")
         try:
             await self._tried.wait()
@@ -66,7 +66,10 @@ class PolledSlowValues:
             self._raise_bug()
 
     def current(self) -> Mapping[str, Reading]:
-        """Return the newest values; missing values with their reason if not connected or stale."""
+        """Return the newest reading (value and quality) of each slow channel, by channel id.
+
+        If the newest poll is too old, or none has succeeded, readings are missing, with a reason.
+        """
         self._raise_bug()
         if self._newest is None:
             return self._missing(Reason.NOT_CONNECTED)

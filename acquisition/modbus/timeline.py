@@ -1,4 +1,4 @@
-"""Sample axis of a block ring: sample index of each slot by two 32-bit counters."""
+"""Sample axis of a block ring: sample index of each slot, from its two 32-bit counters."""
 
 from enum import StrEnum
 
@@ -15,7 +15,7 @@ longer run means that the device was reset."""
 
 
 class Refusal(StrEnum):
-    """Reason for refusing the samples of a slot; the values are names of counters."""
+    """Reason for refusing the samples of a slot; values name the counts of refused samples."""
 
     TORN = "torn_slot"
     DAMAGED = "damaged_slot"
@@ -25,18 +25,18 @@ class Refusal(StrEnum):
 
 
 def ahead(sequence: int, of: int) -> int:
-    """Return the signed distance between two 32-bit counters, modulo wrap-around."""
+    """Return how far a 32-bit counter is ahead of another, across a wrap; negative if behind."""
     return signed_distance(sequence, of, U32)
 
 
 class Timeline:
-    """Sample axis of one epoch.
+    """Sample axis of a block ring within one epoch; a reset of the counters starts a new epoch.
 
     A slot is accepted if sequence number and sample index have advanced equally since the last
     accepted slot. A single inconsistent slot is refused. Two successive slots that are consistent
     with each other show that the counters were reset, and start a new epoch. Up to eight slots with
     consistent index and time are refused without a new epoch: only their sequence number is wrong.
-    Time stamps are otherwise not used here; `BlockAssembler` checks them for all adapters.
+    Time stamps are otherwise not used here; `BlockAssembler` checks those of all sources.
     """
 
     def __init__(self, layout: RingLayout, epochs: Epochs) -> None:
@@ -93,7 +93,7 @@ class Timeline:
     def _is_miscounted(self, reference: Slot, slot: Slot) -> bool:
         """Whether index and time of a slot are consistent, regardless of its sequence number.
 
-        After a reset they are not: the index is low, and the time is at least two slots later.
+        After a reset, index and time disagree: the index is low, the time at least two slots later.
         """
         n_samples = ahead(slot.first_index, reference.first_index)
         return self._is_then(reference, slot, n_samples, self._miscounted)
@@ -105,7 +105,7 @@ class Timeline:
         n_samples: int,
         tolerance: ClockTolerance = _TOLERANCE,
     ) -> bool:
-        """Whether the time stamps of two slots differ by `n_samples` sample periods."""
+        """Whether the time stamps of two slots differ by `n_samples` periods within tolerance."""
         expected_ns = n_samples * 1000 * NS_PER_S // self._layout.rate_mhz
         deviation_ns = slot.start_ns - reference.start_ns - expected_ns
         return abs(deviation_ns) <= tolerance.over(expected_ns)

@@ -12,7 +12,7 @@ from acquisition.modbus.identity import Identity
 _BITS_AROUND_A_CHARACTER = 9  # a start bit and eight of data
 _FRAME_GAP_CHARACTERS = 3.5
 _SHORTEST_FRAME_GAP_S = 0.00175
-"""Gap between frames above 19,200 Bd (Modbus over Serial Line 1.02, 2.5.1.1)."""
+"""Minimum gap between frames, s, above 19,200 Bd (Modbus over Serial Line 1.02, 2.5.1.1)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,11 +92,11 @@ class LinkSettings:
     identity
         Expected identity of the device, checked before any other read; None for no check.
     keeps_connection
-        Whether the connection is kept open. False is for TCP devices that close the connection
-        after each reply or when idle, or that accept a single connection at a time.
+        Whether the connection is kept open between requests. False is for TCP devices that close
+        the connection after each reply or when idle, or that accept one connection at a time.
     requests_in_flight
         Maximum number of requests sent before the first reply, 1 to 16; above 1 for TCP with a kept
-        connection only. It saves round trips, but some devices lose all requests but one.
+        connection only. Several requests save round trips; some devices answer only one of them.
     """
 
     transport: Transport

@@ -94,7 +94,7 @@ def _memory_bytes(request: Mapping[str, Any]) -> int:
 
 
 def answer(request: Mapping[str, Any], out: BinaryIO) -> None:
-    """Write the content of one file as messages; a rejected file ends with an error message.
+    """Write the content of a file to `out` as messages; if rejected, the last is an error message.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def _recording(folder: Path, request: Mapping[str, Any]) -> Iterator[Message]:
 
 
 def _pieces(n_samples: Any, start: int, stop: int) -> Iterator[tuple[int, int]]:
-    """Yield ranges of blocks, one per message: the whole range, or single blocks if it is long."""
+    """Yield ranges of blocks, one per message: the whole range if short, else single blocks."""
     stop = min(stop, len(n_samples))
     if start < stop and n_samples[start:stop].sum() <= ROWS_PER_GROUP:
         yield start, stop

@@ -29,12 +29,15 @@ class ConfinedProcess:
     Parameters
     ----------
     silence_s
-        Timeout of a read from ``output``, after which it raises TimeoutError; None for no timeout.
+        Timeout in seconds of a read from ``output``; the read then raises TimeoutError. None for no
+        timeout.
 
     Attributes
     ----------
-    input, output
-        Standard input and output of the child.
+    input
+        Stream to the standard input of the child.
+    output
+        Stream from the standard output of the child.
 
     Raises
     ------
@@ -59,7 +62,7 @@ class ConfinedProcess:
             self.input, self.output = ours.makefile("wb"), ours.makefile("rb")
 
     def exit_code(self) -> int:
-        """Wait for the end of the child; return its exit code, -N after signal N."""
+        """Wait for the end of the child; return its exit code, or -N after an end by signal N."""
         return self._process.wait()
 
     def is_running(self) -> bool:
@@ -94,7 +97,7 @@ class ConfinedProcess:
 
 
 def confine(memory_bytes: int) -> None:
-    """Limit the memory, CPU time and file size of this process."""
+    """Limit the address space of this process, its CPU time, and the size of files it writes."""
     for kind, limit in (
         (resource.RLIMIT_AS, memory_bytes),
         (resource.RLIMIT_CPU, CPU_S),

@@ -51,7 +51,7 @@ def export_recording(
     out
         Path of the file to create; it must not exist.
     advanced
-        Progress callback; receives the samples per channel written since its previous call.
+        Progress callback; its argument is the number of rows written since its previous call.
 
     Raises
     ------
@@ -73,7 +73,9 @@ def export_recording(
 
 
 def write_rows(recording: Recording, kind: ExportFormat, sink: Path | RawIOBase) -> Iterator[int]:
-    """Write a recording in steps of some thousand rows; yield the number of rows of each step.
+    """Write a recording to a file or stream in steps; yield the number of rows of each step.
+
+    Nothing is written without iteration. The file is complete once the last number, 0, is yielded.
 
     Raises
     ------
@@ -90,7 +92,7 @@ def write_rows(recording: Recording, kind: ExportFormat, sink: Path | RawIOBase)
 
 
 def export_tables(recording: Recording, schema: Any) -> Iterator[Any]:
-    """Yield the rows of a recording as tables of some thousand rows.
+    """Yield the rows of a recording as pyarrow tables of some thousand rows.
 
     Missing samples have no rows: time and index jump. Times are whole microseconds. Samples of a
     bad channel and implausible slow values are NaN. Raises ConfigError if a file of the recording
@@ -102,14 +104,17 @@ def export_tables(recording: Recording, schema: Any) -> Iterator[Any]:
 
 
 def csv_schema(manifest: Manifest) -> Any:
-    """Return the schema of a CSV export; no heading, name and unit, can act as a formula."""
+    """Return the pyarrow schema of a CSV export; headings consist of channel id and unit.
+
+    A heading that a spreadsheet could read as a formula starts with an apostrophe.
+    """
     names = [f"{id_} [{unit}]" for id_, unit in _columns(manifest)]
     harmless = [f"'{n}" if n.startswith(_FORMULA_STARTS) else n for n in names]
     return _schema(manifest, "us", harmless)
 
 
 def parquet_schema(manifest: Manifest) -> Any:
-    """Return the Parquet schema; the metadata of each column contain its unit.
+    """Return the pyarrow schema of a Parquet export; the metadata of each column contain its unit.
 
     Raises
     ------

@@ -44,7 +44,7 @@ MAX_INDEX = 2**53
 """Maximum sample index and maximum epoch number; exact in double precision."""
 
 MAX_REJECTIONS = 32
-"""Maximum number of rejections, one per reason, before a block."""
+"""Maximum number of rejection entries, one per reason, before a block."""
 
 MAX_REASON_LENGTH = 64
 
@@ -63,7 +63,10 @@ class ManifestPart(BaseModel):
 
 
 class RecordedChannel(ManifestPart):
-    """Recorded waveform channel; its measurand determines its engineering unit."""
+    """Recorded waveform channel; its measurand determines its engineering unit.
+
+    Calibration fields are those of :class:`core.samples.calibration.ChannelCalibration`.
+    """
 
     id: Name
     measurand: Measurand
@@ -168,9 +171,11 @@ class Progress:
     Parameters
     ----------
     n_passed
-        Samples per channel so far, including gaps within an epoch.
-    epoch, stop_index
-        Epoch of the last block, and sample index after its end; epoch None before the first block.
+        Number of samples per channel so far, including gaps within an epoch.
+    epoch
+        Epoch of the last block; None before the first block.
+    stop_index
+        Sample index after the end of the last block; 0 before the first block.
     """
 
     n_passed: int = 0
@@ -264,7 +269,7 @@ def manifest_text(manifest: Manifest) -> str:
 
 
 def checksum_of(document: dict[str, object]) -> str:
-    """Return the SHA-256 of all values except the checksum, independent of order and spacing."""
+    """Return the SHA-256 of all values but the checksum, independent of key order and spacing."""
     rest = {name: value for name, value in document.items() if name != "checksum"}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("ascii")).hexdigest()

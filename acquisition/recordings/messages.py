@@ -1,4 +1,4 @@
-"""Messages of the confined child process: a short JSON header and raw bytes, never pickles."""
+"""Messages from the confined child process: a short JSON header and raw bytes, never pickles."""
 
 import itertools
 import json
@@ -47,7 +47,7 @@ def send(stream: BinaryIO, head: dict[str, Any], body: bytes = b"") -> None:
 
 
 def receive(stream: BinaryIO) -> Message:
-    """Read one message from a stream.
+    """Read one message from a stream; return its JSON header and its raw bytes.
 
     Raises
     ------
@@ -106,6 +106,8 @@ def blocks_message(
     ----------
     heads
         (n_blocks,) block headers of type :func:`head_type`.
+    rejected
+        Rejections before the blocks.
     counts
         (n_channels, n_samples) samples of all blocks; None for a message with headers only.
     done
@@ -156,7 +158,7 @@ class BlockLayout:
         ]
 
     def runs(self, message: Message) -> Iterator[SampleBlock]:
-        """Yield the samples of a message; blocks without a gap between them are joined.
+        """Yield the sample blocks in a message; blocks without a gap between them are joined.
 
         Raises
         ------
@@ -212,7 +214,10 @@ class BlockLayout:
 def follows(
     rows: npt.NDArray[np.void], rejected: Mapping[int, list[Rejection]]
 ) -> npt.NDArray[np.bool_]:
-    """Return a mask of the blocks that continue the previous block without a gap or rejection."""
+    """Return a mask (n_blocks,): whether a block follows the previous one without a gap.
+
+    Rejected samples before a block count as a gap. False for the first block.
+    """
     found = np.zeros(len(rows), dtype=np.bool_)
     found[1:] = rows["epoch"][1:] == rows["epoch"][:-1]
     found[1:] &= rows["first_index"][1:] == (rows["first_index"] + rows["n_samples"])[:-1]
@@ -241,7 +246,7 @@ the frame is CAN FD, data length in bytes, and the data padded with zeros."""
 
 
 def frames_message(frames: Frames, done: float) -> Message:
-    """Return a message with CAN frames; `done` is the fraction of the file read so far."""
+    """Return a message with CAN frames; `done` is the fraction of the file that has been read."""
     return {"kind": "frames", "done": done}, frames.tobytes()
 
 

@@ -40,7 +40,10 @@ class Recording:
     def raw_blocks(
         self, first_block: int = 0, stop_block: int | None = None
     ) -> Generator[RawBlock]:
-        """Yield blocks as written, `stop_block` excluded; one row group is held in memory."""
+        """Yield the blocks as written, from `first_block` to `stop_block` (excluded; None for all).
+
+        The first block of the recording has number 0.
+        """
         for run in self.runs(first_block, stop_block):
             yield from cells_of(run)
 
@@ -56,7 +59,7 @@ class Recording:
             yield from self._layout.heads(message)
 
     def rows(self) -> Iterator[tuple[npt.NDArray[np.void], Mapping[int, list[Rejection]]]]:
-        """Yield the headers of all blocks as arrays of some hundred; see `BlockLayout.parts`."""
+        """Yield the headers of all blocks in arrays, with rejections; see `BlockLayout.parts`."""
         for message in self._messages(0, self.manifest.n_blocks, with_samples=False):
             rows, rejected, _ = self._layout.parts(message)
             if rows.size:

@@ -1,4 +1,4 @@
-"""Client of the confined child process: returns the blocks and frames of files read there."""
+"""Client of the confined child process that reads files; returns their blocks and CAN frames."""
 
 import atexit
 import errno
@@ -50,7 +50,7 @@ _idle: deque[ConfinedProcess] = deque()
 def confined_messages(
     path: Path, format_: str, kind: str, request: Mapping[str, Any]
 ) -> Generator[Message]:
-    """Read a file or recording in the child; closing the generator stops the reading.
+    """Read a file or recording in the child and yield its messages, until the generator is closed.
 
     Parameters
     ----------
@@ -58,6 +58,8 @@ def confined_messages(
         Format in the request; see :func:`acquisition.recordings.child.answer`.
     kind
         Expected kind of the messages, "blocks" or "frames".
+    request
+        Other fields of the request.
 
     Raises
     ------
@@ -165,7 +167,7 @@ def imported_blocks(path: Path, job: ImportJob) -> Generator[tuple[RawBlock, flo
 
 
 def imported_frames(path: Path, job: ImportJob) -> Generator[tuple[Frames, float]]:
-    """Yield the frames of a CAN log in batches; fraction and errors as :func:`imported_blocks`."""
+    """Yield the frames of a CAN log in batches, as :func:`imported_blocks` yields blocks."""
     for message in _imported(path, job, "frames"):
         yield frames_of(message), _done(message)
 

@@ -19,12 +19,14 @@ from core.samples.calibration import UnitCalibration
 
 @dataclass(frozen=True)
 class Selection:
-    """Selected channels of a recording, in the order of a unit's channels, with calibration.
+    """Selected channels of a recording in the order that a unit needs, with their calibration.
 
     Parameters
     ----------
-    channels, slow
-        Positions of the waveform channels and of the slow channels in the recording.
+    channels
+        Positions of the selected waveform channels in the recording.
+    slow
+        Positions of the selected slow channels in the recording.
     """
 
     channels: tuple[int, ...]
@@ -49,7 +51,7 @@ def all_of(recorded: RecordedUnit) -> Selection:
 
 
 def select(recorded: RecordedUnit, unit: Unit, slow_units: Mapping[str, str]) -> Selection:
-    """Select the channels of a unit from a recording, with the recorded calibration.
+    """Return the selection of a unit's channels from a recording, with their recorded calibration.
 
     Parameters
     ----------
@@ -106,7 +108,7 @@ def _listed(ids: Iterable[str]) -> str:
 
 
 class RecordingSource:
-    """Source of the calibrated blocks of a recording, paced in time or as fast as possible.
+    """Source of the calibrated blocks of a recording, paced by a clock or as fast as possible.
 
     A paced recording runs from the first connection on: samples due without a connection are
     lost, and the sample index jumps. Without pacing, a new connection continues at the block after
@@ -150,7 +152,7 @@ class RecordingSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the recording; see :class:`acquisition.source.SampleSource`.
+        """Start the replay and yield its blocks; see :class:`acquisition.source.SampleSource`.
 
         Raises
         ------

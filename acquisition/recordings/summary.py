@@ -18,20 +18,27 @@ class RecordingSummary:
 
     Parameters
     ----------
-    start_ns, stop_ns
-        Time of the first sample, and end of the last sample, in UTC.
+    start_ns
+        Time of the first sample, UTC in ns since 1970.
+    stop_ns
+        End of the last sample period, UTC in ns since 1970.
+    n_samples
+        Number of recorded samples.
     n_passed
         Total number of recorded, missing and rejected samples.
     gaps
         First thousand gaps in order of time.
-    n_gaps, n_gap_samples
-        Number of all gaps and of the samples missing in them, without rejected samples.
+    n_gaps
+        Number of all gaps.
+    n_gap_samples
+        Number of samples missing in all gaps, without rejected samples.
     rejected
         Number of rejected samples by reason.
     epochs
         Epochs in order of time; several if the device restarted.
     n_not_ok
-        Samples by channel id, in blocks where the device reported the channel as not OK.
+        Number of samples by channel id in blocks where the device reported the channel as not OK;
+        without channels that were always OK.
     """
 
     start_ns: int

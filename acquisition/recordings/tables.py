@@ -33,13 +33,13 @@ def _required(types: Mapping[str, Any]) -> list[Any]:
 
 
 def samples_schema(unit: RecordedUnit) -> Any:
-    """Return the schema of the samples: one column per waveform channel."""
+    """Return the pyarrow schema of the samples: one column per waveform channel."""
     type_ = _SAMPLE_TYPES[unit.sample_type]
     return pa.schema(_required({c.id: type_ for c in unit.channels}))
 
 
 def blocks_schema(unit: RecordedUnit) -> Any:
-    """Return the schema of block headers; ``ok`` has one bit per channel, channel 0 lowest."""
+    """Return the pyarrow schema of block headers; bit 0 of ``ok`` is that of channel 0."""
     rejection = pa.struct(_required({"reason": pa.string(), "n_samples": pa.int64()}))
     types = dict.fromkeys(("epoch", "first_index", "start_ns"), pa.int64())
     types |= {"n_samples": pa.int32(), "ok": pa.uint32()}
@@ -49,7 +49,7 @@ def blocks_schema(unit: RecordedUnit) -> Any:
 
 
 def samples_table(counts: RawArray, unit: RecordedUnit) -> Any:
-    """Return (n_channels, n_samples) counts or engineering units as a table."""
+    """Return the table of (n_channels, n_samples) counts or engineering units."""
     return pa.table(list(counts), schema=samples_schema(unit))
 
 
@@ -68,14 +68,17 @@ def blocks_table(blocks: Sequence[RawBlock], unit: RecordedUnit) -> Any:
 
 
 def samples_writer(path: Path, unit: RecordedUnit) -> Any:
-    """Open a writer of samples: delta encoding and zstd, 6 bits per count (11 without delta)."""
+    """Open a Parquet writer of samples; delta encoding and zstd take 6 bits per count.
+
+    Without delta encoding, zstd takes 11 bits per count. Floats use byte-stream-split encoding.
+    """
     schema, encoding = samples_schema(unit), _ENCODINGS[unit.sample_type]
     encodings = dict.fromkeys(schema.names, encoding)
     return _writer(path, schema, use_dictionary=False, column_encoding=encodings)
 
 
 def blocks_writer(path: Path, unit: RecordedUnit) -> Any:
-    """Open a writer of block headers: dictionary encoding, except of texts, and zstd."""
+    """Open a Parquet writer of block headers; all columns except texts are dictionary-encoded."""
     schema = blocks_schema(unit)
     return _writer(path, schema, use_dictionary=[*schema.names, _REJECTED_COUNT])
 
@@ -94,9 +97,10 @@ def _writer(path: Path, schema: Any, **options: Any) -> Any:
 
 @contextmanager
 def parquet_file(path: Path, schema: Any, n_rows: int, rows_per_group: int) -> Iterator[Any]:
-    """Open a Parquet file whose footer matches the manifest; only for the confined child.
+    """Open a Parquet file, check that its footer matches the manifest, and yield the file.
 
-    pyarrow allocates the size stated in a page header, up to 2 GB for a page of 64 kB.
+    Only for use in the confined child, because pyarrow allocates the size stated in a page header:
+    up to 2 GB for a page of 64 kB.
 
     Raises
     ------

@@ -44,9 +44,9 @@ INCOMPLETE = ".incomplete"
 
 
 class RecordingWriter:
-    """Writer of a recording under a temporary name; renames it once it is complete and synced.
+    """Writer of a recording; its folder has a temporary name until it is complete and synced.
 
-    As a context manager it finishes the recording, or removes it after an exception.
+    As a context manager, the writer finishes the recording, or removes it after an exception.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class RecordingWriter:
     made_by
         Program and person that make the recording, for the manifest.
     first_decides
-        Whether the sample type is that of the first block instead of that of `unit`.
+        Whether the first block determines the sample type; otherwise `unit` does.
 
     Raises
     ------
@@ -107,7 +107,7 @@ class RecordingWriter:
 
     @property
     def duration_s(self) -> float:
-        """Duration from the first sample to the last, including gaps within an epoch."""
+        """Duration of the recording in seconds, including gaps within but not between epochs."""
         return self._progress.n_passed / self.unit.rate_hz
 
     def write(self, raw: RawBlock) -> None:
@@ -141,7 +141,7 @@ class RecordingWriter:
                 self._write_blocks()
 
     def write_block(self, block: SampleBlock) -> None:
-        """Append a block of a source, one raw block per cell.
+        """Append a sample block, with one raw block for each of its cells.
 
         Slow values measured by another device are included; a missing value is recorded as NaN.
 

@@ -30,13 +30,13 @@ def read_frames(path: Path, job: ImportJob) -> Iterator[tuple[Frames, float]]:
     """Yield batches of data frames of a log, each with the fraction of the log read so far.
 
     candump writes UTC seconds since 1970. BLF contains the local time of its writer; the time zone
-    is that of the mapping.
+    is that of the import job.
 
     Raises
     ------
     ConfigError
         If a frame is invalid, the log is incomplete, or the log has frames of several buses and the
-        mapping selects none.
+        job selects none.
     """
     size = max(path.stat().st_size, 1)
     with path.open("rb") as stream:

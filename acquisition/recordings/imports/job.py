@@ -39,14 +39,14 @@ class TimeAxis:
         Source of the times. "file": provided by the file format. "column": a time column. "start":
         a start time and the sampling rate of the unit, without gaps.
     place
-        Time column, for kind "column".
+        Time column for kind "column"; None without a time column.
     form
         Content of a time column: text ("iso8601"), time stamps of the file format ("timestamp"), or
         numbers since 1970 ("epoch_s") or since the start ("elapsed_s"), in s, ms, us or ns.
     start_ns
         Start time, UTC in ns; None if the file states it.
     utc_offset_s
-        Local time minus UTC, for times without a time zone.
+        Local time minus UTC in s, for times without a time zone.
     tolerance
         Maximum deviation of a stamp from a constant sampling rate, in samples.
     """
@@ -66,7 +66,7 @@ class ChannelColumn:
     Parameters
     ----------
     unit
-        Unit of the values in the file.
+        Unit of measurement of the values in the file.
     factor
         Engineering units of the channel per unit of the file.
     calibrated_per_count
@@ -108,6 +108,10 @@ class CsvLayout:
 
     Parameters
     ----------
+    delimiter
+        Character between columns.
+    decimal
+        Decimal separator.
     header_line
         Number of the line with the headings, counted from 1; earlier lines are skipped.
     """
@@ -123,10 +127,14 @@ class ImportJob:
 
     Parameters
     ----------
-    rate_hz, block_samples
-        Values of the unit; see :class:`core.samples.calibration.UnitCalibration`.
-    channels, slow
-        Columns in the order of the channels of the unit.
+    rate_hz
+        Sampling rate of the unit.
+    channels
+        Columns of the waveform channels, in the order of the unit.
+    slow
+        Columns of the slow channels, in the order of the unit.
+    block_samples
+        Block length in samples; see :class:`core.samples.calibration.UnitCalibration`.
     bus
         Bus to read from a CAN log; empty for a log of a single bus.
     """

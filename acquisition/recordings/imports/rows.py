@@ -51,7 +51,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Stretch:
-    """Range of rows without a gap, with epoch and sample index of its first row."""
+    """Range of rows without a gap, `stop` excluded, with epoch and index of its first sample."""
 
     start: int
     stop: int
@@ -60,10 +60,10 @@ class Stretch:
 
 
 class Indexer:
-    """Assigns sample indices to rows by their time stamps, at the sampling rate of the unit.
+    """Assigner of sample indices to rows by their time stamps, at the sampling rate of the unit.
 
     A line of constant rate is fitted to the stamps and follows the drift of their clock. A step off
-    the line by a whole number of samples is a gap of that number. A step by a fraction of a sample
+    the line by a whole number of samples is a gap of that length. A step by a fraction of a sample
     after a pause is a restart of the device and starts a new epoch. All other steps, and a
     different rate, raise an error. Nothing is interpolated.
 
@@ -85,7 +85,7 @@ class Indexer:
         self._last_ns = 0
 
     def stretches(self, times_ns: TimeArray) -> Iterator[Stretch]:
-        """Divide the next rows into ranges without a gap, counted from the first of these rows.
+        """Yield the ranges without a gap of the next rows; row numbers are positions in `times_ns`.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Conversion to rows of files with random access to columns: HDF5, TDMS and MDF."""
+"""Conversion of HDF5, TDMS and MDF files, read column by column, to rows."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -38,11 +38,12 @@ class Series:
     unit
         Unit of measurement as stated in the file; None if the file states none.
     values
-        Reads counts if `per_count` is given, else values in the unit of the file.
+        Function that reads counts if `per_count` is given, else values in the unit of the file.
     per_count
         Value of one count in the unit of the file, for int16 counts with a linear scale.
     times_ns
-        Reads the times that the file format provides for the column; None if it provides none.
+        Function that reads the times that the format stores with the column, UTC in ns; None if it
+        stores none.
     time_key
         Identifier of the time base; columns with the same key have the same times.
     """
@@ -57,12 +58,13 @@ class Series:
 
 @dataclass(frozen=True)
 class SeriesFile:
-    """Columns of an opened measurement file.
+    """Access to the columns of an open measurement file.
 
     Parameters
     ----------
     find
-        Returns a column by name; raises ConfigError if the column is missing or ambiguous.
+        Function that returns a column by name, or raises ConfigError if the column is missing or
+        ambiguous.
     start_ns
         Start time of the file's time column, UTC in ns; None if the file states none.
     """
@@ -72,7 +74,7 @@ class SeriesFile:
 
 
 def series_rows(file: SeriesFile, job: ImportJob) -> Iterator[Rows]:
-    """Yield the rows of the columns that an import job selects.
+    """Yield the rows of a measurement file with the columns that an import job selects.
 
     Raises
     ------
@@ -212,7 +214,12 @@ def _numbers(read: Read, start: int, stop: int, place: ColumnName) -> npt.NDArra
 
 
 def require_one(found: Sequence[Any], place: ColumnName, known: Sequence[str]) -> Any:
-    """Return the only column in a list of matching columns.
+    """Return the only column in a list of columns that match a name.
+
+    Parameters
+    ----------
+    known
+        Names of columns in the file, for the error message.
 
     Raises
     ------
@@ -227,7 +234,7 @@ def require_one(found: Sequence[Any], place: ColumnName, known: Sequence[str]) -
 
 
 def counts_are_kept(job: ImportJob, per_count: Sequence[float | None]) -> bool:
-    """Return whether all columns hold counts with the gain of the calibration of their channel.
+    """Whether all columns hold counts whose gain is that in the calibration of their channel.
 
     Parameters
     ----------

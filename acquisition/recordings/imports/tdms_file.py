@@ -26,7 +26,7 @@ _UNFINISHED = 2**64 - 1
 
 
 def tdms_file(path: Path) -> SeriesFile:
-    """Open a TDMS file; columns are named by group and channel, times are waveform properties."""
+    """Open a TDMS file; columns are named by group and channel, times from waveform properties."""
     stream = path.open("rb")  # not a path: npTDMS would use an index file beside it
     _require_whole(stream)
     file = library("nptdms", "TDMS").TdmsFile.open(stream, raw_timestamps=True)
@@ -70,7 +70,7 @@ def _series(channel: Any) -> Series:
 
 
 def _per_count(channel: Any) -> float | None:
-    """Return the value of one count of an int16 channel with a linear scale through 0, or None."""
+    """Return the value of one count of an int16 channel with linear scale through 0; else None."""
     get = channel.properties.get
     linear = get("NI_Number_Of_Scales") == 1 and get(_SCALE + "Scale_Type") == "Linear"
     if not linear or get(_SCALE + "Linear_Y_Intercept") != 0.0:

@@ -28,7 +28,7 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
     Parameters
     ----------
     start_ns
-        Origin of "elapsed" times, UTC in nanoseconds.
+        Origin of "elapsed" times, UTC in nanoseconds since 1970; None if it is not known.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def numbers_to_ns(values: npt.NDArray[Any], axis: TimeAxis, start_ns: int | None
 
 
 def utc_ns(us: TimeArray, start_ns: int) -> TimeArray:
-    """Convert whole microseconds since a start to UTC in nanoseconds.
+    """Convert whole microseconds since `start_ns` (UTC in ns since 1970) to UTC in nanoseconds.
 
     Raises
     ------
@@ -95,13 +95,16 @@ def _text_to_us(text: str, zone: timezone) -> int:
 
 
 def from_start(start_ns: int, first: int, stop: int, rate_hz: float) -> TimeArray:
-    """Return the times of samples `first` to `stop` (excluded) at a constant sampling rate."""
+    """Return the times of samples `first` to `stop` (excluded) at a constant rate, UTC in ns.
+
+    Sample 0 is at `start_ns`.
+    """
     number = np.arange(first, stop, dtype=np.float64)
     return utc_ns(np.floor(number * (1e6 / rate_hz)).astype(np.int64), start_ns)
 
 
 def library(name: str, what: str) -> Any:
-    """Import an optional library.
+    """Import an optional library and return it; `what` names the file format in the error.
 
     Raises
     ------
