@@ -1,4 +1,4 @@
-"""Audit trail in the database: hash chain of entries, written together with the changes."""
+"""Audit trail in the database: hash chain of entries, each written with the recorded change."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -39,7 +39,7 @@ PAGE = 1000
 
 @dataclass(frozen=True)
 class AuditQuery:
-    """Query for audit entries, newest first; None matches everything.
+    """Query for audit entries, newest first; None for actor, action or object matches all.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class AuditQuery:
     limit
         Maximum number of entries.
     start_ns, end_ns
-        Half-open time range.
+        Half-open time range, ns.
     """
 
     before: int = 2**63 - 1
@@ -88,7 +88,7 @@ class AuditChain:
                 self._update_head()
 
     def add(self, writer: Connection, actions: Iterable[AuditAction]) -> None:
-        """Append entries within a transaction; compare the head file with the chain first."""
+        """Append the entries of actions in a transaction; record first if the head file differs."""
         for action in actions:
             newest = newest_of(writer)
             if not self._is_due and self.head_error is None:
@@ -114,9 +114,9 @@ class AuditChain:
         return f"entry {head.number} is not the one that the head names"
 
     def _update_head(self) -> None:
-        """Write the head file within a transaction, so that an older head cannot overwrite it.
+        """Write the head file in a transaction, so that no process can write an older head later.
 
-        If the write fails, the entries stay stored and the head lags until a later write.
+        If the write fails, the entries stay stored and the head file is updated by a later write.
         """
         self.head_error = None
         try:

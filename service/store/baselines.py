@@ -1,4 +1,4 @@
-"""Tables of baselines, baseline steps and shaft responses."""
+"""Tables of baselines, steps in their life cycles, and shaft responses."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields

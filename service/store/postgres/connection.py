@@ -57,7 +57,10 @@ class PostgresAddress:
         return f"PostgreSQL database {database} at {host}"
 
     def full(self, purpose: str) -> str:
-        """Return the connection string with the password; it must never be displayed or logged."""
+        """Return the connection string with the password and, for the server, the `purpose`.
+
+        The string must never be displayed or logged.
+        """
         given = conninfo_to_dict(self.conninfo)
         name = f"padwatch {purpose} {os.getpid()}@{socket.gethostname()}"[:63]
         settings = {**DEFAULTS, "application_name": name, **given, "client_encoding": "UTF8"}
@@ -95,7 +98,7 @@ SERVER_SETTINGS = """
 
 
 class _TruthDumper(Dumper):
-    """Dumper that writes booleans as 0 and 1, as they are stored."""
+    """Encoder of boolean parameters as 0 and 1, as booleans are stored."""
 
     oid = BIGINT_OID
 
@@ -104,7 +107,7 @@ class _TruthDumper(Dumper):
 
 
 class _NumberDumper(Dumper):
-    """Dumper that writes floats, and NaN as NULL, as SQLite does."""
+    """Encoder of float parameters, which writes NaN as NULL, as SQLite does."""
 
     oid = DOUBLE_OID
 
@@ -205,7 +208,7 @@ CANCEL_WITHIN_S = 2.0
 
 @contextmanager
 def cancelled_when_gone(session: Session) -> Iterator[None]:
-    """Cancel the statements of a session within the block when the HTTP client disconnects.
+    """Return a context manager that cancels statements when the HTTP client disconnects.
 
     Raises
     ------
@@ -275,7 +278,7 @@ OF_THE_ROW = (
     psycopg.errors.DataCorrupted,
     psycopg.errors.IndexCorrupted,
 )
-"""Errors caused by one row or its page; other rows can be written without it."""
+"""Errors caused by one row or its database page; other rows can still be written."""
 
 UNREACHABLE = "check that PostgreSQL runs and can be reached; padwatch retries"
 

@@ -355,7 +355,7 @@ class PostgresDatabase:
             yield reader
 
     def ever_had(self, connection: Connection, table: str) -> bool:  # noqa: ARG002
-        """Return True; a missing head file is written when the store is opened."""
+        """Return True: the store writes a missing head file when it is opened."""
         return True
 
     def hold(self, name: str) -> PostgresHold:

@@ -122,7 +122,7 @@ HYPERTABLE = (
 
 
 def statements_to(number: int) -> list[str]:
-    """Return the statements that migrate a database to a schema number from the previous one."""
+    """Return the statements that migrate a database from schema `number` - 1 to `number`."""
     migration = INSTEAD.get(number, schema.MIGRATIONS[number - 1])
     return [*for_postgres(migration), *AFTERWARDS.get(number, ())]
 

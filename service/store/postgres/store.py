@@ -91,7 +91,7 @@ def _begun(head: Path) -> AuditAction:
 
 
 def server_trail(address: PostgresAddress, head: Path) -> Trail:
-    """Return the audit trail of a database with the head file of this host; no migration is run."""
+    """Return the audit trail of a database with the head file of this host, without migration."""
     return Trail(partial(_opened, address), head, is_shared=True)
 
 

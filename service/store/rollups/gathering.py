@@ -65,7 +65,7 @@ def gather_next(writer: Connection, series: int, now_ns: int) -> None:
 
 
 def gather_again(writer: Connection, series: int) -> None:
-    """Aggregate hours with late readings again."""
+    """Aggregate again the next hours of a bearing for which readings were stored late."""
     mark_ns = select_mark(writer, series)
     hours = writer.execute(
         "SELECT start_ns FROM rollup_redo WHERE series = ? ORDER BY start_ns LIMIT ?",
@@ -89,7 +89,7 @@ def _gather_hour(writer: Connection, series: int, span: Span) -> None:
 
 
 def _until(writer: Connection, series: int, mark_ns: int, now_ns: int) -> int:
-    """Return the end of the next step; only minutes before a later reading are complete."""
+    """Return the end of the next step; a minute is complete once a later minute has a reading."""
     end_ns = now_ns + 1
     times = writer.execute(NEXT_TIMES, (series, mark_ns, end_ns, MAX_READINGS)).fetchall()
     if not times:
@@ -133,7 +133,7 @@ class RollupStore(Tables):
     """Store of roll-ups; readings that are not aggregated yet are read as single readings."""
 
     def due(self, now_ns: int) -> list[int]:
-        """Return the series numbers of bearings with readings to aggregate, most delayed first."""
+        """Return the database numbers of bearings with readings to aggregate, oldest first."""
         with self._reading() as reader:
             rows = reader.execute(DUE, {"now_ns": now_ns, "width_ns": MINUTE_NS})
             return [int(row[0]) for row in rows]

@@ -31,7 +31,7 @@ INSERT_NUMBERS = "INSERT INTO rollup_numbers VALUES (?,?,?,?,?,?)"
 
 
 def select_mark(reader: Connection, series: int) -> int:
-    """Return the time up to which the readings of a bearing are aggregated; 0 if none are."""
+    """Return the time, in ns, up to which a bearing's readings are aggregated; 0 if none are."""
     found = reader.execute(
         "SELECT until_ns FROM rollup_mark WHERE series = ?", (series,)
     ).fetchone()
@@ -100,7 +100,7 @@ def rolled_columns() -> tuple[str, ...]:
 
 
 SINGLE_S = 0
-"""Width that stands for single readings in the table of deleted data."""
+"""Width of single readings in the table of deleted data, in seconds."""
 
 SELECT_DELETED = "SELECT width_s, until_ns FROM retention_mark WHERE series = ?"
 SET_DELETED = """
@@ -116,7 +116,7 @@ class DeletedUntil:
     Parameters
     ----------
     until_ns
-        Time by width in seconds, 0 for single readings; no earlier data of that width exist.
+        Time in ns, by width in seconds (0 for single readings); earlier data no longer exist.
     """
 
     until_ns: dict[int, int]
@@ -127,19 +127,19 @@ class DeletedUntil:
         return self.of(SINGLE_S)
 
     def of(self, width_s: int) -> int:
-        """Return the time up to which roll-ups of a width were deleted; 0 if none were deleted."""
+        """Return the time, in ns, up to which data of a width were deleted; 0 if never."""
         return self.until_ns.get(width_s, 0)
 
     def kept_ns(self, time_ns: int) -> tuple[int, ...]:
-        """Return the widths of the roll-ups that are stored for a time, finest first."""
+        """Return the widths, in ns, of the roll-ups that still exist at `time_ns`, finest first."""
         return tuple(width for width in WIDTHS_NS if self.of(width // NS_PER_S) <= time_ns)
 
     def finest_ns(self, start_ns: int) -> int | None:
-        """Return the finest roll-up width available since a start; None for single readings."""
+        """Return the finest width, ns, of roll-ups since a start; None if readings still exist."""
         return self.kept_ns(start_ns)[0] if start_ns < self.readings_ns else None
 
     def stretches(self, span: tuple[int, int]) -> list[tuple[int, int]]:
-        """Split a time span at the times up to which data were deleted."""
+        """Return the parts of a time span, split at the times up to which data were deleted."""
         cuts = sorted({*span, *(t for t in self.until_ns.values() if span[0] < t < span[1])})
         return list(pairwise(cuts))
 
