@@ -52,7 +52,7 @@ class CaptureSettings:
     max_s
         Maximum duration of a capture.
     window_s
-        Averaging time of film readings; at least this duration is recorded before a film alarm.
+        Averaging time of film readings, recorded before a film alarm as far as `max_s` permits.
     """
 
     pre_s: float = 60.0
@@ -72,7 +72,7 @@ class CaptureSettings:
 
 
 def is_captured(event: AlarmEvent) -> bool:
-    """Return whether an event is captured: a new occurrence, not shelved or suppressed."""
+    """Return whether samples around an alarm event are captured: new, not shelved or suppressed."""
     return (
         event.change in ANNOUNCED
         and event.identity.kind in SAMPLED_KINDS
@@ -285,7 +285,7 @@ class Captures(WriterThread):
         return capture
 
     def _reaches_back(self, capture: Capture, unit: str, events: Sequence[AlarmEvent]) -> bool:
-        """Return whether a capture has all samples before the events that are still in memory."""
+        """Return whether a capture starts early enough for the events, or with the oldest block."""
         oldest_ns = next(iter(self._histories[unit])).start_ns
         return capture.start_ns <= max(min(map(self._settings.start_ns, events)), oldest_ns)
 

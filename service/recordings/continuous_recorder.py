@@ -69,7 +69,7 @@ class Omission:
         self.add(block.epoch, (*block.rejected, Rejection(reason, block.n_samples)))
 
     def before(self, block: SampleBlock) -> SampleBlock:
-        """Return a copy of a block that lists the dropped samples as rejected before it."""
+        """Return a copy of a block that lists the dropped samples as rejected before the block."""
         if not self.n_samples or self.epoch != block.epoch:
             return block
         total = self.n_samples.copy()

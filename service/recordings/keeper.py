@@ -150,7 +150,7 @@ class RecordingIndexer:
         self._lock.release()
 
     def look(self) -> None:
-        """Measure the free space and, if locked, maintain the recordings; runs in the thread."""
+        """Measure the free space; maintain the recordings if the lock is free; in the thread."""
         errors = FirstError()
         with errors.deferred():
             self._gauge.measure()  # first, as later steps may take long or fail

@@ -187,7 +187,7 @@ class RecordingWindow:
 
 
 def window_of(recording: Recording, start_s: float, seconds: float) -> RecordingWindow:
-    """Read the blocks from ``start_s`` after the first sample on, for a time of ``seconds``.
+    """Read the blocks from ``start_s`` to ``start_s + seconds`` after the first sample.
 
     Raises
     ------

@@ -81,7 +81,7 @@ def _time_ns(file: WaveformFile) -> int:
 
 @dataclass(frozen=True)
 class RoomLimits:
-    """Maximum total size of recordings of each kind, and maximum age of continuous recordings."""
+    """Limits of the total size of recordings by kind, and of the age of continuous recordings."""
 
     continuous_bytes: int = 100_000_000_000
     capture_bytes: int = 10_000_000_000
@@ -161,7 +161,7 @@ class FirstError:
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
-        """Return a context manager that catches `OSError` and `StoreError`; the first one is kept."""
+        """Return a context manager that catches `OSError` and `StoreError` and keeps the first."""
         try:
             yield
         except (OSError, StoreError) as error:

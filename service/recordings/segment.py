@@ -43,7 +43,7 @@ class CaptureError(Exception):
 
 
 class CaptureFile:
-    """File of a capture: a recording and its alarms, written atomically.
+    """Files of a capture, that is a recording and its alarms; written atomically.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ class Segment:
         sync_folder(root)
 
     def covers(self, block: SampleBlock) -> bool:
-        """Return whether a block belongs to the segment, which ends at a multiple of ``segment_s``."""
+        """Return whether a block starts in the segment, which ends at a multiple of its length."""
         return (
             block.start_ns // self._length_ns == self._number
             and self._n_samples < self._max_samples

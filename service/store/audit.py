@@ -88,7 +88,7 @@ class AuditChain:
                 self._update_head()
 
     def add(self, writer: Connection, actions: Iterable[AuditAction]) -> None:
-        """Append the entries of actions in a transaction; record first if the head file differs."""
+        """Append the entries of actions, after an entry on a contradicting head file, if any."""
         for action in actions:
             newest = newest_of(writer)
             if not self._is_due and self.head_error is None:
@@ -99,7 +99,7 @@ class AuditChain:
             _insert(writer, action, newest)
 
     def _difference(self, writer: Connection, newest: AuditHead) -> str | None:
-        """Return how the head file contradicts the chain; None if it agrees or only lags behind."""
+        """Return how the head file contradicts the chain; None if it agrees or is only older."""
         try:
             head = read_head(self._head)
         except HeadError as error:
@@ -144,7 +144,7 @@ class AuditedTables(Tables):
 
 
 class AuditStore(AuditedTables):
-    """Store of the audit trail; other stores write their entries within their transactions."""
+    """Store of the audit trail; other stores add audit entries to their transactions."""
 
     @property
     def head_error(self) -> str | None:
@@ -185,7 +185,7 @@ class Trail:
         self._reading, self._head, self._is_shared = reading, head, is_shared
 
     def verify(self) -> Verdict:
-        """Verify the whole audit trail without changing it.
+        """Return the result of verifying the whole audit trail, which is not changed.
 
         Raises
         ------
@@ -207,7 +207,7 @@ class Trail:
 
     @contextmanager
     def entries(self) -> Iterator[Iterator[AuditEntry]]:
-        """Open an iterator over all entries, oldest first.
+        """Return a context manager that provides an iterator over all entries, oldest first.
 
         Raises
         ------

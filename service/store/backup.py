@@ -364,7 +364,7 @@ def access_before(database: Path) -> AccessBefore | None:
 
 
 def revoke_again(access: AccessStore, before: AccessBefore | None, now_ns: int) -> AccessAfter:
-    """End all sessions of a restored database; revoke again the API keys that were revoked before.
+    """End all sessions of a restored database; revoke again the API keys listed in `before`.
 
     Raises
     ------

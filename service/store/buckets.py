@@ -137,7 +137,7 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int 
     Parameters
     ----------
     finest_ns
-        Width of the finest available roll-ups, a divisor of a day; the bucket width is a multiple.
+        Width of the finest available roll-ups, a divisor of a day and of the bucket width.
     """
     # a range that is not aligned with the buckets may overlap one more bucket
     needed = -(-(end_ns - start_ns) // max(max_points - 1, 1))
@@ -148,7 +148,7 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int 
 
 
 def single_points(readings: Summaries, hole_ns: int) -> Trend:
-    """Return the trend of single readings; an empty point marks each pause above `hole_ns`."""
+    """Return the trend of single readings, with an empty point in each interval above `hole_ns`."""
     holes = np.flatnonzero(np.diff(readings.time_ns) > hole_ns) + 1
     time_ns = np.insert(readings.time_ns, holes, readings.time_ns[holes - 1] + hole_ns // 2)
     series = {}

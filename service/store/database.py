@@ -119,7 +119,7 @@ class Database(Protocol):
 
 
 class Tables:
-    """Base class of the stores that read and write some tables of a database.
+    """Base class of stores; a store reads and writes some of the tables of a database.
 
     Parameters
     ----------

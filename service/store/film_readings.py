@@ -210,7 +210,7 @@ def _or_null(value: float) -> float | None:
 
 
 def select_decisions(reader: Connection, unit: str, bearing: str) -> list[StoredDecision]:
-    """Return the stored decision about each direction of a bearing.
+    """Return the stored decisions on the film of a bearing, one per direction.
 
     Raises
     ------

@@ -69,7 +69,7 @@ class FilmStore(BaselineTables):
         Parameters
         ----------
         values
-            Trend values by column name, shape (n,) each; NaN for missing values.
+            Trend values by column name, shape (n,) for n film readings; NaN for missing values.
         """
         time_ns = films.history.time_ns
         with self._writing() as writer:
@@ -82,7 +82,7 @@ class FilmStore(BaselineTables):
             writer.execute(MARK_PAST, span)
 
     def past_end_ns(self, unit: str, bearing: str) -> int | None:
-        """Return the end time of the simulated past data of a bearing; None if it has none."""
+        """Return the end time of the simulated past data of a bearing; None without such data."""
         with self._reading() as reader:
             row = reader.execute(
                 "SELECT end_ns FROM simulated_past JOIN series ON series.id = simulated_past.series"
@@ -107,7 +107,7 @@ class FilmStore(BaselineTables):
         return None if found[0] is None else int(found[0])
 
     def decisions(self, unit: str, bearing: str) -> list[StoredDecision]:
-        """Return the stored decision about each direction of a bearing."""
+        """Return the stored decisions on the film of a bearing, one per direction."""
         with self._reading() as reader:
             return select_decisions(reader, unit, bearing)
 

@@ -20,8 +20,8 @@ RETENTION_REST_SHARE = 9.0
 class RetentionLoop:
     """Loop that deletes old data in small steps, one bearing after the other, with pauses.
 
-    The age of data is relative to the 24th newest hour with results, or to the clock if earlier. A
-    clock that is set years ahead therefore causes no deletion within the first day.
+    The age of data is relative to the 24th newest hour with results, or to the clock if the clock
+    is earlier. A clock that is set years ahead therefore causes no deletion within the first day.
     """
 
     def __init__(self, store: RetentionStore, limits: Ages, clock: Clock) -> None:

@@ -23,7 +23,7 @@ class QueryTooLargeError(Exception):
 
 @dataclass(frozen=True)
 class ValueRange:
-    """Inclusive lower and upper bound of a value; None for no bound."""
+    """Range of values with inclusive lower and upper bounds; None for no bound."""
 
     low: float | None = None
     high: float | None = None

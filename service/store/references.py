@@ -109,7 +109,7 @@ class _References(AuditedTables, Generic[_Reference]):
     table: str
     columns: tuple[str, ...]
     key: tuple[str, ...]
-    """Key columns, the first of `columns`; one reference is in force per key."""
+    """Key columns, with which `columns` begins; one reference is in force per key."""
 
     order: str
     """Columns by which `in_force` sorts the references, as an SQL expression."""
@@ -209,7 +209,7 @@ def _gaps(reference: GapReference) -> dict[str, object]:
 
 
 class VectorReferenceStore(_References[SetVectorReference]):
-    """Table of the 1× vector references; one is in force per bearing and operating state."""
+    """Table of the 1× vector references; one per bearing and operating state is in force."""
 
     table = "vector_reference"
     columns = ("unit", "bearing", "state", "set_ns", "author", "note", "vectors")

@@ -150,10 +150,10 @@ BEARING_RULES: Mapping[str, Callable[[Connection, int, int], Step]] = {
     "ten_minutes_days": partial(_delete_rollups, 600),
     "films_days": _delete_films,
 }
-"""Functions that delete data of a bearing before a time, by age setting; finest data first."""
+"""Functions that delete data of a bearing older than a time, by age setting; finest first."""
 
 PLANT_RULES: Mapping[str, Callable[[Connection, int], Step]] = {"messages_days": _delete_messages}
-"""Functions that delete data of the whole plant before a time, by age setting."""
+"""Functions that delete data of the whole plant older than a time, by age setting."""
 
 Ages = Mapping[str, int]
 """Maximum age of data in ns, by name of the setting; data without an entry are never deleted."""

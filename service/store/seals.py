@@ -59,7 +59,7 @@ class DamageLog:
             return list(self._places)
 
     def note(self, place: Place) -> None:
-        """Add a damaged or missing row."""
+        """Add a damaged or missing row to the log, unless the row is already listed."""
         with self._lock:
             if place in self._places:
                 return
@@ -272,7 +272,7 @@ class Seals:
         return False
 
     def key_of(self, name: str, cells: Sequence[object]) -> str:
-        """Return the key of a row as text."""
+        """Return the key of a row as text, given the table name and all columns of the row."""
         table = self.tables[name]
         cell_of = dict(zip(table.columns, cells, strict=True))
         return ", ".join(f"{column} {_cell_words(cell_of[column])}" for column in table.key)

@@ -18,7 +18,7 @@ ADD = "INSERT INTO series (unit, bearing) VALUES (?, ?) ON CONFLICT DO NOTHING"
 
 
 def find_series(reader: Connection, unit: str, bearing: str) -> int | None:
-    """Return the database number of a bearing; None if the bearing has no number."""
+    """Return the database number of a bearing; None if nothing is stored for it."""
     found = reader.execute(FIND, (unit, bearing)).fetchone()
     return None if found is None else int(found[0])
 

@@ -251,7 +251,7 @@ class Commands(Tables):
         return [each for each in found if each.command.unit in units]
 
     def take(self, id_: str, process: str) -> bool:
-        """Record the process that executes a command; return False if it is already answered."""
+        """Record the process that executes a command; return False for an answered command."""
         with self._writing() as writer:
             return bool(writer.execute(TAKE, (process, id_)).rowcount == 1)
 

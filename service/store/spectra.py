@@ -201,7 +201,7 @@ TRIM = """
         ORDER BY id DESC LIMIT 1 OFFSET :n_kept
     )
 """
-"""Statement that deletes the spectra inserted first, since their times depend on the clock."""
+"""Statement that deletes spectra in order of insertion, since the clock may have been wrong."""
 
 IN_RANGE = """
     SELECT min(id), time_ns FROM spectrum WHERE series = ? AND time_ns >= ? AND time_ns < ?
@@ -220,7 +220,7 @@ JUDGED = tuple(
 def insert_spectra(
     writer: Connection, assessments: Iterable[Assessment], limits: SpectraLimits
 ) -> None:
-    """Insert the first spectrum of each interval of each tier; delete the oldest surplus ones."""
+    """Insert the first spectrum of each interval of each tier; delete spectra beyond the limit."""
     for assessment in assessments:
         spectrum = assessment.spectrum
         if spectrum.frequency_hz.size and spectrum.n_segments.diagonal().any():

@@ -10,7 +10,7 @@ from service.store.port import StoreError
 
 
 class WaveformKind(StrEnum):
-    """Kind of a waveform recording."""
+    """Kind of a waveform recording: capture around an alarm, or continuous recording."""
 
     CAPTURE = "capture"
     CONTINUOUS = "continuous"

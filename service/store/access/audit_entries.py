@@ -49,6 +49,10 @@ class AuditAction:
         Identifier of the changed object.
     before, after
         State of the object before and after the action as JSON values; None if not recorded.
+    reason
+        Reason given for the action; empty if none was given.
+    source
+        Interface through which the action was taken.
     peer
         Network address of the request, or user of the operating system; None if unknown.
     """

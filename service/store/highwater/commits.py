@@ -225,7 +225,7 @@ class CommitMarks:
     def settle(self) -> None:
         """Write the mark of the committed transaction to the file.
 
-        If the write fails, the transaction stays committed and the file lags until a later write.
+        If the write fails, the transaction stays committed and a later write updates the file.
         """
         if self._newest is None or self.found:
             return

@@ -57,7 +57,7 @@ class PostgresAddress:
         return f"PostgreSQL database {database} at {host}"
 
     def full(self, purpose: str) -> str:
-        """Return the connection string with the password and, for the server, the `purpose`.
+        """Return the connection string with the password, and the `purpose` in application_name.
 
         The string must never be displayed or logged.
         """
@@ -142,14 +142,14 @@ class PostgresConnection:
     def executemany(
         self, statement: str, parameters: Iterable[Parameters], /
     ) -> psycopg.Cursor[tuple[Any, ...]]:
-        """Run a statement once for each set of parameters, without a round trip for each."""
+        """Run a statement once for each set of parameters, in few network round trips."""
         cursor = self._session.cursor()
         cursor.executemany(translated(statement), parameters)
         return cursor
 
 
 def connected(address: PostgresAddress, purpose: str, settings: str) -> Session:
-    """Open a session with the common settings and additional SET statements."""
+    """Return a new session with the settings `SESSION` and additional SET statements."""
     session = psycopg.connect(address.full(purpose), autocommit=True, context=_Context)
     try:
         session.execute((SESSION + settings).encode())
@@ -284,7 +284,7 @@ UNREACHABLE = "check that PostgreSQL runs and can be reached; padwatch retries"
 
 
 def sentence(where: str, error: psycopg.Error) -> str:
-    """Return a one-line error message with advice."""
+    """Return a one-line message about a PostgreSQL error, with advice on the remedy."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     said = (error.diag.message_primary or (lines[0] if lines else type(error).__name__)).rstrip(".")
     advice = _advice(error)
@@ -302,7 +302,7 @@ def _advice(error: psycopg.Error) -> str | None:
 
 @contextmanager
 def renamed(where: str) -> Iterator[None]:
-    """Convert errors of PostgreSQL, psycopg and the operating system to `StoreError`."""
+    """Return a context manager that converts database and OS errors to `StoreError`."""
     try:
         yield
     except psycopg.Error as error:

@@ -209,7 +209,7 @@ class Writer:
 
 
 def writing_session(address: PostgresAddress) -> Session:
-    """Open a writing session.
+    """Return a new writing session on a suitable server.
 
     Raises
     ------

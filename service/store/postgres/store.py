@@ -66,7 +66,7 @@ class PostgresStore(Store):
 
 
 def _begin_head(database: PostgresDatabase, head: Path) -> bool:
-    """Write a missing head file; return whether the audit trail already had entries."""
+    """Write the head file if it is missing; return whether a trail with entries lacked it."""
     if head.exists():
         return False
     head.parent.mkdir(parents=True, exist_ok=True)

@@ -56,7 +56,7 @@ SET_MARK = """
 
 
 def gather_next(writer: Connection, series: int, now_ns: int) -> None:
-    """Aggregate the next complete minutes of readings of a bearing."""
+    """Aggregate the readings of the next complete minutes of a bearing into roll-ups."""
     mark_ns = select_mark(writer, series)
     until_ns = _until(writer, series, mark_ns, now_ns)
     if until_ns > mark_ns:
@@ -133,7 +133,7 @@ class RollupStore(Tables):
     """Store of roll-ups; readings that are not aggregated yet are read as single readings."""
 
     def due(self, now_ns: int) -> list[int]:
-        """Return the database numbers of bearings with readings to aggregate, oldest first."""
+        """Return the numbers of the bearings with readings to aggregate, longest delayed first."""
         with self._reading() as reader:
             rows = reader.execute(DUE, {"now_ns": now_ns, "width_ns": MINUTE_NS})
             return [int(row[0]) for row in rows]

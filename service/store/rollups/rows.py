@@ -295,7 +295,7 @@ def select_cells(
     names: tuple[str, ...],
     asked: Mapping[str, object] = ANYTHING,
 ) -> Cells | None:
-    """Return the cells of a time span that may contain requested readings; None without cells.
+    """Return the cells of a time span that may contain requested readings; None if none may.
 
     Parameters
     ----------

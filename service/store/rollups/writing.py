@@ -50,7 +50,7 @@ def minutes_of(writer: Connection, series: int, span: Span) -> Cells | None:
 
 
 def insert_cells(writer: Connection, series: int, width_ns: int, cells: Cells) -> None:
-    """Insert roll-ups of one width."""
+    """Insert roll-ups of one width for a bearing."""
     width_s, slots = width_ns // NS_PER_S, cells.slots().tolist()
     start_ns = cells.summaries.time_ns.tolist()
     writer.executemany(INSERT_CELL, _cell_rows(series, width_s, start_ns, slots, cells.conditions))
@@ -79,7 +79,7 @@ def _cell_rows(
 
 
 def forget_width(writer: Connection, series: int, width_ns: int, span: Span) -> None:
-    """Delete the roll-ups of one width in a time span."""
+    """Delete the roll-ups of one width of a bearing in a time span."""
     layouts = [row[0] for row in writer.execute("SELECT id FROM layout").fetchall()]
     its = (series, width_ns // NS_PER_S)
     writer.execute(
@@ -135,7 +135,7 @@ class DeletedUntil:
         return tuple(width for width in WIDTHS_NS if self.of(width // NS_PER_S) <= time_ns)
 
     def finest_ns(self, start_ns: int) -> int | None:
-        """Return the finest width, ns, of roll-ups since a start; None if readings still exist."""
+        """Return the finest roll-up width, ns, that exists at a time; None if readings exist."""
         return self.kept_ns(start_ns)[0] if start_ns < self.readings_ns else None
 
     def stretches(self, span: tuple[int, int]) -> list[tuple[int, int]]:

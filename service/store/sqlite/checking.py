@@ -127,7 +127,7 @@ def _damage(log: DamageLog) -> Iterator[Finding]:
 
 
 ROWS_AT_ONCE = 500
-"""Number of rows per read transaction of a few milliseconds, between which the WAL is truncated."""
+"""Number of rows per read transaction, which takes milliseconds and rarely delays a checkpoint."""
 
 HEX = "hex"
 REMEMBER_EVERY = 300
@@ -200,7 +200,7 @@ class Scrubber:
 
 
 def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
-    """Return index and last key of the check to resume; the first check without valid progress."""
+    """Return the number and the last key of the check to resume; 0 and None if unknown."""
     row = reader.execute(RECALL).fetchone()
     try:
         name, is_of_seals, after = json.loads(row[0]) if row else (None, False, None)

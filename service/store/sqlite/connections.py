@@ -73,7 +73,7 @@ class Readers:
             reader.close()
 
     def _should_end(self) -> Callable[[], bool]:
-        """Return a callback that interrupts a query: after a timeout, or without its client."""
+        """Return a callback that is true when a query has timed out or its client is gone."""
         asker, end_s = ASKER.get(), self._now_s() + LONGEST_S
         return lambda: self._now_s() > end_s or (asker is not None and asker.has_gone)
 
