@@ -22,7 +22,7 @@ from service.settings.alarm_kinds import SAMPLED_KINDS
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a capture.
+    """Result of a capture: the recording, or the reason why it was not written.
 
     Parameters
     ----------

@@ -94,7 +94,7 @@ class RecordingError(Exception):
 
 
 class UnitRecorder:
-    """Recorder of one unit; writes its blocks to consecutive segments.
+    """Recorder of one unit; writes the sample blocks to consecutive segments of recordings.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ REPORTED_S = 60.0
 
 
 class ContinuousRecorder(WriterThread):
-    """Continuous recorder of all units.
+    """Recorder that continuously writes the samples of all units to the disk.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ class Index:
         return {f.name: f.reason for f in self._files.values() if f.state is WaveformState.DAMAGED}
 
     def put(self, files: Iterable[WaveformFile]) -> None:
-        """Add or replace entries.
+        """Write entries to the index and the store; replace entries of the same kind and name.
 
         Raises
         ------

@@ -30,7 +30,7 @@ MAX_ALARM_BYTES = 1_000_000
 
 @dataclass(frozen=True)
 class RecordingEntry:
-    """Entry of a recording in the library.
+    """Recording in the library, with its manifest, alarm events and fault.
 
     Parameters
     ----------
@@ -172,10 +172,12 @@ class RecordingWindow:
 
     Parameters
     ----------
-    start_ns, stop_ns
-        Start time and end time of the whole recording.
+    start_ns
+        Start time of the whole recording.
+    stop_ns
+        End time of the whole recording.
     blocks
-        Blocks in the window with the same epoch as the first of them; empty in a gap.
+        Blocks in the window that have the epoch of the first block in it; empty in a gap.
     n_other
         Number of blocks in the window with other epochs, which are omitted.
     """

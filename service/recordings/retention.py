@@ -226,7 +226,7 @@ class SpaceGauge:
 log = structlog.get_logger()
 
 MAX_LOOK_S = 2.0
-"""Maximum time in seconds for indexing in one run; the next run indexes the remaining ones."""
+"""Maximum time in seconds for indexing in one run; the next run indexes the others."""
 
 CHECK_SHARE = 0.02
 """Maximum fraction of time in which indexed recordings are checked."""
@@ -260,7 +260,7 @@ class RetentionRules:
 
 
 class RecordingRetention:
-    """Retention of recordings: updates the index from the folders, and removes recordings.
+    """Maintenance of recordings: updates the index from the folders, checks and removes recordings.
 
     Each step runs even if other steps fail; for example, space is freed even if the index cannot be
     written.

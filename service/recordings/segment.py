@@ -145,7 +145,7 @@ class SegmentSettings:
     Parameters
     ----------
     segment_s
-        Duration of a segment, which becomes one recording.
+        Duration of a segment, which finally becomes one recording.
     part_s
         Duration of a part. A finished part is synced to the disk; a crash loses at most the open
         part and the queued blocks.

@@ -31,8 +31,12 @@ class Summaries:
         Times of single readings, or starts of aggregated time spans.
     count : (n, n_names)
         Number of usable readings.
-    mean, minimum, maximum : (n, n_names)
-        Mean and extremes of the usable readings; NaN without usable readings.
+    mean : (n, n_names)
+        Mean of the usable readings; NaN without usable readings.
+    minimum : (n, n_names)
+        Minimum of the usable readings; NaN without usable readings.
+    maximum : (n, n_names)
+        Maximum of the usable readings; NaN without usable readings.
     level : (n, n_names)
         Worst quality level of all readings.
     """

@@ -73,10 +73,12 @@ class FilmHistory:
         Numbers of `AlarmLevel`, 0 for no alarm.
     change : (2, n)
         Most significant mean deviation of ln(stiffness) from the baseline; NaN if unknown.
+    change_std : (2, n)
+        Standard uncertainty of `change`; NaN if unknown.
     deviation : (2, n)
         Deviation of ln(stiffness) of the reading from the baseline; NaN if unknown.
-    change_std, deviation_std : (2, n)
-        Standard uncertainties of `change` and of `deviation`; NaN if unknown.
+    deviation_std : (2, n)
+        Standard uncertainty of `deviation`; NaN if unknown.
     baseline_version : (n,)
         Version of the baseline, 0 for no baseline.
     """

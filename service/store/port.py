@@ -90,6 +90,8 @@ class Trend:
         Width of the buckets; None for single readings.
     time_ns
         Start times of the buckets, or times of the single readings.
+    series
+        Statistics of the readings by quantity.
     next_ns
         Time of the first reading of the next page; None on the last page.
     coarse_until_ns

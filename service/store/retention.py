@@ -197,7 +197,7 @@ class RetentionStore(Tables):
             return [int(row[0]) for row in reader.execute("SELECT id FROM series ORDER BY id")]
 
     def believed_ns(self) -> int | None:
-        """Return the start of the 24th newest hour with results, the latest over all bearings.
+        """Return the start, ns, of the 24th newest hour with results, the latest of all bearings.
 
         Returns None if no bearing has results of 24 hours.
         """

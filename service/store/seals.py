@@ -219,7 +219,7 @@ class Seals:
         self.tables: dict[str, SealedTable] = {}
 
     def begin(self, writer: sqlite3.Connection) -> None:
-        """Create missing checksums in a transaction; add triggers and views to the connection."""
+        """Create or recompute checksums if needed; add triggers and views to the connection."""
         self.tables = {table.name: table for table in _tables(writer)}
         self.register_functions(writer)
         (schema,) = writer.execute("PRAGMA main.user_version").fetchone()

@@ -321,7 +321,7 @@ READ_POSITION = f"SELECT {', '.join(POSITION_COLUMNS)} FROM stream_position WHER
 
 
 def write_positions(writer: Connection, positions: Iterable[StreamPosition]) -> None:
-    """Write the newest stream position of each unit, within the transaction of its results."""
+    """Write the newest stream position of each unit, in the transaction of the unit's results."""
     newest = {position.unit: position for position in positions}
     # in a fixed order, so that two writers cannot deadlock
     for _, position in sorted(newest.items()):

@@ -95,8 +95,10 @@ class StoredSpectrum:
         Number of segments in which all channels were usable.
     quality
         Worst quality of the 1× amplitudes.
-    order1_hz, vortex_hz
-        Frequency of the 1× line and of the vortex line; None if unknown.
+    order1_hz
+        Frequency of the 1× line; None if unknown.
+    vortex_hz
+        Frequency of the vortex line; None if unknown.
     bin_hz
         Line spacing, which is also the frequency of the first spectral line.
     amplitude_um_pk : (N_CHANNELS, n_lines)

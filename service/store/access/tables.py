@@ -27,11 +27,11 @@ class Account:
     password_hash
         Argon2id hash in the encoded text form, which includes its parameters.
     password_number
-        Number of the password, incremented at each change.
+        Version number of the password, incremented at each change.
     password_ns
         Time at which the password was set.
     must_change
-        Whether another person set the password, so that the account may only change it.
+        Whether another person set the password, so that the owner must change it before other use.
     """
 
     name: str
@@ -197,7 +197,7 @@ class SessionStore(AuditedTables):
         return is_begun
 
     def get(self, digest: bytes) -> tuple[Session, Account] | None:
-        """Return a session with the current state of its account; None if it does not exist."""
+        """Return a session and its account; None if the session does not exist."""
         with self._reading() as reader:
             row = reader.execute(SELECT_SESSION, (digest,)).fetchone()
         if row is None:

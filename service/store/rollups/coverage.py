@@ -128,13 +128,13 @@ class _Covering:
         self.take((inner[1], span[1]), finer_ns)
 
     def take_coarse(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span by roll-ups because its single readings, except late ones, are deleted."""
+        """Cover a span by roll-ups whose single readings, except late readings, are deleted."""
         self._take_cells(span, widths_ns)
         late = self._redone(span)
         self.cover.spans += [_within(span, (hour, hour + HOUR_NS)) for hour in late]
 
     def _take_cells(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span by the widest roll-ups inside; the finest roll-ups may extend beyond."""
+        """Cover a span by the widest roll-ups in it; the finest roll-ups may extend beyond the span."""
         width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
         inner = _inside(span, width_ns) if finer_ns else _around(span, width_ns)
         if finer_ns and inner[0] >= inner[1]:

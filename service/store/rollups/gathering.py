@@ -22,9 +22,9 @@ DELETE_HOUR = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time
 def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUntil) -> None:
     """Merge late readings into the roll-ups of an hour whose single readings were deleted.
 
-    The late readings are deleted in the same transaction, so that each is either stored or merged.
-    A reading that is written twice after its hour was deleted is counted twice, since padwatch
-    cannot recognize it.
+    The late readings are deleted in the same transaction, so that a late reading is either stored
+    or merged. A reading that is written twice after the readings of its hour were deleted is counted
+    twice, since padwatch cannot recognize the repetition.
     """
     hour = (hour_ns, hour_ns + HOUR_NS)
     minutes = minutes_of(writer, series, hour)
