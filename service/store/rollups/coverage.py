@@ -134,7 +134,7 @@ class _Covering:
         self.cover.spans += [_within(span, (hour, hour + HOUR_NS)) for hour in late]
 
     def _take_cells(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span by the widest roll-ups in it; the finest roll-ups may extend beyond the span."""
+        """Cover a span by the widest roll-ups in it; the finest may extend beyond the span."""
         width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
         inner = _inside(span, width_ns) if finer_ns else _around(span, width_ns)
         if finer_ns and inner[0] >= inner[1]:

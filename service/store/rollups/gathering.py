@@ -23,8 +23,8 @@ def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUn
     """Merge late readings into the roll-ups of an hour whose single readings were deleted.
 
     The late readings are deleted in the same transaction, so that a late reading is either stored
-    or merged. A reading that is written twice after the readings of its hour were deleted is counted
-    twice, since padwatch cannot recognize the repetition.
+    or merged. A reading that is written twice after the deletion of its hour is counted twice,
+    since padwatch cannot recognize the repetition.
     """
     hour = (hour_ns, hour_ns + HOUR_NS)
     minutes = minutes_of(writer, series, hour)
