@@ -205,7 +205,7 @@ def _wrong_head(
 
 
 def place_of(entry: AuditEntry, last: int) -> str:
-    """Return whether an entry with a wrong hash was altered or moved, as an error message."""
+    """Return the error message on an entry with a wrong hash: altered, or out of order."""
     for number in range(1, last + 1):
         if recomputed(replace(entry, number=number)) == entry.hash:
             return f"entry {entry.number} is out of order: it holds entry {number}"

@@ -355,7 +355,7 @@ class PostgresDatabase:
             yield reader
 
     def ever_had(self, connection: Connection, table: str) -> bool:  # noqa: ARG002
-        """Return True: the store writes a missing head file when it is opened."""
+        """Return True, so that a head file missing after the store was opened is an error."""
         return True
 
     def hold(self, name: str) -> PostgresHold:

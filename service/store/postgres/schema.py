@@ -162,7 +162,7 @@ def migrate(session: Session, where: str, origin: Origin) -> None:
 
 
 def _schema_number(session: Session, where: str, origin: Origin) -> int:
-    """Return the schema number of a database; create its table in a new database."""
+    """Return the schema number of a database; a new database receives the number 0."""
     if session.execute(HAS_WHAT).fetchone() == (True,):
         row = session.execute("SELECT origin, schema_number FROM padwatch").fetchone()
         if row is None:

@@ -66,7 +66,7 @@ class PostgresStore(Store):
 
 
 def _begin_head(database: PostgresDatabase, head: Path) -> bool:
-    """Write the head file if it is missing; return whether a trail with entries lacked it."""
+    """Write a missing head file; return True if it was missing although the trail has entries."""
     if head.exists():
         return False
     head.parent.mkdir(parents=True, exist_ok=True)
