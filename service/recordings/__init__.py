@@ -1,1 +1,1 @@
-"""Recordings of samples, around alarms and continuous; recording library and retention."""
+"""Recordings of vibration samples, around alarms and continuous; their library and retention."""

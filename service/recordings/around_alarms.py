@@ -22,7 +22,7 @@ from service.settings.alarm_kinds import SAMPLED_KINDS
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a capture.
+    """Result of a capture: the recording, or the reason why it was not written.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Outcome:
     folder
         Folder of the capture; None if the capture could not be written.
     reason
-        Reason why the capture could not be written.
+        Reason why the capture could not be written; None if it was written.
     """
 
     alarms: Sequence[AlarmEvent]
@@ -45,12 +45,14 @@ class CaptureSettings:
 
     Parameters
     ----------
-    pre_s, post_s
-        Duration before the alarm and after the alarm.
+    pre_s
+        Duration before the alarm.
+    post_s
+        Duration after the alarm.
     max_s
         Maximum duration of a capture.
     window_s
-        Duration of an averaging window, which is recorded before an alarm about a film.
+        Averaging time of film readings, recorded before a film alarm as far as `max_s` permits.
     """
 
     pre_s: float = 60.0
@@ -60,17 +62,17 @@ class CaptureSettings:
 
     @property
     def longest_pre_s(self) -> float:
-        """Maximum duration before an alarm, so that `post_s` still fits into the capture."""
+        """Maximum duration before an alarm, in s, that leaves room for `post_s` in the capture."""
         return max(self.pre_s, min(self.window_s, self.max_s - self.post_s))
 
     def start_ns(self, event: AlarmEvent) -> int:
-        """Return the start time of the capture of an alarm event."""
+        """Return the start time, in ns, of the capture of an alarm event."""
         is_film = event.identity.kind in FILM_KINDS
         return event.time_ns - ns_from_s(self.longest_pre_s if is_film else self.pre_s)
 
 
 def is_captured(event: AlarmEvent) -> bool:
-    """Return whether an event is captured: a new occurrence, not shelved or suppressed."""
+    """Return whether samples around an alarm event are captured: new, not shelved or suppressed."""
     return (
         event.change in ANNOUNCED
         and event.identity.kind in SAMPLED_KINDS
@@ -79,23 +81,23 @@ def is_captured(event: AlarmEvent) -> bool:
 
 
 class Capture:
-    """Capture in progress, which consists of whole blocks.
+    """Capture in progress, which consists of whole sample blocks.
 
     Parameters
     ----------
     start_ns
         Start time of the capture, by the time stamps of the samples.
     max_samples
-        Maximum number of samples per channel, in case the time stamps stop or decrease.
+        Maximum number of samples per channel, which applies if the time stamps stop or decrease.
 
     Attributes
     ----------
     alarms
         Alarm events that the capture covers; the first event started the capture.
     deadline_s
-        Monotonic time at which the capture is finished without further samples.
+        Monotonic time, in s, at which the capture is finished if no further samples arrive.
     pending
-        Blocks to be written, filled on the event loop and emptied in the thread.
+        Blocks to be written; added on the event loop and written in the writer thread.
     is_lost
         Whether the capture is abandoned because the disk is too slow.
     is_replaced
@@ -114,7 +116,7 @@ class Capture:
         self.is_lost = self.is_replaced = False
 
     def extend(self, event: AlarmEvent, now_s: float) -> None:
-        """Add an alarm event and extend the capture beyond it, up to the maximum duration."""
+        """Add an alarm event; extend the capture to `post_s` after it, up to `max_s` in total."""
         self.alarms.append(event)
         end_ns = max(self._end_ns, event.time_ns + ns_from_s(self._settings.post_s))
         self._end_ns = min(end_ns, self._last_end_ns)
@@ -127,12 +129,12 @@ class Capture:
             self._n_left -= block.n_samples
 
     def is_over(self, newest: SampleBlock) -> bool:
-        """Return whether all blocks after the newest block start after the end of the capture."""
+        """Return whether the capture is complete once it contains the newest block."""
         return newest.stop_ns >= self._end_ns or self._n_left <= 0
 
     @property
     def n_pending_samples(self) -> int:
-        """Number of samples of all channels that are still to be written."""
+        """Number of samples still to be written, summed over the channels."""
         return len(self.pending) * self.pending[0].counts.size if self.pending else 0
 
 
@@ -147,7 +149,7 @@ MAX_BUSY_S = 60.0
 """Maximum duration of one write, in seconds."""
 
 MAX_PENDING_SAMPLES = 50_000_000
-"""Maximum number of samples waiting to be written, of all channels and captures: 200 MB."""
+"""Maximum number of samples to be written, summed over channels and captures: 200 MB."""
 
 
 class Captures(WriterThread):
@@ -160,12 +162,14 @@ class Captures(WriterThread):
     make_writer
         Function that opens a recording, by unit; other units are not captured.
     rate_hz
-        Sampling rate of each unit in `make_writer`.
+        Sampling rate, by unit, of the units in `make_writer`.
 
     Attributes
     ----------
-    n_written, n_failed
-        Number of finished captures and of failed writes since the start.
+    n_written
+        Number of finished captures since the start.
+    n_failed
+        Number of failed writes since the start.
     """
 
     def __init__(
@@ -210,7 +214,7 @@ class Captures(WriterThread):
 
     @property
     def trouble(self) -> str | None:
-        """Reason why samples are not captured, an error or a disk timeout; None if they are."""
+        """Reason why captures are not written, an error or a disk timeout; None otherwise."""
         since_s = self._busy_since_s
         if since_s is not None and self._clock.monotonic_s() - since_s > MAX_BUSY_S:
             return "the disk does not answer"
@@ -281,12 +285,12 @@ class Captures(WriterThread):
         return capture
 
     def _reaches_back(self, capture: Capture, unit: str, events: Sequence[AlarmEvent]) -> bool:
-        """Return whether a capture starts early enough for all events, or at the oldest block."""
+        """Return whether a capture starts early enough for the events, or with the oldest block."""
         oldest_ns = next(iter(self._histories[unit])).start_ns
         return capture.start_ns <= max(min(map(self._settings.start_ns, events)), oldest_ns)
 
     def _replace(self, unit: str, events: list[AlarmEvent]) -> Capture:
-        """Replace the running capture by a capture with an earlier start and all its alarms."""
+        """Replace the running capture by a capture that starts earlier and has all alarms."""
         before = self._running[unit]
         before.is_replaced, before.pending = True, deque()
         self._end(unit)
@@ -319,7 +323,7 @@ class Captures(WriterThread):
         self._running = {u: c for u, c in self._running.items() if not c.file.is_closed}
 
     def _put(self, capture: Capture, is_last: bool) -> None:
-        """Write the pending blocks of a capture; runs in the thread."""
+        """Write the pending blocks of a capture; runs in the writer thread."""
         try:
             if capture.is_replaced:
                 capture.file.abandon("another capture contains them")
@@ -337,7 +341,7 @@ class Captures(WriterThread):
             self._note(str(error))
 
     def _remove_incomplete(self) -> None:
-        """Remove captures that a crash left incomplete; runs in the thread."""
+        """Remove captures that a crash left incomplete; runs in the writer thread."""
         try:
             for folder in remove_incomplete(self._root, self._histories):
                 log.warning("an incomplete capture is removed", folder=folder.name)

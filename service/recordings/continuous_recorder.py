@@ -1,4 +1,4 @@
-"""Continuous recording of all samples of units; samples are dropped under overload."""
+"""Continuous recording of the samples of units; under overload samples are dropped."""
 
 import asyncio
 from collections import Counter, deque
@@ -22,7 +22,7 @@ from service.runtime.heartbeats import UNHEARD, Pulse
 
 
 class DropReason(StrEnum):
-    """Reason why samples are missing from a continuous recording, as stated in the recording."""
+    """Reason, as stated in a continuous recording, why samples are missing from it."""
 
     ANALYSIS_BEHIND = "analysis_behind"
     DISK_SLOW = "disk_slow"
@@ -30,7 +30,7 @@ class DropReason(StrEnum):
     DISK_REFUSED = "disk_refused"
     NOT_RUNNING = "not_running"
     GAP_BEFORE = "gap_before"
-    """Samples missing from the device between two segments."""
+    """Samples that the device did not deliver between two segments."""
 
 
 WORDS = {
@@ -41,12 +41,12 @@ WORDS = {
 }
 
 Position = tuple[int, int]
-"""Epoch, and sample index after the last recorded sample."""
+"""Epoch, and index of the sample after the last recorded sample."""
 
 
 @dataclass
 class Omission:
-    """Numbers of samples of one epoch that were dropped since the last recorded block.
+    """Counts of the samples dropped in one epoch since the last recorded block.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class Omission:
     n_samples: Counter[str] = field(default_factory=Counter)
 
     def add(self, epoch: int, rejected: Iterable[Rejection]) -> None:
-        """Add dropped samples; a new epoch resets the numbers."""
+        """Add dropped samples to the counts; a new epoch first resets the counts."""
         if epoch != self.epoch:
             self.epoch, self.n_samples = epoch, Counter()
         for each in rejected:
@@ -69,7 +69,7 @@ class Omission:
         self.add(block.epoch, (*block.rejected, Rejection(reason, block.n_samples)))
 
     def before(self, block: SampleBlock) -> SampleBlock:
-        """Return a copy of a block that lists the dropped samples as rejected before it."""
+        """Return a copy of a block that lists the dropped samples as rejected before the block."""
         if not self.n_samples or self.epoch != block.epoch:
             return block
         total = self.n_samples.copy()
@@ -78,12 +78,12 @@ class Omission:
         return replace(block, rejected=tuple(Rejection(r, n) for r, n in total.items()))
 
     def clear(self) -> None:
-        """Reset the numbers, once a recorded block lists them."""
+        """Reset the counts, after a recorded block has listed the dropped samples."""
         self.n_samples = Counter()
 
 
 def unseen_part(block: SampleBlock, end: Position | None) -> SampleBlock | None:
-    """Return the part of a block after a position; None if the whole block lies before it."""
+    """Return the part of a block from a position on; None if the block ends before the position."""
     if end is None or end[0] != block.epoch or block.first_index >= end[1]:
         return block
     return None if block.stop_index <= end[1] else block.from_sample(end[1] - block.first_index)
@@ -94,7 +94,7 @@ class RecordingError(Exception):
 
 
 class UnitRecorder:
-    """Recorder of one unit; writes its blocks to consecutive segments.
+    """Recorder of one unit; writes the sample blocks to consecutive segments of recordings.
 
     Parameters
     ----------
@@ -105,9 +105,10 @@ class UnitRecorder:
     ----------
     ended
         Finished segments that are still to be joined.
-    n_written, n_refused
-        Numbers of samples per channel since the start that were synced, and that could not be
-        written.
+    n_written
+        Number of samples per channel synced to the disk since the start.
+    n_refused
+        Number of samples per channel since the start that could not be written.
     """
 
     def __init__(
@@ -149,7 +150,7 @@ class UnitRecorder:
         self.sync(now_s)
 
     def sync(self, now_s: float) -> None:
-        """Sync the open part to the disk if it is due.
+        """Sync the open part of the segment to the disk if `Segment.is_due`.
 
         Raises
         ------
@@ -215,7 +216,7 @@ class UnitRecorder:
 
 
 MAX_TRIED = 3
-"""Maximum number of recordings to try, from the newest, if recordings are damaged."""
+"""Maximum number of recordings that `last_end` tries to read, newest first."""
 
 
 def last_end(root: Path, unit: str) -> Position | None:
@@ -240,23 +241,23 @@ log = structlog.get_logger()
 WRITE_EVERY_S = 1.0
 
 MAX_WAIT_S = 20.0
-"""Maximum time in the queue, in seconds; a crash loses at most the queue and the open part."""
+"""Maximum time of a block in the queue, in seconds; a crash loses the queue and the open part."""
 
 MAX_WAITING_SAMPLES = 20_000_000
-"""Maximum number of samples in the queue, of all channels and units: 80 MB."""
+"""Maximum number of samples in the queue, summed over channels and units: 80 MB."""
 
 MAX_BUSY_S = 60.0
 """Maximum duration of one write, in seconds."""
 
 MAX_END_S = 2.0
-"""Maximum time to join segments on shutdown, in seconds; the next start joins the others."""
+"""Maximum time to join segments at shutdown, in seconds; the next start joins the rest."""
 
 REPORTED_S = 60.0
-"""Time in seconds for which `trouble` reports a dropped sample."""
+"""Time in seconds after a dropped sample during which `trouble` reports the reason."""
 
 
 class ContinuousRecorder(WriterThread):
-    """Continuous recorder of all units.
+    """Recorder that continuously writes the samples of all units to the disk.
 
     Parameters
     ----------
@@ -265,9 +266,9 @@ class ContinuousRecorder(WriterThread):
     units
         Units to record; blocks of other units are ignored.
     pressure
-        Function that returns the reason to drop samples now, or None.
+        Function that returns the reason to drop samples at present; None to record them.
     owned
-        Further units whose unfinished recordings are completed at the start.
+        Ids of further units whose unfinished recordings are completed at the start.
 
     Attributes
     ----------
@@ -318,7 +319,7 @@ class ContinuousRecorder(WriterThread):
         return WORDS[self._dropped[1]]
 
     def take(self, block: SampleBlock) -> None:
-        """Queue a block without waiting, or drop and count it."""
+        """Queue a block for writing, or drop the block under overload and count its samples."""
         if block.unit not in self._units or self._is_closed:
             return
         unseen = unseen_part(block, self._seen.get(block.unit))
@@ -375,7 +376,7 @@ class ContinuousRecorder(WriterThread):
         await self._in_thread(self._put, blocks)
 
     def _put(self, blocks: Sequence[SampleBlock]) -> None:
-        """Write blocks and join one segment; runs in the thread."""
+        """Write blocks and join one segment; runs in the writer thread."""
         now_s, error = self._clock.monotonic_s(), None if blocks else self.error
         for block in blocks:
             error = self._try(block.unit, methodcaller("write", block, now_s)) or error
@@ -384,7 +385,7 @@ class ContinuousRecorder(WriterThread):
         self._note(self._join_one() or error)
 
     def _try(self, unit: str, do: Callable[[UnitRecorder], None]) -> str | None:
-        """Call a function with the recorder of a unit; return the error message, if any."""
+        """Call a function with the recorder of a unit; return its error message, or None."""
         if unit not in self._recorders:
             self._recorders[unit] = UnitRecorder(
                 self._root, self._units[unit], self._settings, last_end(self._root, unit)
@@ -414,7 +415,7 @@ class ContinuousRecorder(WriterThread):
         return None
 
     def _end(self) -> None:
-        """End all segments, and join them within the time limit; runs in the thread."""
+        """End all segments, and join segments for up to `MAX_END_S`; runs in the writer thread."""
         for unit in list(self._recorders):
             self._note(self._try(unit, UnitRecorder.end))
         until_s = self._clock.monotonic_s() + MAX_END_S
@@ -423,7 +424,7 @@ class ContinuousRecorder(WriterThread):
                 self._note(self._join_one())
 
     def _recover(self) -> None:
-        """Join the segments that a crash left unjoined; runs in the thread."""
+        """Join the segments that a crash left unjoined; runs in the writer thread."""
         try:
             left = unjoined(self._root, self._owned)
             remove_incomplete(self._root, self._owned)

@@ -1,4 +1,4 @@
-"""Folder names of recordings, which contain their state, and operations on these folders."""
+"""Folders of recordings: names, which show the state of the recording, and file operations."""
 
 import os
 import re
@@ -14,7 +14,7 @@ from core.units import NS_PER_S
 from service.runtime.files import write_whole
 
 CONTINUOUS = "continuous"
-"""Last part of the name of a continuous recording; a capture has the kind of its alarm instead."""
+"""Last part of the name of a continuous recording; a capture name ends with the alarm kind."""
 
 PARTS = ".parts"
 """Suffix of the folder that holds the parts of a segment until they are joined."""
@@ -46,7 +46,7 @@ def new_folder(root: Path, unit: str, time_ns: int, kind: str) -> Path:
 
 
 def unit_of(name: str) -> str | None:
-    """Return the unit in the name of a recording; None for other names."""
+    """Return the unit id in the name of a recording; None if the name is not of a recording."""
     found = _NAME.match(name)
     return found[1] if found else None
 
@@ -90,7 +90,7 @@ def remove_incomplete(root: Path, units: Container[str | None]) -> list[Path]:
 
 
 def remove_recording(folder: Path) -> None:
-    """Remove a recording if it exists, manifest before data, so that no rest looks complete."""
+    """Remove a recording if it exists, the manifest first, so that a remainder is not complete."""
     if folder.is_dir():
         for name in FILES:
             (folder / name).unlink(missing_ok=True)
@@ -113,7 +113,7 @@ def finished(root: Path) -> Iterator[str]:
 
 
 def is_recording(folder: Path) -> bool:
-    """Return whether a folder contains files of a recording, all or some, and no other files.
+    """Return whether a folder contains some or all files of a recording, and no other files.
 
     Raises
     ------
@@ -137,12 +137,12 @@ def being_removed(root: Path) -> list[str]:
 
 
 def begin_removal(folder: Path) -> None:
-    """Rename a recording to mark it as being removed; it is no longer listed."""
+    """Rename the folder of a recording to mark it as being removed; `finished` then omits it."""
     folder.rename(_removed(folder))
 
 
 def delete_files(folder: Path) -> None:
-    """Delete the files of a recording whose removal has begun; may be repeated.
+    """Delete the files of a recording after `begin_removal`; a repeated call has no effect.
 
     Raises
     ------
@@ -176,14 +176,14 @@ def finish_removal(folder: Path) -> Path | None:
 
 
 def set_aside(folder: Path) -> Path:
-    """Rename a recording to mark it as damaged; return its new folder."""
+    """Rename the folder of a recording to mark it as damaged; return the new path."""
     if folder.name.endswith(DAMAGED):
         return folder
     return folder.rename(_suffixed(folder, DAMAGED))
 
 
 def n_bytes_of(folder: Path) -> int:
-    """Return the size in bytes of the readable files of a recording."""
+    """Return the total size in bytes of the files of a recording, without inaccessible files."""
     sizes = 0
     for name in FILES:
         try:

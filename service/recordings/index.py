@@ -1,4 +1,4 @@
-"""Index of recordings, and inspection of recordings."""
+"""Index of the recordings in a data folder, and checks of recordings against the index."""
 
 import errno
 import hashlib
@@ -23,7 +23,7 @@ ON_DISK = (WaveformState.PRESENT, WaveformState.DAMAGED)
 
 
 class Index:
-    """Index of all recordings except removed recordings; for use in one thread."""
+    """Index of the recordings in a data folder, loaded from the store; for use in one thread."""
 
     def __init__(self, store: WaveformStore, place: str) -> None:
         self._store, self.place = store, place
@@ -35,17 +35,17 @@ class Index:
         return self._files.get((kind, name))
 
     def names(self, kind: WaveformKind) -> set[str]:
-        """Return the names of the recordings of a kind that should be on the disk."""
+        """Return the names of the indexed recordings of a kind, except missing recordings."""
         return {file.name for file in self.on_disk if file.kind is kind}
 
     @property
     def on_disk(self) -> Sequence[WaveformFile]:
-        """Recordings on the disk, including damaged ones."""
+        """Entries of the recordings on the disk, including damaged recordings."""
         return [file for file in self._files.values() if file.state in ON_DISK]
 
     @property
     def whole(self) -> Sequence[WaveformFile]:
-        """Recordings on the disk without a known fault."""
+        """Entries of the recordings on the disk without a known fault."""
         return [f for f in self._files.values() if f.state is WaveformState.PRESENT]
 
     @property
@@ -54,7 +54,7 @@ class Index:
         return {f.name: f.reason for f in self._files.values() if f.state is WaveformState.DAMAGED}
 
     def put(self, files: Iterable[WaveformFile]) -> None:
-        """Add or replace entries.
+        """Write entries to the index and the store; replace entries of the same kind and name.
 
         Raises
         ------
@@ -69,13 +69,13 @@ class Index:
                 self._removed.pop(key, None)  # the name is in use again
 
     def remove(self, file: WaveformFile, reason: str, now_ns: int) -> None:
-        """Remove an entry; `store_removals` writes the removal to the store."""
+        """Remove an entry from the index in memory; `store_removals` then updates the store."""
         gone = replace(file, state=WaveformState.REMOVED, reason=reason, changed_ns=now_ns)
         self._files.pop((file.kind, file.name), None)
         self._removed[file.kind, file.name] = gone
 
     def store_removals(self) -> None:
-        """Write pending removals to the store; after an error they stay pending.
+        """Write the removals of entries to the store; after an error they can be written again.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class Index:
             self._removed.clear()
 
     def forget(self, before_ns: int) -> None:
-        """Delete entries of recordings that were removed or missing before a time.
+        """Delete the entries of recordings that have been removed or missing since before a time.
 
         Raises
         ------
@@ -106,11 +106,11 @@ DAMAGE_ERRORS = (
     *(errno.ENOENT, errno.EISDIR, errno.ENOTDIR),
     *(errno.ELOOP, errno.EINVAL, errno.EFBIG),
 )
-"""Error numbers that show damage of a recording; after other errors a retry may succeed."""
+"""Values of ``errno`` that mean a damaged recording; after other errors a retry may succeed."""
 
 
 def inspected(folder: Path, place: str, kind: WaveformKind, now_ns: int) -> WaveformFile:
-    """Read a recording completely and return its index entry, with the fault if it is damaged.
+    """Read a whole recording and return its index entry, with the fault of a damaged recording.
 
     Raises
     ------
@@ -147,7 +147,7 @@ def inspected(folder: Path, place: str, kind: WaveformKind, now_ns: int) -> Wave
 
 
 def reinspected(known: WaveformFile, folder: Path, now_ns: int) -> WaveformFile:
-    """Read an indexed recording again and return its entry; a changed recording is damaged.
+    """Read an indexed recording again and return its entry: damaged if its content has changed.
 
     Raises
     ------
@@ -163,10 +163,10 @@ def reinspected(known: WaveformFile, folder: Path, now_ns: int) -> WaveformFile:
 
 
 def _raise_refusal(error: BaseException, folder: Path) -> None:
-    """Raise the cause of an error if the disk or the system caused it, not damage.
+    """Raise `OSError` if an error was caused by the disk or the system, not by damage.
 
-    The reader wraps such errors. An `OSError` without an error number reports a format error;
-    libraries use the same class for both.
+    Such errors are causes of the error from the reader. An `OSError` without an error number is not
+    raised: libraries use this class also for format errors.
     """
     cause: BaseException | None = error
     while cause is not None:
@@ -178,7 +178,7 @@ def _raise_refusal(error: BaseException, folder: Path) -> None:
 
 
 class RecordingState(StrEnum):
-    """State of a recording found by a check."""
+    """State of a recording according to `RecordingCheck`."""
 
     SOUND = "sound"
     NOT_ENTERED = "not_entered"
@@ -189,7 +189,7 @@ class RecordingState(StrEnum):
 
 @dataclass(frozen=True)
 class CheckResult:
-    """Result of the check of a recording, with the reason if the recording is not sound."""
+    """Result of the check of one recording; the reason is empty for a sound recording."""
 
     kind: WaveformKind
     name: str
@@ -210,7 +210,7 @@ class RecordingCheck:
     Attributes
     ----------
     n_to_read
-        Number of recordings that the check reads.
+        Number of recordings in the folders, which the check reads completely.
     """
 
     def __init__(
@@ -227,7 +227,7 @@ class RecordingCheck:
         self.n_to_read = len(self._there)
 
     def results(self) -> Iterator[CheckResult]:
-        """Read all recordings and yield the result of each.
+        """Read all recordings and yield the results, also for missing and unfinished recordings.
 
         Raises
         ------
@@ -268,20 +268,20 @@ RETRY_S = 60.0
 
 
 class RetryList:
-    """Recordings that could not be read because of the disk or the system, for a later retry."""
+    """List of recordings that the disk or the system could not read, for a later retry."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
         self._refused: dict[Key, tuple[float, OSError]] = {}
 
     def is_due(self, kind: WaveformKind, name: str) -> bool:
-        """Return whether a recording may be read now: no failure, or the delay has passed."""
+        """Return whether a recording can be read: not listed, or listed for at least `RETRY_S`."""
         tried = self._refused.get((kind, name))
         return tried is None or self._clock.monotonic_s() - tried[0] >= RETRY_S
 
     @contextmanager
     def noted(self, kind: WaveformKind, name: str) -> Iterator[None]:
-        """Add the recording to the list if the context raises `OSError`, else remove it."""
+        """Return a context manager that lists a recording after an `OSError`, else removes it."""
         try:
             yield
         except OSError as error:
@@ -291,10 +291,10 @@ class RetryList:
             self._refused.pop((kind, name), None)
 
     def keep(self, kind: WaveformKind, names: Collection[str]) -> None:
-        """Remove all recordings of a kind except the named recordings from the list."""
+        """Remove the recordings of a kind from the list, except recordings with the given names."""
         self._refused = {k: v for k, v in self._refused.items() if k[0] != kind or k[1] in names}
 
     def raise_first(self) -> None:
-        """Raise the error of the first recording in the list; do nothing if the list is empty."""
+        """Raise the error of the recording that was listed first; no effect on an empty list."""
         for _, refusal in self._refused.values():
             raise refusal.with_traceback(None)

@@ -1,4 +1,4 @@
-"""Background task that maintains the recordings of a data folder, in one process at a time."""
+"""Background task that indexes, checks and removes recordings, in one process per data folder."""
 
 import asyncio
 import fcntl
@@ -25,7 +25,7 @@ LOCK = "recordings.lock"
 
 
 class RecordingLock:
-    """File lock held by the process that maintains the recordings; released when it ends."""
+    """File lock of the process that maintains the recordings; released when the process ends."""
 
     def __init__(self, data_folder: Path) -> None:
         self._path = data_folder / LOCK
@@ -61,10 +61,10 @@ class RecordingLock:
 LOOK_EVERY_S = 5.0
 
 SHARE = 0.02
-"""Maximum fraction of time spent in runs, regardless of the number of recordings."""
+"""Maximum fraction of time spent in runs of `RecordingIndexer`."""
 
 MAX_LOOK_S = 600.0
-"""Maximum duration of a run in seconds; a run may read all of a large recording."""
+"""Maximum duration of a run in seconds; a run may read a whole large recording."""
 
 LASTING_S = 60.0
 """Time in seconds for which runs must fail before an alarm is raised."""
@@ -76,9 +76,9 @@ class RecordingIndexer:
     Parameters
     ----------
     gauge
-        Measurement of the free space, which every process performs.
+        Measurement of the free space, also performed by processes without the lock.
     open_retention
-        Creates the retention; called in the thread, and called again if it raised an error.
+        Function that returns the retention; called in the thread, and again after an error.
     lock
         Lock of the process that maintains the recordings.
 
@@ -86,8 +86,10 @@ class RecordingIndexer:
     ----------
     faults
         Fault of each damaged recording, by name.
-    n_files, n_bytes
-        Number and size of the recordings on the disk, by kind.
+    n_files
+        Number of the recordings on the disk, by kind.
+    n_bytes
+        Total size of the recordings on the disk, by kind.
     trouble
         First error of the last run; None if the run succeeded.
     """
@@ -111,7 +113,7 @@ class RecordingIndexer:
 
     @property
     def found(self) -> RetentionCounts:
-        """Counts of processed recordings since the start."""
+        """Numbers of indexed, checked, damaged, missing and removed recordings since the start."""
         return self._retention.found if self._retention else RetentionCounts()
 
     @property
@@ -121,7 +123,7 @@ class RecordingIndexer:
 
     @property
     def lasting_trouble(self) -> str | None:
-        """Reason why runs have failed for at least a minute; None otherwise."""
+        """Reason why all runs have failed for at least `LASTING_S`; None otherwise."""
         lasts_s = self._clock.monotonic_s() - self._failing_since_s
         if self.trouble is None or lasts_s < LASTING_S:
             return None
@@ -148,7 +150,7 @@ class RecordingIndexer:
         self._lock.release()
 
     def look(self) -> None:
-        """Perform one run: measure the free space and maintain the recordings; in the thread."""
+        """Measure the free space; maintain the recordings if the lock is free; in the thread."""
         errors = FirstError()
         with errors.deferred():
             self._gauge.measure()  # first, as later steps may take long or fail

@@ -1,4 +1,4 @@
-"""Library of finished recordings; reading of a time window of a recording."""
+"""Library of finished recordings, and the samples in a time window of a recording."""
 
 import json
 import re
@@ -30,7 +30,7 @@ MAX_ALARM_BYTES = 1_000_000
 
 @dataclass(frozen=True)
 class RecordingEntry:
-    """Entry of a recording in the library.
+    """Recording in the library, with its manifest, alarm events and fault.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class RecordingEntry:
     fault
         Reason why the recording cannot be opened; None for a sound recording.
     alarms
-        Alarms that the recording was made for, as listed in its file ``alarm.json``.
+        Alarm events in the file ``alarm.json`` of a capture; empty for other recordings.
     n_bytes
         Size of all files of the recording.
     """
@@ -58,7 +58,7 @@ class RecordingLibrary:
     Parameters
     ----------
     roots
-        Folders that contain the recordings; they need not exist yet.
+        Folders that contain the recordings; a missing folder counts as empty.
     faults
         Faults of damaged recordings, by name; damaged recordings are not opened.
     """
@@ -69,7 +69,7 @@ class RecordingLibrary:
     def newest(
         self, limit: int, unit: str | None = None, kind: WaveformKind | None = None
     ) -> list[RecordingEntry]:
-        """Return the newest recordings, optionally of one unit or one kind, newest first."""
+        """Return at most `limit` recordings, newest first; None for all units or all kinds."""
         folders = [
             folder
             for folder in self._folders()
@@ -79,7 +79,7 @@ class RecordingLibrary:
         return [self._entry(folder) for folder in by_age[:limit]]
 
     def one(self, name: str) -> RecordingEntry | None:
-        """Return the recording with a name; None if it does not exist."""
+        """Return the entry of the recording with a name; None if the recording does not exist."""
         folder = self._folder(name)
         return None if folder is None else self._entry(folder)
 
@@ -103,7 +103,7 @@ class RecordingLibrary:
         return summary_of(self.opened(name))
 
     def zip_pieces(self, name: str) -> Generator[bytes, None, None]:
-        """Yield the files of a recording as one ZIP file; raises as `opened` does.
+        """Yield the content of a ZIP file with all files of a recording; raises as `opened` does.
 
         Raises
         ------
@@ -115,13 +115,13 @@ class RecordingLibrary:
         return zipped({f"{name}/{file}": folder / file for file in there})
 
     def csv_pieces(self, name: str) -> Generator[bytes, None, None]:
-        """Yield the samples as CSV with units in the headings; raises as `opened` does."""
+        """Yield the samples as CSV text with units in the header; raises as `opened` does."""
         recording, sink = self.opened(name), Sink()
         for _ in write_rows(recording, ExportFormat.CSV, sink):
             yield from sink.taken()
 
     def _folder(self, name: str) -> Path | None:
-        """Return the listed folder with a name, so that no name leads out of the roots."""
+        """Return the folder of a recording; None if no folder in the roots has the name."""
         if _NAME.fullmatch(name) is None:
             return None
         return next((folder for folder in self._folders() if folder.name == name), None)
@@ -146,7 +146,7 @@ def kind_of(name: str) -> WaveformKind:
 
 
 def _age(folder: Path) -> tuple[str, str]:
-    """Return the sort key of a recording by age, from its name without access to the disk."""
+    """Return the start time in the name of a recording, and the name, as a sort key."""
     found = _TIME.search(folder.name)
     return found[0] if found else "", folder.name
 
@@ -172,12 +172,14 @@ class RecordingWindow:
 
     Parameters
     ----------
-    start_ns, stop_ns
-        Start and end of the whole recording.
+    start_ns
+        Start time of the whole recording.
+    stop_ns
+        End time of the whole recording.
     blocks
-        Blocks in the window that have the epoch of its first block; empty in a gap.
+        Blocks in the window that have the epoch of the first block in it; empty in a gap.
     n_other
-        Number of blocks of later epochs in the window, which are omitted.
+        Number of blocks in the window with other epochs, which are omitted.
     """
 
     start_ns: int
@@ -187,7 +189,7 @@ class RecordingWindow:
 
 
 def window_of(recording: Recording, start_s: float, seconds: float) -> RecordingWindow:
-    """Read a time window, which starts ``start_s`` after the first sample of the recording.
+    """Read the blocks from ``start_s`` to ``start_s + seconds`` after the first sample.
 
     Raises
     ------

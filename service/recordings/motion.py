@@ -1,4 +1,4 @@
-"""Motion of a shaft in its bearing (orbit), from the newest samples or from a recording."""
+"""Shaft orbit: motion of a shaft in its bearing, from new samples or from a recording."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from service.live.samples import SampleWindow, sample_window
 from service.recordings.library import RecordingWindow, window_of
 
 MIN_MARKS = 3
-"""Minimum number of key-phase marks to compute a speed."""
+"""Minimum number of key-phase marks from which a speed is computed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Order1:
     x_um, y_um
         (n_samples,) displacement at running speed; NaN where too few neighbouring samples exist.
     ellipse
-        1x orbit in the middle of the window.
+        Ellipse of the 1x orbit in the middle of the window.
     """
 
     frequency_hz: float
@@ -51,13 +51,14 @@ class ShaftMotion:
     x_um, y_um
         (n_samples,) displacement along the bearing's axes, mean removed; NaN for missing samples.
     centre_um
-        Mean (x, y) position of the shaft in the clearance circle; None if unknown.
+        Mean position (x, y) of the shaft centre in the clearance circle; None if unknown.
     speed_rpm
         Speed from the key-phase marks, else from the slow channel; None if unknown.
     order1
         1x component; None if the speed is unknown or the samples are too few.
     marks
-        Positions of the key-phase marks in samples from the first; None without a key phase.
+        Positions of the key-phase marks, as fractional sample numbers from 0; None without a
+        key-phase channel.
     """
 
     window: SampleWindow
@@ -70,7 +71,7 @@ class ShaftMotion:
 
 
 def channels_for(unit: Unit, bearing: Bearing) -> list[str]:
-    """Return the ids of the waveform channels needed to compute the motion in a bearing."""
+    """Return the ids of the waveform channels from which the shaft motion is computed."""
     wanted = (
         *(bearing.shaft_x, bearing.shaft_y, bearing.opposite_x, bearing.opposite_y),
         unit.key_phase,
@@ -173,7 +174,7 @@ def _gap(window: SampleWindow, channel: Channel | None, slow_channel: str | None
 
 
 class NoMotionError(Exception):
-    """Error raised if a recording lacks a channel or samples; the message states which."""
+    """A recording lacks a needed channel or samples; the message states which."""
 
 
 @dataclass(frozen=True)
@@ -196,7 +197,7 @@ class RecordedMotion:
 def recorded_motion(
     recording: Recording, unit: Unit, bearing: Bearing, start_s: float, seconds: float
 ) -> RecordedMotion:
-    """Read the shaft motion in a time window of a recording, with the recorded calibration.
+    """Return the shaft motion in a time window of a recording, with the recorded calibration.
 
     Raises
     ------
@@ -236,7 +237,7 @@ def _rows(manifest: Manifest, unit: Unit, bearing: Bearing) -> Mapping[str, int]
 
 
 def _indices(window: RecordingWindow, start_s: float, seconds: float) -> tuple[int, int]:
-    """Return sample index and number of samples of the window, limited to existing samples."""
+    """Return first sample index and number of the samples of a recording in a time window."""
     first, last = window.blocks[0], window.blocks[-1]
     from_ns = window.start_ns + ns_from_s(start_s)
     skipped = max(0, round(s_from_ns(from_ns - first.start_ns) * first.rate_hz))

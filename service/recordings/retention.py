@@ -1,4 +1,4 @@
-"""Retention of recordings: limits of age and space, order of removal, and periodic checks."""
+"""Retention of recordings: removal by age and disk space, and periodic checks for damage."""
 
 import errno
 import os
@@ -27,22 +27,22 @@ from service.store.port import StoreError
 from service.store.waveforms import WaveformFile, WaveformKind, WaveformState
 
 TRUSTED_NS = DAY_NS
-"""Total duration of recordings after which the clock of their unit is trusted."""
+"""Total duration of recordings, ns, that confirms that the clock of the unit is correct."""
 
 MAX_LENGTH_NS = 3600 * NS_PER_S
-"""Maximum duration of a recording in the settings; a longer duration indicates a clock step."""
+"""Maximum duration of a recording, ns; a longer duration indicates a step of the clock."""
 
 
 class AgeLimit:
     """Age limit of continuous recordings, by the clock of each unit.
 
-    Age is counted from the newest time that is followed by a day of recordings, so that a forward
-    step of the clock does not make all recordings too old.
+    The age is counted back from the start of the newest day of recordings, or from now if that is
+    earlier, so that a forward step of the clock does not make all recordings too old.
 
     Parameters
     ----------
     files
-        All continuous recordings.
+        Index entries of all continuous recordings.
     keep_ns
         Maximum age in nanoseconds.
     """
@@ -66,7 +66,7 @@ class AgeLimit:
 
 
 def _trusted_ns(files: Iterable[WaveformFile]) -> int | None:
-    """Return the time since which a day of recordings exists; None for less than a day."""
+    """Return the time after which `TRUSTED_NS` of recordings were made; None if there are fewer."""
     n_recorded_ns = 0
     for file in sorted(files, key=_time_ns, reverse=True):
         n_recorded_ns += min(max(file.stop_ns - file.start_ns, 0), MAX_LENGTH_NS)
@@ -81,7 +81,7 @@ def _time_ns(file: WaveformFile) -> int:
 
 @dataclass(frozen=True)
 class RoomLimits:
-    """Maximum total size of recordings of each kind, and maximum age of continuous recordings."""
+    """Limits of the total size of recordings by kind, and of the age of continuous recordings."""
 
     continuous_bytes: int = 100_000_000_000
     capture_bytes: int = 10_000_000_000
@@ -89,7 +89,7 @@ class RoomLimits:
 
 
 InUse = Callable[[], frozenset[str]]
-"""Function that returns the names of the captures that evidence of alarms refers to."""
+"""Function that returns the names of the captures to which the evidence of alarms refers."""
 
 Remove = Callable[[WaveformFile, str], bool]
 """Function (recording, reason) that removes a recording and returns whether this succeeded."""
@@ -103,13 +103,13 @@ def make_room(
     in_use: InUse,
     remove: Remove,
 ) -> None:
-    """Remove recordings beyond the limits, continuous recordings first.
+    """Remove the oldest recordings until the limits are met, continuous recordings first.
 
     Parameters
     ----------
     short_bytes
-        Disk space to free, by kind. Captures are removed for it only if the removal of continuous
-        recordings frees too little, and never if evidence refers to them.
+        Disk space to free, in bytes, by kind. To free it, captures are removed only if the removal
+        of continuous recordings frees too little, and never if evidence refers to the captures.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def make_room(
 def _remove_captures(
     by_age: Sequence[WaveformFile], over: int, short: int, in_use: frozenset[str], remove: Remove
 ) -> None:
-    """Remove captures except the newest; captures in use last, and only beyond their size limit."""
+    """Remove captures but never the newest; captures in use last, only for the size limit."""
     for file in sorted(by_age[:-1], key=lambda file: file.name in in_use):
         if over > 0:
             why = "captures exceed max_gb"
@@ -154,14 +154,14 @@ def _remove_captures(
 
 
 class FirstError:
-    """Collector of the first error of several independent steps."""
+    """First error of several steps that all run, even if one of them fails."""
 
     def __init__(self) -> None:
         self.first: OSError | StoreError | None = None
 
     @contextmanager
     def deferred(self) -> Iterator[None]:
-        """Catch an error of the disk or the store in the context; keep the first error."""
+        """Return a context manager that catches `OSError` and `StoreError` and keeps the first."""
         try:
             yield
         except (OSError, StoreError) as error:
@@ -183,14 +183,14 @@ class SpaceGauge:
     space
         Limits of the free space.
     measure
-        Function that measures the space of the disk of a folder.
+        Function that measures the total and free space of the disk of a folder.
 
     Attributes
     ----------
     is_full
         Whether too little space is left for continuous recording.
     short_bytes
-        Space to free on the disk of each kind of recordings.
+        Disk space to free, in bytes, by kind of recordings.
     """
 
     def __init__(
@@ -201,7 +201,7 @@ class SpaceGauge:
         self.short_bytes = dict.fromkeys(WaveformKind, 0)
 
     def measure(self) -> None:
-        """Measure the free space of all disks; 0 bytes are to be freed on an unreadable disk.
+        """Measure the free space of all disks; `short_bytes` is 0 for an unreadable disk.
 
         Raises
         ------
@@ -226,15 +226,15 @@ class SpaceGauge:
 log = structlog.get_logger()
 
 MAX_LOOK_S = 2.0
-"""Maximum time in seconds to index new recordings in one run; the next run continues."""
+"""Maximum time in seconds for indexing in one run; the next run indexes the others."""
 
 CHECK_SHARE = 0.02
-"""Maximum fraction of time spent on checks of indexed recordings."""
+"""Maximum fraction of time in which indexed recordings are checked."""
 
 CHECK_EVERY_NS = DAY_NS
 
 REMEMBERED_NS = 90 * DAY_NS
-"""Retention of index entries of removed and missing recordings."""
+"""Retention time of the index entries of removed and missing recordings, ns."""
 
 
 @dataclass
@@ -251,7 +251,7 @@ class RetentionCounts:
 
 @dataclass(frozen=True)
 class RetentionRules:
-    """Rules of the retention of recordings, and the folder of each kind of recordings."""
+    """Folder of each kind of recordings, limits of their size and age, and captures in use."""
 
     roots: Mapping[WaveformKind, Path]
     room: RoomLimits
@@ -260,9 +260,10 @@ class RetentionRules:
 
 
 class RecordingRetention:
-    """Retention of recordings: updates the index from the folders, and removes recordings.
+    """Maintenance of recordings: updates the index from the folders, checks and removes recordings.
 
-    Each step runs even if others fail: space is freed even if the index cannot be written.
+    Each step runs even if other steps fail; for example, space is freed even if the index cannot be
+    written.
     """
 
     def __init__(self, rules: RetentionRules, index: Index, clock: Clock) -> None:
@@ -273,7 +274,7 @@ class RecordingRetention:
 
     @property
     def on_disk(self) -> Sequence[WaveformFile]:
-        """Recordings on the disk, including damaged ones."""
+        """Index entries of the recordings on the disk, including damaged recordings."""
         return self._index.on_disk
 
     @property
@@ -282,7 +283,7 @@ class RecordingRetention:
         return self._index.faults
 
     def look(self) -> None:
-        """Run all steps once: update the index, free space, check a recording.
+        """Update the index, free disk space, and check one recording if a check is due.
 
         Raises
         ------
@@ -373,7 +374,7 @@ class RecordingRetention:
     def _finish_removals(self, errors: FirstError) -> None:
         """Remove the folders of removed recordings.
 
-        Until the store has recorded a removal, the empty folder marks it for the next start.
+        The folder of a recording is kept until the store has recorded the removal.
         """
         self._index.store_removals()
         for root in self._rules.roots.values():
@@ -386,7 +387,7 @@ class RecordingRetention:
                             log.warning(words, folder=left.name)
 
     def _check_one(self) -> None:
-        """Check the recording with the oldest check, within the fraction of time for checks."""
+        """Check the recording with the oldest check, if due and if `CHECK_SHARE` permits it."""
         start_s = self._clock.monotonic_s()
         due = (f for f in self._index.whole if self._retry.is_due(f.kind, f.name))
         file = min(due, key=lambda file: file.checked_ns, default=None)
@@ -400,7 +401,7 @@ class RecordingRetention:
         self._check_from_s = start_s + taken_s / CHECK_SHARE
 
     def check(self, file: WaveformFile) -> WaveformFile:
-        """Read a recording completely again; return its new index entry.
+        """Read a whole recording again, and write and return its new index entry.
 
         Raises
         ------

@@ -35,7 +35,7 @@ from service.runtime.files import sync_folder, write_synced
 from service.runtime.times import rfc3339
 
 MakeWriter = Callable[[Path, str], RecordingWriter]
-"""Function (folder, made_by) that opens a recording of a unit."""
+"""Function (folder, made_by) that returns a writer of a new recording of a unit."""
 
 
 class CaptureError(Exception):
@@ -43,14 +43,14 @@ class CaptureError(Exception):
 
 
 class CaptureFile:
-    """File of a capture: a recording and its alarms, written atomically.
+    """Files of a capture, that is a recording and its alarms; written atomically.
 
     Attributes
     ----------
     folder
-        Folder of the capture; None until the first write.
+        Final folder of the capture, which exists when it is finished; None until the first write.
     finished
-        Folder of the capture; None until it is complete.
+        Final folder of the capture; None until the capture is finished.
     is_closed
         Whether the capture is finished or abandoned.
     """
@@ -63,7 +63,7 @@ class CaptureFile:
         self.is_closed = False
 
     def write(self, blocks: Sequence[SampleBlock]) -> None:
-        """Append blocks.
+        """Append sample blocks; no effect on a closed capture.
 
         Raises
         ------
@@ -98,7 +98,7 @@ class CaptureFile:
         self.is_closed, self.finished = True, folder
 
     def abandon(self, reason: str) -> CaptureError:
-        """Close and remove the capture; return the error to raise."""
+        """Close and remove the capture; return the error that the caller raises."""
         self.is_closed = True
         if self._writer is not None and self.folder is not None:
             with suppress(OSError):
@@ -145,10 +145,10 @@ class SegmentSettings:
     Parameters
     ----------
     segment_s
-        Duration of a segment, which becomes one recording.
+        Duration of a segment, which finally becomes one recording.
     part_s
-        Duration of a part, which is synced to the disk; a crash loses at most the open part and
-        the queued blocks.
+        Duration of a part. A finished part is synced to the disk; a crash loses at most the open
+        part and the queued blocks.
     """
 
     segment_s: float = 600.0
@@ -161,8 +161,8 @@ MAX_PARTS = 10_000
 class Segment:
     """Segment of a continuous recording in progress; for use in one thread.
 
-    A segment consists of parts. Each finished part is a recording, synced and renamed into place.
-    The newest part is open: in memory or incomplete. `join` makes one recording of all parts.
+    A segment consists of parts. Each finished part is a recording, synced to the disk under its
+    final name. The newest part is still being written. `join` makes one recording of all parts.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ class Segment:
         sync_folder(root)
 
     def covers(self, block: SampleBlock) -> bool:
-        """Return whether a block belongs to the segment, which ends at a multiple of its length."""
+        """Return whether a block starts in the segment, which ends at a multiple of its length."""
         return (
             block.start_ns // self._length_ns == self._number
             and self._n_samples < self._max_samples
@@ -223,14 +223,14 @@ class Segment:
         self._n_samples += block.n_samples
 
     def is_due(self, now_s: float) -> bool:
-        """Return whether the open part is to be finished because of its length or its age."""
+        """Return whether the open part has samples for ``part_s`` or was opened ``part_s`` ago."""
         if self._writer is None:
             return False
         long_enough = self._writer.n_samples >= self._settings.part_s * self._unit.rate_hz
         return long_enough or now_s - self._opened_s >= self._settings.part_s
 
     def finish_part(self) -> int:
-        """Sync the open part to the disk; return its number of samples per channel.
+        """Finish the open part and sync it; return its number of samples per channel, or 0.
 
         Raises
         ------
@@ -256,9 +256,10 @@ log = structlog.get_logger()
 
 
 def join(folder: Path) -> bool:
-    """Join the parts of a segment to one recording; return whether the recording exists.
+    """Join the parts of a segment to one recording; return False if no part is readable.
 
-    The function can be repeated after an interruption. An unreadable part is marked as damaged.
+    After an interruption the function can be called again. An unreadable part is left out and its
+    folder is marked as damaged.
 
     Raises
     ------
@@ -276,7 +277,7 @@ def join(folder: Path) -> bool:
 
 
 def unjoined(root: Path, units: Container[str | None]) -> list[Path]:
-    """Return the segments of units that a crash left unjoined, oldest first per unit.
+    """Return the folders of the segments that a crash left unjoined, oldest first per unit.
 
     Segments of other units are omitted: another process may be writing them.
     """
@@ -315,12 +316,12 @@ def _remove_parts(parts: Path) -> None:
 
 
 class WriterThread:
-    """Base class of recorders: a thread for all writes, and log entries on failure and recovery.
+    """Base class of recorders: writer thread, and log entries when writes fail or succeed again.
 
     Parameters
     ----------
     what
-        Subject of the log messages.
+        Recorded data, as the subject of the log messages.
 
     Attributes
     ----------

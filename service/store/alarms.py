@@ -1,4 +1,4 @@
-"""Alarms in the database: current state of each alarm, and its events, numbered without gaps."""
+"""Tables of alarms and alarm events; the events of an alarm are numbered without gaps."""
 
 from collections.abc import Iterable
 from dataclasses import asdict

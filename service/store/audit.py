@@ -1,4 +1,4 @@
-"""Audit trail in the database: hash chain of entries, written together with the changes."""
+"""Audit trail in the database: hash chain of entries, each written with the recorded change."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -39,7 +39,7 @@ PAGE = 1000
 
 @dataclass(frozen=True)
 class AuditQuery:
-    """Query for audit entries, newest first; None matches everything.
+    """Query for audit entries, newest first; None for actor, action or object matches all.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class AuditQuery:
     limit
         Maximum number of entries.
     start_ns, end_ns
-        Half-open time range.
+        Half-open time range, ns.
     """
 
     before: int = 2**63 - 1
@@ -88,7 +88,7 @@ class AuditChain:
                 self._update_head()
 
     def add(self, writer: Connection, actions: Iterable[AuditAction]) -> None:
-        """Append entries within a transaction; compare the head file with the chain first."""
+        """Append the entries of actions, after an entry on a contradicting head file, if any."""
         for action in actions:
             newest = newest_of(writer)
             if not self._is_due and self.head_error is None:
@@ -99,7 +99,7 @@ class AuditChain:
             _insert(writer, action, newest)
 
     def _difference(self, writer: Connection, newest: AuditHead) -> str | None:
-        """Return how the head file contradicts the chain; None if it agrees or only lags behind."""
+        """Return how the head file contradicts the chain; None if it agrees or is only older."""
         try:
             head = read_head(self._head)
         except HeadError as error:
@@ -114,9 +114,9 @@ class AuditChain:
         return f"entry {head.number} is not the one that the head names"
 
     def _update_head(self) -> None:
-        """Write the head file within a transaction, so that an older head cannot overwrite it.
+        """Write the head file in a transaction, so that no process can write an older head later.
 
-        If the write fails, the entries stay stored and the head lags until a later write.
+        If the write fails, the entries stay stored and the head file is updated by a later write.
         """
         self.head_error = None
         try:
@@ -144,7 +144,7 @@ class AuditedTables(Tables):
 
 
 class AuditStore(AuditedTables):
-    """Store of the audit trail; other stores write their entries within their transactions."""
+    """Store of the audit trail; other stores add audit entries to their transactions."""
 
     @property
     def head_error(self) -> str | None:
@@ -185,7 +185,7 @@ class Trail:
         self._reading, self._head, self._is_shared = reading, head, is_shared
 
     def verify(self) -> Verdict:
-        """Verify the whole audit trail without changing it.
+        """Return the result of verifying the whole audit trail, which is not changed.
 
         Raises
         ------
@@ -207,7 +207,7 @@ class Trail:
 
     @contextmanager
     def entries(self) -> Iterator[Iterator[AuditEntry]]:
-        """Open an iterator over all entries, oldest first.
+        """Return a context manager that provides an iterator over all entries, oldest first.
 
         Raises
         ------

@@ -105,7 +105,7 @@ def _number(connection: sqlite3.Connection, pragma: str) -> int:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Lock a folder against other backups within the block.
+    """Return a context manager that locks a folder against other backups within its block.
 
     Raises
     ------
@@ -319,7 +319,7 @@ class AccessBefore:
     accounts
         Names of the accounts.
     revoked
-        Identifiers of the revoked keys.
+        Identifiers of the revoked API keys.
     """
 
     accounts: frozenset[str]
@@ -332,10 +332,13 @@ class AccessAfter:
 
     Parameters
     ----------
-    accounts, keys
-        Names of the accounts; names and identifiers of the valid keys.
+    accounts
+        Names of the accounts.
+    keys
+        Names and identifiers of the valid API keys.
     returned
-        Accounts that the previous database did not have, for example removed accounts.
+        Names of the accounts that the previous database did not have, such as accounts that were
+        removed after the backup.
     revoked
         Identifiers of the keys that were revoked again after the restoration.
     """
@@ -361,7 +364,7 @@ def access_before(database: Path) -> AccessBefore | None:
 
 
 def revoke_again(access: AccessStore, before: AccessBefore | None, now_ns: int) -> AccessAfter:
-    """End all sessions of a restored database; revoke the keys revoked since the backup.
+    """End all sessions of a restored database; revoke again the API keys listed in `before`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Tables of baselines, baseline steps and shaft responses."""
+"""Tables of baselines, steps in their life cycles, and shaft responses."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -84,7 +84,7 @@ class Versions:
     renewed_ns
         Time from which readings are used for learning; None for all readings.
     first_accepted
-        First version that was put in force since the last renewal.
+        First version put in force since the last renewal; None if there was no such version.
     """
 
     in_force: int | None = None
@@ -136,7 +136,7 @@ class BaselineTables(AuditedTables):
     """Store of baselines, their steps and shaft responses; changes are on the disk on return."""
 
     def add_baseline(self, baseline: BearingBaseline, steps: Sequence[StoredStep]) -> None:
-        """Write a learned baseline with its first steps; writing the same again has no effect."""
+        """Write a learned baseline with its first steps; a second call has no effect."""
         origin, document = baseline.origin, to_json(baseline)
         key = (origin.unit, origin.bearing, origin.version)
         learned = (baseline.learned_from_ns, baseline.learned_until_ns)

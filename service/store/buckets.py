@@ -1,4 +1,4 @@
-"""Statistics of readings in buckets of time: count, mean, extremes, worst quality."""
+"""Statistics of readings in time buckets: count, mean, minimum, maximum and worst quality."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -29,9 +29,16 @@ class Summaries:
         Names of the quantities.
     time_ns : (n,)
         Times of single readings, or starts of aggregated time spans.
-    count, mean, minimum, maximum, level : (n, n_names)
-        Number and statistics of usable readings, NaN without usable readings; worst quality level
-        of all readings.
+    count : (n, n_names)
+        Number of usable readings.
+    mean : (n, n_names)
+        Mean of the usable readings; NaN without usable readings.
+    minimum : (n, n_names)
+        Minimum of the usable readings; NaN without usable readings.
+    maximum : (n, n_names)
+        Maximum of the usable readings; NaN without usable readings.
+    level : (n, n_names)
+        Worst quality level of all readings.
     """
 
     names: tuple[str, ...]
@@ -46,7 +53,7 @@ class Summaries:
     def of(
         cls, names: tuple[str, ...], time_ns: IntArray, value: FloatArray, level: LevelArray
     ) -> "Summaries":
-        """Return single readings as summaries; values are NaN for unusable readings."""
+        """Return the summaries of single readings; an unusable reading has the value NaN."""
         count = np.isfinite(value).astype(np.int64)
         return cls(names, time_ns, count, value, value, value, level)
 
@@ -63,17 +70,17 @@ class Summaries:
         return found.at(np.argsort(found.time_ns, kind="stable"))
 
     def at(self, rows: IntArray | npt.NDArray[np.bool_]) -> "Summaries":
-        """Return the rows with the given indices or mask, in that order."""
+        """Return the rows selected by a mask, or by indices and in the order of the indices."""
         return Summaries(self.names, **{name: getattr(self, name)[rows] for name in ROWS})
 
     def only(self, names: tuple[str, ...]) -> "Summaries":
-        """Return the columns with the given names, in that order."""
+        """Return the columns with the given names, in the order of the names."""
         columns = [self.names.index(name) for name in names]
         chosen = {name: getattr(self, name)[:, columns] for name in STATISTICS}
         return Summaries(names, self.time_ns, **chosen)
 
     def in_spans(self, width_ns: int) -> "Summaries":
-        """Return the rows, sorted by time, aggregated over aligned time spans of a width."""
+        """Aggregate the rows, sorted by time, over spans that start at multiples of `width_ns`."""
         if self.time_ns.size == 0:
             return self
         number = self.time_ns // width_ns
@@ -125,16 +132,16 @@ LEVEL_OF: dict[int, Level | None] = {-1: None} | {int(level): level for level in
 """Quality level by number, None for -1; a lookup table, for speed."""
 
 MAX_DAYS = (2**63 - 1) // DAY_NS
-"""Maximum bucket width in days, which fits in 64-bit nanoseconds."""
+"""Maximum bucket width in days; a wider bucket would exceed 64-bit nanoseconds."""
 
 
 def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int = 1) -> int:
-    """Return the narrowest round bucket width with at most ``max_points`` buckets in a range.
+    """Return the narrowest round width, in ns, with at most ``max_points`` buckets in a range.
 
     Parameters
     ----------
     finest_ns
-        Width of the finest available roll-ups, a divisor of a day.
+        Width of the finest available roll-ups, a divisor of a day and of the bucket width.
     """
     # a range that is not aligned with the buckets may overlap one more bucket
     needed = -(-(end_ns - start_ns) // max(max_points - 1, 1))
@@ -145,7 +152,7 @@ def bucket_width_ns(start_ns: int, end_ns: int, max_points: int, finest_ns: int 
 
 
 def single_points(readings: Summaries, hole_ns: int) -> Trend:
-    """Return the trend of single readings; a point without a value marks each hole."""
+    """Return the trend of single readings, with an empty point in each interval above `hole_ns`."""
     holes = np.flatnonzero(np.diff(readings.time_ns) > hole_ns) + 1
     time_ns = np.insert(readings.time_ns, holes, readings.time_ns[holes - 1] + hole_ns // 2)
     series = {}
@@ -166,7 +173,10 @@ def page(readings: Summaries, max_points: int, hole_ns: int) -> Trend:
 
 
 def bucketed(readings: Summaries, width_ns: int) -> Trend:
-    """Return the trend of readings in aligned buckets; buckets without readings are empty."""
+    """Return the trend of readings in buckets that start at multiples of `width_ns`.
+
+    Buckets without readings between the first and the last reading are empty.
+    """
     if readings.time_ns.size == 0:
         nothing = {name: TrendSeries([], [], [], [], []) for name in readings.names}
         return Trend(width_ns, [], nothing)

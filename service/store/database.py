@@ -6,7 +6,7 @@ Each SQL statement is written once and runs on both databases. Rules for stateme
   compare them with numbers (``is_active = 1``);
 - a parameter that is compared with NULL names its type: ``CAST(:unit AS TEXT) IS NULL``,
   ``CAST(:low AS DOUBLE PRECISION) IS NULL``;
-- ``ON CONFLICT``, never ``INSERT OR REPLACE``; the old value is ``table.column`` in it;
+- ``ON CONFLICT``, never ``INSERT OR REPLACE``; ``table.column`` is the old value in such a clause;
 - no ``rowid``, ``typeof``, ``instr``, ``GLOB``, ``min`` or ``max`` of two values, ``LIMIT -1``;
 - rows from which other rows are computed are read from the view named ``whole_`` plus the table
   name, which omits damaged rows also in a writing transaction;
@@ -55,14 +55,14 @@ class Connection(Protocol):
 
 
 Connect = Callable[[], AbstractContextManager[Connection]]
-"""Function that opens a writing transaction; durable once its block ends without an error."""
+"""Function that opens a transaction; its changes are durable when the block ends without error."""
 
 
 class Reading(Protocol):
     """Function that opens a read-only transaction on one consistent state of a database."""
 
     def __call__(self, unreadable: Unreadable = "strict", /) -> AbstractContextManager[Connection]:
-        """Open the transaction."""
+        """Open a read-only transaction; `unreadable` is the handling of text that is not UTF-8."""
         ...
 
 
@@ -119,12 +119,14 @@ class Database(Protocol):
 
 
 class Tables:
-    """Base class of the stores that read and write some tables of a database.
+    """Base class of stores; a store reads and writes some of the tables of a database.
 
     Parameters
     ----------
-    writing, reading
-        Functions that open a writing and a read-only transaction.
+    writing
+        Function that opens a writing transaction.
+    reading
+        Function that opens a read-only transaction.
     """
 
     def __init__(self, writing: Connect, reading: Reading) -> None:

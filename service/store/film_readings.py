@@ -1,4 +1,4 @@
-"""Table of film readings, with one column per number, and table of decisions."""
+"""Tables of the stiffness readings of oil films and of the decisions on the films."""
 
 import math
 from collections.abc import Iterable
@@ -57,15 +57,28 @@ class FilmQuery:
 
 @dataclass(frozen=True, eq=False)
 class FilmHistory:
-    """Readings of one film with the findings of the change detection at that time.
+    """Readings of one film at n times, with the results of the change detection in x and y.
 
     Parameters
     ----------
-    state, is_settled, is_simulated : (n,)
-    verdict, level : (2, n)
-        Numbers of `Verdict`; numbers of `AlarmLevel`, 0 for no alarm.
-    change, change_std, deviation, deviation_std : (2, n)
-        Changes of the natural logarithm of stiffness; NaN if unknown.
+    state : (n,)
+        Numbers of `OperatingState`.
+    is_settled : (n,)
+        Whether the operating condition was settled.
+    is_simulated : (n,)
+        Whether the reading is simulated.
+    verdict : (2, n)
+        Numbers of `Verdict`.
+    level : (2, n)
+        Numbers of `AlarmLevel`, 0 for no alarm.
+    change : (2, n)
+        Most significant mean deviation of ln(stiffness) from the baseline; NaN if unknown.
+    change_std : (2, n)
+        Standard uncertainty of `change`; NaN if unknown.
+    deviation : (2, n)
+        Deviation of ln(stiffness) of the reading from the baseline; NaN if unknown.
+    deviation_std : (2, n)
+        Standard uncertainty of `deviation`; NaN if unknown.
     baseline_version : (n,)
         Version of the baseline, 0 for no baseline.
     """
@@ -148,7 +161,7 @@ def insert_film_news(
     news: Iterable[FilmNews],
     provenance: Provenance = Provenance.MEASURED,
 ) -> None:
-    """Insert film readings, and replace the decisions about their films."""
+    """Insert film readings, and replace the stored decisions on the same films."""
     for each in news:
         reading = each.reading
         series = series_of(writer, reading.unit, reading.bearing)
@@ -199,7 +212,7 @@ def _or_null(value: float) -> float | None:
 
 
 def select_decisions(reader: Connection, unit: str, bearing: str) -> list[StoredDecision]:
-    """Return the stored decision about each direction of a bearing.
+    """Return the stored decisions on the film of a bearing, one per direction.
 
     Raises
     ------

@@ -64,12 +64,12 @@ class FilmStore(BaselineTables):
         films: FilmHistory,
         values: Mapping[str, FloatArray],
     ) -> None:
-        """Write the simulated past of a bearing: film readings, and results for its trends.
+        """Write simulated past data of a bearing: film readings, and results for its trends.
 
         Parameters
         ----------
         values
-            Trend values by layout column, shape (n,) each; NaN for missing values.
+            Trend values by column name, shape (n,) for n film readings; NaN for missing values.
         """
         time_ns = films.history.time_ns
         with self._writing() as writer:
@@ -82,7 +82,7 @@ class FilmStore(BaselineTables):
             writer.execute(MARK_PAST, span)
 
     def past_end_ns(self, unit: str, bearing: str) -> int | None:
-        """Return the end time of a bearing's simulated past; None if it has no simulated past."""
+        """Return the end time of the simulated past data of a bearing; None without such data."""
         with self._reading() as reader:
             row = reader.execute(
                 "SELECT end_ns FROM simulated_past JOIN series ON series.id = simulated_past.series"
@@ -97,7 +97,7 @@ class FilmStore(BaselineTables):
             return select_film_history(reader, query)
 
     def first_ns(self, unit: str, bearing: str, estimator: Estimator) -> int | None:
-        """Return the time of the first reading of a film; None if it has no readings."""
+        """Return the time, in ns, of the first reading of a film; None if it has no readings."""
         with self._reading() as reader:
             found = reader.execute(
                 "SELECT min(time_ns) FROM film_reading WHERE estimator = ? AND series ="
@@ -107,7 +107,7 @@ class FilmStore(BaselineTables):
         return None if found[0] is None else int(found[0])
 
     def decisions(self, unit: str, bearing: str) -> list[StoredDecision]:
-        """Return the stored decision about each direction of a bearing."""
+        """Return the stored decisions on the film of a bearing, one per direction."""
         with self._reading() as reader:
             return select_decisions(reader, unit, bearing)
 
@@ -277,4 +277,4 @@ FILM_TABLES = f"""
     CREATE TRIGGER baseline_step_kept BEFORE DELETE ON baseline_step
     BEGIN SELECT RAISE(ABORT, 'steps of baselines are kept'); END;
 """
-"""Migration that creates the tables of film readings, decisions, baselines and responses."""
+"""Migration that creates the tables of film readings, decisions, baselines and shaft responses."""

@@ -52,9 +52,9 @@ class FileSystem:
     kind
         File system type used by the kernel; empty if unknown.
     is_remote
-        Whether it is a network file system, which must not be used for results.
+        Whether the type is a network file system, which must not be used for results.
     warning
-        Reason why results may be lost on it; empty if they are safe.
+        Reason why results may be lost on the file system; empty if results are safe.
     """
 
     kind: str
@@ -177,9 +177,9 @@ def lock_path(database: Path) -> Path:
 def exclusive_use(
     database: Path, look: Callable[[Path], FileSystem] = file_system_of
 ) -> Iterator[None]:
-    """Lock a database against other services within the block.
+    """Return a context manager that locks a database against other services within its block.
 
-    The lock ends with the process; the lock file stays and has no further meaning.
+    The lock ends with the process. The lock file remains, but alone does not lock the database.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def _take(descriptor: int, database: Path) -> None:
 
 
 def take_lock(descriptor: int) -> str | None:
-    """Lock a file and write this process id to it; return the id of another holder, or None."""
+    """Lock a file and write the process id to it; return None, or the id of the current holder."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:

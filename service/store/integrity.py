@@ -9,14 +9,14 @@ from service.store.seals import DamageLog, Place
 
 
 class Integrity:
-    """Integrity state of a database; no findings for PostgreSQL, which checks its data itself.
+    """Integrity checks of a database; no findings for PostgreSQL, which checks its data itself.
 
     Parameters
     ----------
     chain
         Audit trail.
     marks
-        High-water mark beside the database file.
+        High-water mark of a SQLite database; None for PostgreSQL.
     damage
         Log of the damaged rows found since the start.
     check_some

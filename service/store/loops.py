@@ -14,14 +14,14 @@ RETENTION_PERIOD_S = 600.0
 """Pause of the retention loop when no data are due for deletion."""
 
 RETENTION_REST_SHARE = 9.0
-"""Ratio of pause to work; the loop uses a tenth of one core, and others can write."""
+"""Ratio of pause time to working time; the loop uses a tenth of one core."""
 
 
 class RetentionLoop:
     """Loop that deletes old data in small steps, one bearing after the other, with pauses.
 
-    The age of data is relative to the 24th newest hour with results, or to the clock if earlier. A
-    clock that is set years ahead therefore causes no deletion within the first day.
+    The age of data is relative to the 24th newest hour with results, or to the clock if the clock
+    is earlier. A clock that is set years ahead therefore causes no deletion within the first day.
     """
 
     def __init__(self, store: RetentionStore, limits: Ages, clock: Clock) -> None:
@@ -40,7 +40,7 @@ class RetentionLoop:
                 await rest(RETENTION_PERIOD_S, self._clock, pulse)
 
     async def round(self, pulse: Pulse = UNHEARD) -> bool:
-        """Delete some old data of each bearing; return whether any data were due."""
+        """Delete some old data of each bearing; return whether any old data were found."""
         found = False
         try:
             believed_ns = await asyncio.to_thread(self._store.believed_ns)
@@ -71,7 +71,7 @@ ROLLUP_PERIOD_S = 20.0
 """Pause of the roll-up loop when no readings are due for aggregation."""
 
 ROLLUP_REST_SHARE = 3.0
-"""Ratio of pause to work; aggregating an old database uses a quarter of one core."""
+"""Ratio of pause time to working time; the loop uses at most a quarter of one core."""
 
 
 class RollupLoop:
@@ -91,7 +91,7 @@ class RollupLoop:
                 await self._clock.sleep(ROLLUP_PERIOD_S)
 
     async def _round(self, pulse: Pulse) -> bool:
-        """Aggregate some readings of each bearing that is due; return whether any was due."""
+        """Aggregate some new readings of each bearing; return False if there are none."""
         now_ns = self._clock.now_ns()
         try:
             due = await asyncio.to_thread(self._rollups.due, now_ns)
@@ -109,7 +109,7 @@ class RollupLoop:
 
 
 SCRUB_REST_SHARE = 49.0
-"""Ratio of pause to work; the loop uses a fiftieth of one core."""
+"""Ratio of pause time to working time; the loop uses a fiftieth of one core."""
 
 MIN_REST_S = 0.2
 SCRUB_PERIOD_S = 86_400.0
@@ -117,7 +117,7 @@ SCRUB_PERIOD_S = 86_400.0
 
 
 class ScrubLoop:
-    """Loop that checks the checksums of all rows, some at a time, with pauses."""
+    """Loop that compares all rows with their checksums, a few rows at a time, with pauses."""
 
     def __init__(self, integrity: Integrity, clock: Clock) -> None:
         self._integrity, self._clock = integrity, clock
@@ -133,7 +133,7 @@ class ScrubLoop:
                 await rest(SCRUB_PERIOD_S, self._clock, pulse)
 
     async def look(self, pulse: Pulse = UNHEARD) -> bool:
-        """Check some rows and pause; return whether all rows have been checked once."""
+        """Check the next rows and pause; return True when a check of all rows is complete."""
         begun_s = self._clock.monotonic_s()
         try:
             is_around = await asyncio.to_thread(self._integrity.check_some)

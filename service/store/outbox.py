@@ -35,7 +35,7 @@ class OutboxMessage:
     queued_ns
         Time of queueing by the host clock.
     is_urgent
-        Whether the message ends quiet hours.
+        Whether the message is sent in quiet hours, together with all waiting messages.
     is_active
         Whether the receiver regards the alarm as active after the message.
     closes
@@ -99,9 +99,9 @@ class Backlog:
     n_dead
         Total number of refused and expired messages.
     last_dead
-        Newest refused or expired message.
+        Newest refused or expired message; None if no message was refused or expired.
     delivered_ns
-        Time of the last delivery.
+        Time of the last delivery; None if no message was delivered.
     """
 
     receiver: str
@@ -124,7 +124,8 @@ INSERT = """
         ORDER BY number DESC LIMIT 1
     ) = 1
 """
-"""Statement that queues a message; with ``closes`` only if the last message was active."""
+"""Statement that queues a message; with ``closes`` only if the last message about the same alarm to
+the receiver reported an active alarm."""
 
 COLUMNS = "id, receiver, event_id, body, queued_ns, is_urgent, state, n_attempts, answer, done_ns"
 SELECT_WAITING = f"""
@@ -194,7 +195,7 @@ class Outbox(Tables):
             writer.execute(FAIL, (answer[:MAX_ANSWER], message))
 
     def expire(self, receiver: str, before_ns: int, answer: str, now_ns: int) -> int:
-        """Expire the waiting messages that were queued, and whose event occurred, before a time.
+        """Expire the waiting messages whose queueing and whose alarm event precede `before_ns`.
 
         Returns the number of expired messages.
         """

@@ -23,7 +23,7 @@ class QueryTooLargeError(Exception):
 
 @dataclass(frozen=True)
 class ValueRange:
-    """Inclusive lower and upper bound of a value; None for no bound."""
+    """Range of values with inclusive lower and upper bounds; None for no bound."""
 
     low: float | None = None
     high: float | None = None
@@ -46,13 +46,14 @@ class TrendQuery:
     start_ns, end_ns
         Half-open time range.
     max_points
-        If the range has more readings, they are aggregated into buckets of equal width.
+        Maximum number of points; more readings are aggregated into buckets of equal width.
     hole_ns
-        Longest interval between consecutive readings that is not a hole in the trend.
+        Maximum interval between consecutive readings, ns; a longer interval is a hole in the trend.
     states
         Operating states to include; empty for all.
     is_page
-        Return single readings, oldest first; readings after ``max_points`` are on the next page.
+        Whether to return at most ``max_points`` single readings, oldest first, and the start time
+        of the next page, instead of buckets.
     """
 
     unit: str
@@ -70,7 +71,7 @@ class TrendQuery:
 
 @dataclass(frozen=True)
 class TrendSeries:
-    """Statistics of one quantity by bucket; None for buckets without a usable reading."""
+    """Statistics of one quantity, one item per bucket; None without a usable reading."""
 
     minimum: Sequence[float | None]
     maximum: Sequence[float | None]
@@ -86,11 +87,15 @@ class Trend:
     Parameters
     ----------
     bucket_ns
-        Width of the buckets, whose starts are in ``time_ns``; None for single readings.
+        Width of the buckets; None for single readings.
+    time_ns
+        Start times of the buckets, or times of the single readings.
+    series
+        Statistics of the readings by quantity.
     next_ns
         Time of the first reading of the next page; None on the last page.
     coarse_until_ns
-        Time up to which single readings were deleted; None if the range begins after it.
+        Time up to which single readings were deleted; None if the range begins later.
     """
 
     bucket_ns: int | None
@@ -110,7 +115,7 @@ class StoredReadings:
 
 @dataclass(frozen=True)
 class AlarmQuery:
-    """Query for alarm events, newest first; None matches everything.
+    """Query for alarm events, newest first; None for alarm, unit or kind matches all.
 
     Operating states and value ranges refer to the operating point at which the alarm was raised.
 

@@ -109,13 +109,13 @@ class _References(AuditedTables, Generic[_Reference]):
     table: str
     columns: tuple[str, ...]
     key: tuple[str, ...]
-    """Key columns, the first of `columns`; one reference is in force per key."""
+    """Key columns, with which `columns` begins; one reference is in force per key."""
 
     order: str
-    """Columns by which `in_force` orders the references."""
+    """Columns by which `in_force` sorts the references, as an SQL expression."""
 
     def add(self, reference: _Reference) -> None:
-        """Write a reference, which becomes the one in force; writing it again has no effect.
+        """Write a reference, which is then in force; writing it a second time has no effect.
 
         Raises
         ------
@@ -134,7 +134,7 @@ class _References(AuditedTables, Generic[_Reference]):
                 writer.execute(insert(self.table, self.columns), row)
 
     def in_force(self) -> list[_Reference]:
-        """Return the reference in force of each key: the last one written, whatever its time."""
+        """Return the reference in force of each key: the last written, regardless of `set_ns`."""
         newest = f"SELECT max(id) FROM {self.table} GROUP BY {', '.join(self.key)}"  # noqa: S608
         return self._read(f"WHERE id IN ({newest}) ORDER BY {self.order}")
 
@@ -209,7 +209,7 @@ def _gaps(reference: GapReference) -> dict[str, object]:
 
 
 class VectorReferenceStore(_References[SetVectorReference]):
-    """Table of the 1× vector references; one is in force per bearing and operating state."""
+    """Table of the 1× vector references; one per bearing and operating state is in force."""
 
     table = "vector_reference"
     columns = ("unit", "bearing", "state", "set_ns", "author", "note", "vectors")

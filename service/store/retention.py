@@ -40,7 +40,7 @@ MAX_FILM_READINGS = 5000
 MAX_MESSAGES = 500
 
 MEAN_TOLERANCE = 1e-9
-"""Tolerance of means, relative to the extremes; rounding depends on the order of summation."""
+"""Tolerance of means relative to the larger extreme; rounding depends on the summation order."""
 
 NEXT_READINGS = """
     SELECT time_ns FROM assessment WHERE series = ? AND time_ns >= ? AND time_ns < ?
@@ -81,7 +81,7 @@ BELIEVED = """
 """
 BELIEVED_HOURS = (HOUR_NS // NS_PER_S, 23)
 """Parameters of `BELIEVED`: roll-up width, and offset of the 24th newest hour with results.
-The query has no DISTINCT, since SQLite 3.40 then returns the oldest hour if there are fewer."""
+The query has no DISTINCT, with which SQLite 3.40 returns the oldest hour of fewer than 24."""
 
 
 class Step(Enum):
@@ -113,9 +113,9 @@ def _delete_readings(writer: Connection, series: int, before_ns: int) -> Step:
 def _delete_rollups(width_s: int, writer: Connection, series: int, before_ns: int) -> Step:
     """Delete the next roll-ups of one width of a bearing before a time.
 
-    Roll-ups that differ from wider ones are kept and block the deletion of later ones. They cannot
-    be aggregated again, since finer data are deleted, and only one time per width is stored up to
-    which data were deleted.
+    Roll-ups that differ from wider roll-ups are kept, and so are all later ones of the same width.
+    They cannot be aggregated again, since finer data are deleted, and only one time is stored per
+    width up to which data were deleted.
     """
     width_ns, deleted = width_s * NS_PER_S, select_deleted(writer, series)
     finer_s = {wider // NS_PER_S: finer // NS_PER_S for finer, wider in pairwise((0, *WIDTHS_NS))}
@@ -150,22 +150,22 @@ BEARING_RULES: Mapping[str, Callable[[Connection, int, int], Step]] = {
     "ten_minutes_days": partial(_delete_rollups, 600),
     "films_days": _delete_films,
 }
-"""Functions that delete data of a bearing before a time, by age setting; finest data first."""
+"""Functions that delete data of a bearing older than a time, by age setting; finest first."""
 
 PLANT_RULES: Mapping[str, Callable[[Connection, int], Step]] = {"messages_days": _delete_messages}
-"""Functions that delete data of the whole plant before a time, by age setting."""
+"""Functions that delete data of the whole plant older than a time, by age setting."""
 
 Ages = Mapping[str, int]
-"""Maximum age of data in ns, by setting; data without an entry are never deleted."""
+"""Maximum age of data in ns, by name of the setting; data without an entry are never deleted."""
 
 
 def ages_of(settings: RetentionSettings) -> Ages:
-    """Return the maximum ages of the settings that are greater than zero."""
+    """Return the maximum ages of the settings, without settings of 0 days (no deletion)."""
     return {name: round(days * DAY_NS) for name, days in settings if days > 0.0}
 
 
 class RetentionStore(Tables):
-    """Deletion of old data in small, atomic steps.
+    """Store that deletes old data in small, atomic steps.
 
     Parameters
     ----------
@@ -192,12 +192,15 @@ class RetentionStore(Tables):
         )
 
     def series(self) -> list[int]:
-        """Return the series numbers of all bearings."""
+        """Return the database numbers of all bearings that have stored data."""
         with self._reading() as reader:
             return [int(row[0]) for row in reader.execute("SELECT id FROM series ORDER BY id")]
 
     def believed_ns(self) -> int | None:
-        """Return the latest of the bearings' 24th newest hours with results; None without one."""
+        """Return the start, ns, of the 24th newest hour with results, the latest of all bearings.
+
+        Returns None if no bearing has results of 24 hours.
+        """
         with self._reading() as reader:
             found: int | None = reader.execute(BELIEVED, BELIEVED_HOURS).fetchone()[0]
         return found

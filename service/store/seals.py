@@ -12,7 +12,7 @@ from typing import Any
 from service.store.database import Connection
 
 MAX_PLACES = 1000
-"""Maximum number of damaged rows that are listed; further ones are only counted."""
+"""Maximum number of damaged rows that are listed; further damaged rows are only counted."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Place:
     key
         Key of the row as text.
     is_missing
-        Whether the row is missing, not damaged.
+        Whether the row is missing; False if the row is damaged.
     """
 
     table: str
@@ -49,7 +49,7 @@ class DamageLog:
 
     @property
     def n_damaged(self) -> int:
-        """Number of damaged rows; rows beyond the listed ones may be counted repeatedly."""
+        """Number of damaged rows; rows that are not listed may be counted repeatedly."""
         return len(self._places) + self._n_more
 
     @property
@@ -59,7 +59,7 @@ class DamageLog:
             return list(self._places)
 
     def note(self, place: Place) -> None:
-        """Add a damaged or missing row."""
+        """Add a damaged or missing row to the log, unless the row is already listed."""
         with self._lock:
             if place in self._places:
                 return
@@ -87,7 +87,7 @@ def initial_crc(table: str) -> int:
 
 
 def seal_of(begun_with: int, cells: tuple[Cell, ...]) -> int:
-    """Return the CRC-32 of a row, starting from the initial value of its table."""
+    """Return the CRC-32 of a row; `begun_with` is the initial CRC-32 of its table."""
     return zlib.crc32(marshal.dumps(cells, _VERSION), begun_with)
 
 
@@ -95,7 +95,7 @@ SEAL, IS_WHOLE = "padwatch_seal_", "padwatch_is_whole_"
 """Name prefixes of the SQL functions that compute and check checksums; one pair per table."""
 
 WHOLE = "whole_"
-"""Name prefix of the views without damaged rows, which also exist on writing connections."""
+"""Name prefix of the views without damaged rows; writing connections also have these views."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class SealedTable:
     def view(self, before: str = "") -> str:
         """Return the statement that creates a temporary view of the intact rows.
 
-        The view has the name of the table after the prefix `before`.
+        The name of the view is the prefix `before` and the name of the table.
         """
         listed = ", ".join(f"r.{column} AS {column}" for column in self.columns)
         return (
@@ -164,12 +164,12 @@ class SealedTable:
         )
 
     def is_whole(self, of: str) -> str:
-        """Return the SQL condition that a row matches its checksum."""
+        """Return the SQL condition that a row, with the prefix `of`, matches its checksum."""
         seal = f"SELECT s.seal FROM main.{self.seals} AS s WHERE {self.matched(of, 's.')}"  # noqa: S608
         return f"{IS_WHOLE}{self.name}(({seal}), {self._cells(of)})"
 
     def matched(self, of: str, ours: str = "") -> str:
-        """Return the SQL condition that a row and a checksum have the same key."""
+        """Return the SQL condition that a row (`of`) and a checksum (`ours`) have equal keys."""
         return " AND ".join(f"{ours}{column} = {of}{column}" for column in self.key)
 
     def _seal(self, of: str) -> str:
@@ -186,15 +186,15 @@ class SealedTable:
 
 
 OTHERWISE_KEPT = frozenset({"spectrum", "high_water", "rollup_redo"})
-"""Tables without seals: their rows include a checksum, or only list pending work."""
+"""Tables without row checksums: the rows contain a checksum, or only list pending work."""
 
 SCHEMA = "CREATE TABLE IF NOT EXISTS seal_schema (id INTEGER PRIMARY KEY, number INTEGER)"
 SEALED_AT = "SELECT number FROM seal_schema WHERE id = 1"
 SET_SEALED_AT = "INSERT OR REPLACE INTO seal_schema VALUES (1, ?)"
-"""Statement that writes the schema and format of the checksums, which are recomputed after a
-migration, since it may change rows."""
+"""Statement that writes the number of the schema and format of the checksums. The checksums are
+recomputed if the number has changed, since a migration may change rows."""
 PER_FORMAT = 1_000_000
-"""Factor of the format in the stored number, ``format * PER_FORMAT + schema``."""
+"""Factor in the stored number of schema and format, ``format * PER_FORMAT + schema``."""
 
 WALK = "CREATE TABLE IF NOT EXISTS seal_walk (id INTEGER PRIMARY KEY, place TEXT)"
 """Statement that creates the table with the progress of `Scrubber`."""
@@ -219,7 +219,7 @@ class Seals:
         self.tables: dict[str, SealedTable] = {}
 
     def begin(self, writer: sqlite3.Connection) -> None:
-        """Create missing checksums in a transaction; add triggers and views to the connection."""
+        """Create or recompute checksums if needed; add triggers and views to the connection."""
         self.tables = {table.name: table for table in _tables(writer)}
         self.register_functions(writer)
         (schema,) = writer.execute("PRAGMA main.user_version").fetchone()
@@ -240,7 +240,7 @@ class Seals:
                 writer.execute(statement)
 
     def load(self, reader: sqlite3.Connection) -> None:
-        """Find the tables with checksums of a database that another process may be writing."""
+        """Find the tables that have checksums; another process may be writing to the database."""
         there = {name for (name,) in reader.execute("SELECT name FROM main.sqlite_master")}
         self.tables = {t.name: t for t in _tables(reader) if t.seals in there}
         self.register_functions(reader)
@@ -272,7 +272,7 @@ class Seals:
         return False
 
     def key_of(self, name: str, cells: Sequence[object]) -> str:
-        """Return the key of a row as text."""
+        """Return the key of a row as text, given the table name and all columns of the row."""
         table = self.tables[name]
         cell_of = dict(zip(table.columns, cells, strict=True))
         return ", ".join(f"{column} {_cell_words(cell_of[column])}" for column in table.key)
@@ -303,7 +303,7 @@ def _table(reader: sqlite3.Connection, name: str) -> SealedTable:
 
 
 ROWS_AT_ONCE = 2000
-"""Number of rows per query of a walk; short read transactions keep the WAL small."""
+"""Number of rows per query of a check; short read transactions keep the WAL file small."""
 
 Key = tuple[Any, ...]
 """Values of the primary key columns of a row."""
@@ -311,12 +311,13 @@ Key = tuple[Any, ...]
 
 @dataclass(frozen=True)
 class Walk:
-    """Check of all rows of a table, or of all its checksums, in order of the primary key.
+    """Check of all rows of a table, or of all checksums of its rows, in order of the primary key.
 
     Parameters
     ----------
     source
-        SQL query of the key columns and a flag: row intact, or row present for checksums.
+        SQL query of the key columns and a flag. The flag states whether the row is intact, or,
+        in a query of checksums, whether the row exists.
     keys
         Key columns in the query, separated by commas.
     is_of_seals
@@ -331,9 +332,10 @@ class Walk:
     def page(
         self, reader: Connection, log: DamageLog, after: Key | None, n_rows: int = ROWS_AT_ONCE
     ) -> Key | None:
-        """Check up to `n_rows` rows after a key; return the last key, or None at the end.
+        """Check up to `n_rows` rows after a key; return the last key, None if no row is left.
 
-        Missing rows are added to the log here, altered rows by the SQL function of the query.
+        Missing rows are added to the log by this method, altered rows by the SQL function of the
+        query.
         """
         marks = ", ".join("?" * len(self.table.key))
         beyond = "" if after is None else f"WHERE ({self.keys}) > ({marks})"
@@ -347,7 +349,7 @@ class Walk:
 
 
 def walks(table: SealedTable) -> tuple[Walk, Walk]:
-    """Return the walk over the rows, which finds altered rows, and over the checksums (missing)."""
+    """Return the check of the rows, for altered rows, and of the checksums, for missing rows."""
     keys, of_seals = _keys(table, "r."), _keys(table, "s.")
     row = f"SELECT 1 FROM main.{table.name} AS r WHERE {table.matched('s.', 'r.')}"  # noqa: S608
     rows = f"SELECT {keys}, {table.is_whole('r.')} FROM main.{table.name} AS r"  # noqa: S608

@@ -1,4 +1,4 @@
-"""Result series of bearings: series numbers, unique times, and binary encoding of readings."""
+"""Result series, one per bearing: database number, unique times, and encoding of readings."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -18,13 +18,13 @@ ADD = "INSERT INTO series (unit, bearing) VALUES (?, ?) ON CONFLICT DO NOTHING"
 
 
 def find_series(reader: Connection, unit: str, bearing: str) -> int | None:
-    """Return the series number of a bearing; None if the bearing has no series."""
+    """Return the database number of a bearing; None if nothing is stored for it."""
     found = reader.execute(FIND, (unit, bearing)).fetchone()
     return None if found is None else int(found[0])
 
 
 def series_of(writer: Connection, unit: str, bearing: str) -> int:
-    """Return the series number of a bearing; assign a new number if it has none."""
+    """Return the database number of a bearing; assign a new number if it has none."""
     found = find_series(writer, unit, bearing)
     if found is None:
         writer.execute(ADD, (unit, bearing))
@@ -39,15 +39,17 @@ def unique_time_ns(
     time_ns: int,
     measured: tuple[object, ...],
 ) -> int:
-    """Return the first time from `time_ns` on that no other measurement has.
+    """Return the earliest time, `time_ns` or later, at which no other measurement is stored.
 
     A device whose clock restarts or is set back reports the same times again for different
-    measurements. A measurement that is already stored at a time keeps that time.
+    measurements. A measurement that is already stored keeps its time.
 
     Parameters
     ----------
     select
-        Statement that reads the columns of `measured` by key and time.
+        Query of the columns `measured`, with parameters `key` and time.
+    key
+        Key of the series.
     measured
         Values that identify the measurement.
     """
@@ -72,9 +74,9 @@ def columns_of(quantities: Iterable[Quantity]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Layout:
-    """Column names of stored rows, and quality reasons by the number in the quality byte.
+    """Column names of stored rows, and the quality reasons to which quality bytes refer.
 
-    Each row refers to the layout with which it was written, so that the catalogue can grow.
+    Each row refers to the layout with which it was written, so that quantities can be added later.
     """
 
     quantities: tuple[str, ...]
@@ -82,11 +84,11 @@ class Layout:
 
     @classmethod
     def of(cls, quantities: tuple[str, ...]) -> "Layout":
-        """Return the layout of some columns with all quality reasons of this padwatch version."""
+        """Return the layout of the given columns with all current quality reasons."""
         return cls(quantities, tuple(reason.value for reason in Reason))
 
     def dumps(self) -> tuple[str, str]:
-        """Return the quantities and the reasons as JSON texts, as stored."""
+        """Return the column names and the quality reasons as JSON texts for storage."""
         return json.dumps(self.quantities), json.dumps(self.reasons)
 
     @staticmethod
@@ -96,7 +98,7 @@ class Layout:
         return Layout(tuple(json.loads(quantities)), tuple(json.loads(reasons)))
 
     def encode(self, readings: Mapping[str, Reading]) -> tuple[bytes, bytes]:
-        """Return the values (NaN if missing) and quality bytes, in the order of the layout."""
+        """Return values (float64, NaN if missing) and quality bytes, in the order of the layout."""
         ordered = [_column(readings, name) for name in self.quantities]
         values = np.array([number for number, _ in ordered], dtype="<f8")
         qualities = bytes(
@@ -108,7 +110,7 @@ class Layout:
     def decode(
         self, values: list[bytes], qualities: list[bytes]
     ) -> tuple[FloatArray, npt.NDArray[np.uint8]]:
-        """Return values (NaN if missing) and quality levels, both of (n_rows, n_quantities)."""
+        """Return values (NaN if missing) and quality levels, both (n_rows, n_quantities)."""
         shape = (len(values), len(self.quantities))
         number = np.frombuffer(b"".join(values), dtype="<f8").reshape(shape)
         byte = np.frombuffer(b"".join(qualities), dtype=np.uint8).reshape(shape)

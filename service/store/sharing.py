@@ -18,14 +18,18 @@ class UnitReport:
         Number of the report, unique within a process.
     beat_ns
         Time of the report by the clock of its host; for information only.
-    link, reason
-        State of the connection to the sample source, and the reason for the state.
+    link
+        State of the connection to the sample source.
+    reason
+        Reason for the state; None if there is no reason.
+    last_sample_ns
+        Time of the newest sample; None without samples.
     signs
         JSON document with the arrival of samples and the age of all data.
     revision
         Revision number of `state`.
     state
-        Document with results and alarms; None if unchanged since the previous report.
+        Encoded document of results and alarms; None if unchanged since the previous report.
     """
 
     unit: str
@@ -106,7 +110,7 @@ class UnitStates(Tables):
             return [UnitBeat(*row) for row in reader.execute(SELECT_BEATS)]
 
     def states(self, units: Collection[str]) -> dict[str, tuple[str, int, bytes]]:
-        """Return process, revision and state document of the given units that have a report."""
+        """Return process, revision and state document by unit, for the units with a report."""
         with self._reading() as reader:
             found = {unit: reader.execute(SELECT_STATE, (unit,)).fetchone() for unit in units}
         return {
@@ -142,10 +146,14 @@ class Command:
         Unique identifier.
     unit
         Unit whose process executes the command.
-    kind, document
-        Kind of command, and its arguments as JSON.
-    actor, peer
-        Name of the operator, and network address of the request.
+    kind
+        Kind of command.
+    document
+        Arguments of the command as JSON.
+    actor
+        Name of the operator.
+    peer
+        Network address of the request; None if unknown.
     expires_ns
         Latest time at which execution may begin, by the clock of the sending host.
     """
@@ -162,7 +170,7 @@ class Command:
 
 @dataclass(frozen=True)
 class OpenCommand:
-    """Command without a final answer; `taken_by` is the executing process, None while waiting."""
+    """Command without a final answer; `taken_by` is the executing process, None if waiting."""
 
     command: Command
     taken_by: str | None
@@ -230,7 +238,7 @@ class Commands(Tables):
     """Queue of operator commands; each command is executed at most once."""
 
     def ask(self, command: Command) -> None:
-        """Add a command and delete old ones; adding the same command again has no effect."""
+        """Add a command once, even if called repeatedly; delete commands older than `KEPT_NS`."""
         with self._writing() as writer:
             writer.execute(FORGET, (command.asked_ns - KEPT_NS,))
             writer.execute(INSERT, astuple(command))
@@ -243,7 +251,7 @@ class Commands(Tables):
         return [each for each in found if each.command.unit in units]
 
     def take(self, id_: str, process: str) -> bool:
-        """Record the process that executes a command; return False if it is already answered."""
+        """Record the process that executes a command; return False for an answered command."""
         with self._writing() as writer:
             return bool(writer.execute(TAKE, (process, id_)).rowcount == 1)
 
@@ -276,13 +284,13 @@ class StreamPosition:
     Parameters
     ----------
     stream
-        Identifier of the stream; a recreated stream has a new one and counts from 1 again.
+        Identifier of the stream; a recreated stream has a new identifier and counts from 1 again.
     sequence
         Sequence number of the newest message whose results are stored.
     window_sequence
         Sequence number of the first message that must be read again to resume.
     memory
-        Document with the further state that is needed to resume.
+        Encoded state of the processing that is needed to resume, besides the messages.
     """
 
     unit: str
@@ -307,13 +315,13 @@ WRITE_POSITION = upsert("stream_position", POSITION_COLUMNS, ("unit",)) + (
     " WHERE stream_position.stream <> excluded.stream"
     " OR stream_position.sequence < excluded.sequence"
 )
-"""Statement that writes a stream position; a delayed process cannot set a position back."""
+"""Statement that writes a stream position; a position in a stream only increases."""
 
 READ_POSITION = f"SELECT {', '.join(POSITION_COLUMNS)} FROM stream_position WHERE unit = ?"  # noqa: S608
 
 
 def write_positions(writer: Connection, positions: Iterable[StreamPosition]) -> None:
-    """Write the newest stream position of each unit, within the transaction of its results."""
+    """Write the newest stream position of each unit, in the transaction of the unit's results."""
     newest = {position.unit: position for position in positions}
     # in a fixed order, so that two writers cannot deadlock
     for _, position in sorted(newest.items()):

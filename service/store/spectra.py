@@ -1,4 +1,4 @@
-"""Store of averaged vibration spectra over time."""
+"""Store of averaged vibration spectra of bearings."""
 
 import hashlib
 import math
@@ -24,7 +24,7 @@ N_CHANNELS = 4
 
 
 class Tier(IntEnum):
-    """Time resolution of stored spectra, numbered as in the database."""
+    """Storage tier of spectra by time resolution; the value is the number in the database."""
 
     DENSE = 0
     SPARSE = 1
@@ -32,7 +32,7 @@ class Tier(IntEnum):
 
 @dataclass(frozen=True)
 class TierLimits:
-    """Limits of a tier: interval between stored spectra and maximum number, per bearing."""
+    """Limits of a storage tier: interval between spectra in s, and maximum number per bearing."""
 
     every_s: float
     n_most: int
@@ -71,7 +71,7 @@ class SpectraQuery:
     start_ns, end_ns
         Half-open time range.
     max_spectra
-        Maximum number of spectra; from a longer range spectra are chosen evenly in time.
+        Maximum number of spectra; if more are stored, spectra evenly spaced in time are chosen.
     """
 
     unit: str
@@ -88,15 +88,19 @@ class StoredSpectrum:
     Parameters
     ----------
     time_ns
-        End time of the averaged samples.
+        Time of the end of the averaged samples.
     duration_s
         Duration of the averaged samples.
     n_segments
         Number of segments in which all channels were usable.
     quality
         Worst quality of the 1× amplitudes.
+    order1_hz
+        Frequency of the 1× line; None if unknown.
+    vortex_hz
+        Frequency of the vortex line; None if unknown.
     bin_hz
-        Frequency of the first spectral line, and line spacing.
+        Line spacing, which is also the frequency of the first spectral line.
     amplitude_um_pk : (N_CHANNELS, n_lines)
         Displacement amplitudes; all NaN for an unusable channel.
     """
@@ -115,7 +119,7 @@ class StoredSpectrum:
 
     @property
     def resolution(self) -> tuple[float, int]:
-        """Line spacing and number of lines, which are equal for spectra with the same axis."""
+        """Line spacing in Hz and number of lines, which define the frequency axis."""
         return self.bin_hz, self.amplitude_um_pk.shape[1]
 
 
@@ -126,11 +130,12 @@ class Spectra:
     Parameters
     ----------
     n_found
-        Number of stored spectra in the range, before the choice of `max_spectra`.
+        Number of stored spectra in the time range, regardless of `max_spectra`.
     damaged_ns
         Times of chosen spectra with a wrong checksum, which are omitted.
     first_ns
-        Time of the oldest stored spectrum of the bearing in any range; None without spectra.
+        Time of the oldest stored spectrum of the bearing, also outside the time range; None
+        without spectra.
     """
 
     spectra: Sequence[StoredSpectrum]
@@ -140,7 +145,7 @@ class Spectra:
 
 
 LOWEST_UM, HIGHEST_UM = 1e-6, 1e5
-"""Range of stored amplitudes; smaller ones are stored as zero, larger ones as the upper limit."""
+"""Range of stored amplitudes, µm; smaller ones are stored as zero, larger ones as the maximum."""
 
 N_STEPS = 65_533
 STEP = math.log(HIGHEST_UM / LOWEST_UM) / N_STEPS
@@ -152,7 +157,7 @@ CHECKSUM_BYTES = 8
 
 
 def encode(amplitude_um_pk: FloatArray) -> bytes:
-    """Return (N_CHANNELS, n_lines) amplitudes, NaN for unusable channels, as 16-bit codes."""
+    """Return (N_CHANNELS, n_lines) amplitudes in µm, NaN if unusable, as 16-bit codes."""
     usable = np.nan_to_num(amplitude_um_pk, nan=LOWEST_UM)
     steps = np.log(np.clip(usable, LOWEST_UM, HIGHEST_UM) / LOWEST_UM) / STEP
     codes = 1 + np.round(steps).astype(np.int64)
@@ -162,7 +167,7 @@ def encode(amplitude_um_pk: FloatArray) -> bytes:
 
 
 def decode(amplitudes: bytes) -> FloatArray:
-    """Return the (N_CHANNELS, n_lines) amplitudes from their codes, the inverse of `encode`."""
+    """Return the (N_CHANNELS, n_lines) amplitudes in µm; the inverse of `encode`."""
     codes = np.frombuffer(amplitudes, dtype="<u2").reshape(N_CHANNELS, -1)
     found: FloatArray = LOWEST_UM * np.exp(STEP * (codes.astype(np.float64) - 1.0))
     found[codes == ZERO] = 0.0
@@ -198,8 +203,7 @@ TRIM = """
         ORDER BY id DESC LIMIT 1 OFFSET :n_kept
     )
 """
-"""Statement that deletes spectra by order of insertion, so that a temporarily wrong clock does not
-displace newer spectra."""
+"""Statement that deletes spectra in order of insertion, since the clock may have been wrong."""
 
 IN_RANGE = """
     SELECT min(id), time_ns FROM spectrum WHERE series = ? AND time_ns >= ? AND time_ns < ?
@@ -218,7 +222,7 @@ JUDGED = tuple(
 def insert_spectra(
     writer: Connection, assessments: Iterable[Assessment], limits: SpectraLimits
 ) -> None:
-    """Insert the first spectrum of each interval of each tier; delete those beyond the maximum."""
+    """Insert the first spectrum of each interval of each tier; delete spectra beyond the limit."""
     for assessment in assessments:
         spectrum = assessment.spectrum
         if spectrum.frequency_hz.size and spectrum.n_segments.diagonal().any():
@@ -267,10 +271,10 @@ def _number(value: float | None) -> float | None:
 
 
 class SpectraStore(Tables):
-    """Store of the averaged spectra of bearings; they are written with the assessments."""
+    """Read access to the averaged spectra of bearings; `Store.append` writes the spectra."""
 
     def read(self, query: SpectraQuery) -> Spectra:
-        """Return the intact spectra that match a query, and the times of damaged ones."""
+        """Return the intact spectra that match a query, and the times of damaged spectra."""
         start_ns, end_ns = storable(query.start_ns), storable(query.end_ns)
         with self._reading() as reader:
             series = find_series(reader, query.unit, query.bearing)
@@ -289,7 +293,7 @@ class SpectraStore(Tables):
 
 
 def _evenly(found: Sequence[tuple[int, int]], n_most: int) -> Sequence[tuple[int, int]]:
-    """Return at most `n_most` entries, evenly in time, including the first and the last."""
+    """Return at most `n_most` entries evenly spaced in time, including the first and the last."""
     if len(found) <= n_most:
         return found
     time_ns = np.array([time for _, time in found], dtype=np.int64)

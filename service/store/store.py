@@ -56,7 +56,7 @@ INSERT_GAP = """
     INSERT INTO gap (unit, epoch, first_index, n_samples, stop_ns, start_ns, is_estimated)
     VALUES (?,?,?,?,?,?,?) ON CONFLICT DO NOTHING
 """
-"""Statement that inserts a gap; ``OR IGNORE`` would also hide violations of other constraints."""
+"""Statement that inserts a gap unless it is stored; ``OR IGNORE`` would hide other errors."""
 
 SELECT_GAPS = """
     SELECT epoch, first_index, n_samples, stop_ns, start_ns, is_estimated FROM gap WHERE unit = ?
@@ -83,7 +83,7 @@ class Store:
     database
         Open database; closed with the store.
     head
-        Head file of the audit trail, with the number and hash of the newest entry.
+        File with the number and hash of the newest entry of the audit trail.
     address
         Function that returns the outbox messages about an alarm event.
     spectra
@@ -145,12 +145,12 @@ class Store:
         Parameters
         ----------
         positions
-            Stream positions that the units have reached with these results.
+            Position in the message stream, per unit, up to which the results are complete.
 
         Raises
         ------
         StoreError
-            If nothing was written.
+            If the results were not written, or the outcome is unknown.
         """
         with self._writing() as writer:
             for assessment in assessments:
@@ -162,7 +162,7 @@ class Store:
             write_positions(writer, positions)
 
     def trend(self, query: TrendQuery) -> Trend:
-        """Return the trends of one bearing, aggregated into buckets if it has many readings.
+        """Return the trends of one bearing, in buckets if more than ``max_points`` readings match.
 
         Raises
         ------
@@ -173,7 +173,7 @@ class Store:
             return read_trend(reader, query)
 
     def gaps(self, unit: str, start_ns: int, end_ns: int) -> list[Gap]:
-        """Return the gaps that end within a time range, oldest first.
+        """Return the gaps in the samples of a unit that end within a time range, oldest first.
 
         Raises
         ------
@@ -189,7 +189,7 @@ class Store:
         return found
 
     def reach(self, unit: str) -> Reach | None:
-        """Return the end of a unit's results and the later gaps; None without measured results."""
+        """Return the end of a unit's results, and all later gaps; None without measured results."""
         with self._reader() as reader:
             series = reader.execute("SELECT id FROM series WHERE unit = ?", (unit,)).fetchall()
             rows = [reader.execute(SELECT_LAST, row).fetchone() for row in series]
@@ -212,7 +212,7 @@ class Store:
         return StoredReadings(int(time_ns), readings)
 
     def add_reference(self, reference: GapReference) -> None:
-        """Write a gap reference; it becomes the one in force for its bearing."""
+        """Write a gap reference, which is then in force for the bearing."""
         self.gap_references.add(reference)
 
     def references(self) -> list[GapReference]:

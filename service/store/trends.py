@@ -1,4 +1,4 @@
-"""Queries of single readings by time and operating condition."""
+"""Queries of single readings (not aggregated) by time and operating condition."""
 
 from collections.abc import Iterable, Iterator
 
@@ -14,16 +14,16 @@ from service.store.series import Layout
 IN_STATES = """(
         CAST(:states AS TEXT) = '' OR CAST(:states AS TEXT) LIKE '%,' || operating_state || ',%'
     )"""
-"""SQL condition that the state is in the list ``:states``, such as ``,2,3,``; empty for all."""
+"""SQL condition that the state is in ``:states``, such as ``,2,,3,``; empty for all states."""
 
 
 def at_least(column: str, name: str) -> str:
-    """Return the SQL condition that a column is at least a parameter; NULL means no bound."""
+    """Return the SQL condition that a column is at least `:name`; NULL means no bound."""
     return f"(CAST(:{name} AS DOUBLE PRECISION) IS NULL OR {column} >= :{name})"
 
 
 def at_most(column: str, name: str) -> str:
-    """Return the SQL condition that a column is at most a parameter; NULL means no bound."""
+    """Return the SQL condition that a column is at most `:name`; NULL means no bound."""
     return f"(CAST(:{name} AS DOUBLE PRECISION) IS NULL OR {column} <= :{name})"
 
 
@@ -51,7 +51,7 @@ MAX_ROWS = 1_000_000
 """Maximum number of readings that one query reads, which takes a few seconds."""
 
 ROWS_AT_ONCE = 4000
-"""Number of rows fetched at a time; only the requested columns stay in memory."""
+"""Number of rows fetched at a time, to limit memory."""
 
 SELECT_ROWS = f"""
     SELECT time_ns, layout, reading_values, reading_qualities FROM assessment
@@ -66,7 +66,7 @@ Span = tuple[int, int]
 """Half-open time range, ns."""
 
 Row = tuple[int, int, bytes, bytes]
-"""Stored reading: time, layout number, encoded values and quality bytes."""
+"""Stored row of readings: time in ns, layout number, encoded values and quality bytes."""
 
 
 def select_page(reader: Connection, query: TrendQuery) -> Summaries:
@@ -78,13 +78,13 @@ def select_page(reader: Connection, query: TrendQuery) -> Summaries:
 def select_readings(
     reader: Connection, query: TrendQuery, spans: Iterable[Span], width_ns: int
 ) -> tuple[int, Summaries]:
-    """Return the number of readings in some time spans, and the readings, oldest first.
+    """Return the number of readings in the given time spans, and the readings, oldest first.
 
     Parameters
     ----------
     width_ns
-        Bucket width into which more than ``max_points`` readings are aggregated while they are
-        read.
+        Width of the buckets into which the readings are aggregated if there are more than
+        ``max_points``.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def select_layouts(reader: Connection) -> dict[int, Layout]:
 
 
 def storable(time_ns: int) -> int:
-    """Return the nearest time that can be stored, from 1970 to 2262."""
+    """Return a time, in ns, limited to the range that can be stored: from 1970 to 2262."""
     return max(0, min(time_ns, 2**63 - 1))
 
 
@@ -149,7 +149,7 @@ def arguments(query: TrendQuery) -> dict[str, object]:
 
 
 def decoded_rows(rows: list[Row], layouts: dict[int, Layout], names: tuple[str, ...]) -> Summaries:
-    """Return the requested columns of stored rows; a column missing in a row has level BAD."""
+    """Return the columns `names` of stored rows; a column that a row lacks has level BAD."""
     time_ns = np.array([row[0] for row in rows], dtype=np.int64)
     layout_of_row = np.array([row[1] for row in rows], dtype=np.int64)
     value = np.full((len(rows), len(names)), np.nan)

@@ -10,7 +10,7 @@ from service.store.port import StoreError
 
 
 class WaveformKind(StrEnum):
-    """Kind of a waveform recording."""
+    """Kind of a waveform recording: capture around an alarm, or continuous recording."""
 
     CAPTURE = "capture"
     CONTINUOUS = "continuous"
@@ -32,11 +32,13 @@ class WaveformFile:
     Parameters
     ----------
     place
-        Identifier of the data folder; several data folders may share a database.
+        Identifier of the data folder, since several data folders may share a database.
     name
         Name of the recording's folder within the folder of its kind.
-    start_ns, stop_ns
-        Time of the first sample, and time one sample after the last.
+    start_ns
+        Time of the first sample.
+    stop_ns
+        Time one sampling interval after the last sample.
     n_samples
         Number of samples per channel.
     n_bytes
@@ -44,7 +46,7 @@ class WaveformFile:
     checksum
         SHA-256 of the manifest, which lists the checksums of the other files; empty if unreadable.
     reason
-        Reason for the state.
+        Reason for the state; may be empty.
     changed_ns
         Time of the last change of state.
     checked_ns
@@ -102,7 +104,7 @@ class WaveformStore(Tables):
     """Store of the index of recordings in all data folders; the database holds no waveforms."""
 
     def put(self, files: Sequence[WaveformFile]) -> None:
-        """Write entries in one transaction; replace entries with the same place, kind and name.
+        """Write index entries in one transaction; replace entries of equal place, kind and name.
 
         Raises
         ------
@@ -113,12 +115,12 @@ class WaveformStore(Tables):
             writer.executemany(PUT, [astuple(file) for file in files])
 
     def files(self, place: str) -> list[WaveformFile]:
-        """Return the entries of a data folder without removed recordings, oldest first."""
+        """Return the entries of a data folder without those of removed recordings, oldest first."""
         with self._reading() as reader:
             return [_file(row) for row in reader.execute(FILES, (place,))]
 
     def forget(self, place: str, before_ns: int) -> int:
-        """Delete the entries of recordings removed or lost before a time; return their number."""
+        """Delete entries of recordings removed or lost before a time; return how many."""
         with self._writing() as writer:
             return writer.execute(FORGET, (place, before_ns)).rowcount
 

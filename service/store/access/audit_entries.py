@@ -16,7 +16,7 @@ MAX_NAME = 300
 
 MAX_REASON = 2000
 MAX_DOCUMENT = 65_536
-"""Maximum length of a document in characters; only the beginning of a longer one is stored."""
+"""Maximum length of a JSON text in characters; of a longer text only the beginning is stored."""
 
 N_SHOWN = 1000
 
@@ -40,7 +40,7 @@ class AuditAction:
     Parameters
     ----------
     time_ns
-        Time of the action, UTC.
+        Time of the action, in ns since 1970 UTC.
     actor
         Name of the person or machine; empty if unknown.
     action
@@ -49,6 +49,10 @@ class AuditAction:
         Identifier of the changed object.
     before, after
         State of the object before and after the action as JSON values; None if not recorded.
+    reason
+        Reason given for the action; empty if none was given.
+    source
+        Interface through which the action was taken.
     peer
         Network address of the request, or user of the operating system; None if unknown.
     """
@@ -74,8 +78,10 @@ class AuditEntry:
         Consecutive number from 1.
     before, after
         State of the object before and after the action, as canonical JSON.
-    previous_hash, hash
-        Hash of the previous entry, and SHA-256 of all other fields of this entry, in hexadecimal.
+    previous_hash
+        Hash of the previous entry, in hexadecimal; `FIRST` in the first entry.
+    hash
+        SHA-256 of all other fields of this entry, in hexadecimal.
     """
 
     number: int
@@ -93,12 +99,14 @@ class AuditEntry:
 
 
 def canonical(document: object) -> str | None:
-    """Return the canonical JSON text of a document; None for None.
+    """Return the canonical JSON text of a JSON value; None for None.
+
+    A text longer than `MAX_DOCUMENT` is replaced by an object with its beginning and its length.
 
     Raises
     ------
     ValueError
-        If the document contains a number that is not finite.
+        If the value contains a number that is not finite.
     """
     if document is None:
         return None
@@ -109,7 +117,7 @@ def canonical(document: object) -> str | None:
 
 
 def storable(text: str, n_most: int) -> str:
-    """Return a text without lone surrogates, truncated to at most `n_most` characters."""
+    """Return a text truncated to `n_most` characters, with lone surrogates replaced by ``?``."""
     whole = text.encode("utf-8", "replace").decode("utf-8")
     return whole if len(whole) <= n_most else whole[: n_most - 1] + "…"
 
@@ -121,7 +129,7 @@ FIRST = "0" * 64
 
 
 def digest(values: Sequence[object]) -> str:
-    """Return the SHA-256 of the fields of an entry, in order and without its own hash.
+    """Return the SHA-256, in hexadecimal, of all fields of an audit entry except its hash.
 
     Raises
     ------
@@ -145,7 +153,7 @@ def chained(action: AuditAction, number: int, previous_hash: str) -> AuditEntry:
 
 
 def recomputed(entry: AuditEntry) -> str | None:
-    """Return the hash that an entry should have; None if its fields have wrong types."""
+    """Return the hash computed from the fields of an entry; None if a field has a wrong type."""
     try:
         return digest(astuple(entry)[:-1])
     except TypeError:
@@ -154,7 +162,7 @@ def recomputed(entry: AuditEntry) -> str | None:
 
 @dataclass(frozen=True)
 class Acting:
-    """Context of actions: data about their origin for audit entries.
+    """Origin of actions, which is recorded in their audit entries.
 
     Parameters
     ----------
@@ -194,13 +202,13 @@ _ACTING: ContextVar[Acting] = ContextVar("acting", default=PADWATCH_ITSELF)
 
 
 def acting() -> Acting:
-    """Return the context of actions in this task or thread; by default `PADWATCH_ITSELF`."""
+    """Return the origin of actions in this task or thread; by default `PADWATCH_ITSELF`."""
     return _ACTING.get()
 
 
 @contextmanager
 def acting_as(who: Acting) -> Iterator[None]:
-    """Set the context of actions within the block."""
+    """Return a context manager that sets the origin of the actions taken within its block."""
     token = _ACTING.set(who)
     try:
         yield
@@ -209,5 +217,5 @@ def acting_as(who: Acting) -> Iterator[None]:
 
 
 def name_actor(actor: str) -> None:
-    """Set the actor in the current context of actions, after authentication."""
+    """Set the authenticated person or machine as the actor of the following actions."""
     _ACTING.set(replace(acting(), actor=actor))

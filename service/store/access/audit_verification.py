@@ -77,7 +77,7 @@ HEAD_DIFFERED = "audit.head_differed"
 
 
 MAX_BEHIND = 64
-"""Maximum number of entries by which the head may lag, as after a crash during a transaction."""
+"""Maximum number of entries by which the head file may lag behind the trail after a crash."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +88,8 @@ class Finding:
     ----------
     number
         Number of the first affected entry; None for a defect of the head file.
+    detail
+        Description of the defect.
     """
 
     number: int | None
@@ -107,12 +109,13 @@ class Verdict:
     finding
         First defect; None if the trail has no defect.
     n_behind
-        Number of entries by which the head lags, as after a crash; the next entry repairs it.
+        Number of newest entries that are missing in the head file, as after a crash; the next
+        write to the trail updates the file.
     contradictions
         Numbers of the entries which record that the head contradicted the chain.
     is_shared
-        Whether other hosts, each with its own head file, also write to the trail. The head then
-        lags by the newer entries of other hosts.
+        Whether other hosts, each with its own head file, also write to the trail. The head of this
+        host then lacks the newer entries of other hosts.
     """
 
     n_entries: int
@@ -135,13 +138,15 @@ def walk(
     *,
     is_shared: bool = False,
 ) -> Verdict:
-    """Verify every entry, oldest first, and compare the last one with the head.
+    """Verify all entries of an audit trail and compare them with the head; return the result.
 
     Parameters
     ----------
+    entries
+        Entries of the trail, oldest first.
     head
-        Head from the file, or the reason why it cannot be read. It must be read before the entries,
-        since it may lag behind them but not lead.
+        Head from the file, or the reason why the file cannot be read. The file must be read before
+        the entries, since the head may be older than the newest entry, but not newer.
     rename
         Function that describes the defect of an entry with a wrong hash.
     is_shared
@@ -200,7 +205,7 @@ def _wrong_head(
 
 
 def place_of(entry: AuditEntry, last: int) -> str:
-    """Describe the defect of an entry with a wrong hash: altered, or stored as another number."""
+    """Return the error message on an entry with a wrong hash: altered, or out of order."""
     for number in range(1, last + 1):
         if recomputed(replace(entry, number=number)) == entry.hash:
             return f"entry {entry.number} is out of order: it holds entry {number}"

@@ -1,4 +1,4 @@
-"""Permissions, roles, sessions, API keys, and the tokens behind them."""
+"""Permissions, roles, login sessions and API keys, and their secret tokens."""
 
 import re
 import secrets
@@ -55,7 +55,7 @@ MIN_ROLE: Mapping[Permission, Role] = MappingProxyType(
         Permission.CHANGE_ACCESS: Role.ADMIN,
     }
 )
-"""Lowest role that has each permission."""
+"""Lowest role that includes a permission, by permission."""
 
 
 class Means(StrEnum):
@@ -101,9 +101,10 @@ class Identity:
         return self.means is not Means.LOCAL
 
     def may(self, permission: Permission, unit: str | None = None) -> bool:
-        """Return whether an operation on a unit, or on data of the whole plant, is permitted.
+        """Return whether an operation on a unit is permitted; None stands for the whole plant.
 
-        An API key that is limited to units may read data of the whole plant, but not change them.
+        An API key that is limited to units may read the data of the whole plant, but may not
+        change these data.
         """
         if not self.role.may(permission):
             return False
@@ -174,7 +175,7 @@ class SessionLimits:
         return now_ns - session.seen_ns >= self.step_s * NS_PER_S
 
     def oldest_ns(self, now_ns: int) -> int:
-        """Return the earliest start time of a session that has not ended."""
+        """Return the earliest login time, in ns, of a session that may still be valid."""
         return now_ns - round(self.absolute_s * NS_PER_S)
 
 

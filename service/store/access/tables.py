@@ -1,6 +1,7 @@
 """Tables of accounts, sessions, API keys and the set-up token.
 
-Each method writes a change with its audit entries; both are on the disk when it returns.
+A change and its audit entries are written in one transaction and are on the disk when the method
+returns.
 """
 
 import json
@@ -26,11 +27,11 @@ class Account:
     password_hash
         Argon2id hash in the encoded text form, which includes its parameters.
     password_number
-        Number of the password, incremented at each change.
+        Version number of the password, incremented at each change.
     password_ns
         Time at which the password was set.
     must_change
-        Whether another person set the password, so that the account may only change it.
+        Whether another person set the password, so that the owner must change it before other use.
     """
 
     name: str
@@ -50,7 +51,7 @@ def _account_action(
 
 
 def _key_action(done: str, id_: str, now_ns: int, made: ApiKey | None = None) -> AuditAction:
-    """Return the audit entry about a change of a key, with its permissions if it is new."""
+    """Return the audit entry about a change of an API key, with the properties of a new key."""
     after = None
     if made is not None:
         after = {
@@ -184,7 +185,8 @@ class SessionStore(AuditedTables):
     def add(self, session: Session, password_number: int, oldest_ns: int) -> bool:
         """Add a session; return False if the password was changed since it was verified.
 
-        Sessions that began before `oldest_ns` and the oldest beyond `MAX_SESSIONS` are deleted.
+        Sessions that began before `oldest_ns` are deleted, and the oldest sessions of the account
+        beyond `MAX_SESSIONS`.
         """
         name = session.account
         row = (session.digest, session.created_ns, session.seen_ns, name, password_number)
@@ -195,7 +197,7 @@ class SessionStore(AuditedTables):
         return is_begun
 
     def get(self, digest: bytes) -> tuple[Session, Account] | None:
-        """Return a session with the current state of its account; None if it does not exist."""
+        """Return a session and its account; None if the session does not exist."""
         with self._reading() as reader:
             row = reader.execute(SELECT_SESSION, (digest,)).fetchone()
         if row is None:
@@ -307,7 +309,7 @@ class SetUpStore(AuditedTables):
     """Store of the set-up token, with which the first account is created."""
 
     def offer(self, digest: bytes, expires_ns: int) -> bool:
-        """Replace the set-up token; return False if an account exists."""
+        """Store a set-up token instead of the previous token; return False if an account exists."""
         offer = """
             INSERT INTO set_up_token SELECT 1, ?, ? WHERE NOT EXISTS (SELECT 1 FROM account)
             ON CONFLICT (id) DO UPDATE SET
@@ -317,7 +319,7 @@ class SetUpStore(AuditedTables):
             return writer.execute(offer, (digest, expires_ns)).rowcount == 1
 
     def holds(self, digest: bytes, now_ns: int) -> bool:
-        """Return whether a set-up token is valid."""
+        """Return whether a set-up token is stored and not expired, and no account exists."""
         with self._reading() as reader:
             return bool(reader.execute(IS_TAKEABLE, (digest, now_ns)).fetchone()[0])
 
@@ -355,7 +357,7 @@ MUST_CHANGE = """
     ALTER TABLE account ADD COLUMN must_change INTEGER NOT NULL DEFAULT 0
         CHECK (must_change IN (0, 1));
 """
-"""Migration that adds the flag of passwords that must be changed by their owner."""
+"""Migration that adds a flag to each account: the owner must change the password."""
 
 ACCESS_TABLES = """
     CREATE TABLE account (

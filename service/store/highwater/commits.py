@@ -34,7 +34,7 @@ def host_id(machine_id: Path = MACHINE_ID) -> str:
 
 
 MAX_BEHIND = 64
-"""Maximum number of transactions by which the mark in the file may lag, as after a crash."""
+"""Maximum number of transactions by which the file may lag behind the database after a crash."""
 
 
 class Kind(StrEnum):
@@ -70,7 +70,7 @@ def compared(mark: Mark | str, database: Mark, host: str) -> list[MarkFinding]:
     Parameters
     ----------
     mark
-        Mark in the file, or the reason why it cannot be read. It must be read before `database`.
+        Mark in the file, or the reason why it cannot be read. The file must be read first.
     database
         Mark in the database.
     host
@@ -177,7 +177,7 @@ class CommitMarks:
     file
         High-water mark file beside the database.
     now_ns
-        Wall clock.
+        Function that returns the wall-clock time, in ns since 1970 UTC.
     host
         Function that returns the identifier of this machine.
 
@@ -200,7 +200,8 @@ class CommitMarks:
     def open(self, writer: Connection, in_file: Mark | str | None) -> None:
         """Compare a newly opened database with the mark file, within a transaction.
 
-        A database without a mark receives one; a missing file is then created.
+        A database without a mark receives a mark; if the file is missing, that is if `in_file` is
+        None, it is then created.
         """
         writer.execute(CREATE)
         mark = select_mark(writer)
@@ -224,7 +225,7 @@ class CommitMarks:
     def settle(self) -> None:
         """Write the mark of the committed transaction to the file.
 
-        If the write fails, the transaction stays committed and the file lags until a later write.
+        If the write fails, the transaction stays committed and a later write updates the file.
         """
         if self._newest is None or self.found:
             return
@@ -262,7 +263,8 @@ class CommitMarks:
     def in_file(self) -> Mark | str | None:
         """Return the mark in the file, or why it is unreadable; None if the file is missing.
 
-        The file must be read before the database, since it may lag behind but not lead.
+        The file must be read before the database, since the mark in the file may be older than the
+        mark in the database, but not newer.
         """
         try:
             return self._file.read()
@@ -273,7 +275,7 @@ class CommitMarks:
 
 
 def select_mark(reader: Connection) -> Mark | None:
-    """Return the high-water mark in a database; None if it has none yet."""
+    """Return the high-water mark in a database; None if the database has no mark yet."""
     row = reader.execute(SELECT).fetchone()
     if row is None:
         return None

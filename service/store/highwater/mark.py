@@ -105,7 +105,7 @@ class MarkFile:
             raise MarkError(f"cannot be read: {error.strerror}") from error
 
     def advance(self, mark: Mark) -> None:
-        """Write a mark, durable on return; a mark older than that in the file is ignored.
+        """Write a mark, durable on return; a mark older than the newest in the file is ignored.
 
         Raises
         ------

@@ -57,7 +57,10 @@ class PostgresAddress:
         return f"PostgreSQL database {database} at {host}"
 
     def full(self, purpose: str) -> str:
-        """Return the connection string with the password; it must never be displayed or logged."""
+        """Return the connection string with the password, and the `purpose` in application_name.
+
+        The string must never be displayed or logged.
+        """
         given = conninfo_to_dict(self.conninfo)
         name = f"padwatch {purpose} {os.getpid()}@{socket.gethostname()}"[:63]
         settings = {**DEFAULTS, "application_name": name, **given, "client_encoding": "UTF8"}
@@ -95,7 +98,7 @@ SERVER_SETTINGS = """
 
 
 class _TruthDumper(Dumper):
-    """Dumper that writes booleans as 0 and 1, as they are stored."""
+    """Encoder of boolean parameters as 0 and 1, as booleans are stored."""
 
     oid = BIGINT_OID
 
@@ -104,7 +107,7 @@ class _TruthDumper(Dumper):
 
 
 class _NumberDumper(Dumper):
-    """Dumper that writes floats, and NaN as NULL, as SQLite does."""
+    """Encoder of float parameters, which writes NaN as NULL, as SQLite does."""
 
     oid = DOUBLE_OID
 
@@ -139,14 +142,14 @@ class PostgresConnection:
     def executemany(
         self, statement: str, parameters: Iterable[Parameters], /
     ) -> psycopg.Cursor[tuple[Any, ...]]:
-        """Run a statement once for each set of parameters, without a round trip for each."""
+        """Run a statement once for each set of parameters, in few network round trips."""
         cursor = self._session.cursor()
         cursor.executemany(translated(statement), parameters)
         return cursor
 
 
 def connected(address: PostgresAddress, purpose: str, settings: str) -> Session:
-    """Open a session with the common settings and additional SET statements."""
+    """Return a new session with the settings `SESSION` and additional SET statements."""
     session = psycopg.connect(address.full(purpose), autocommit=True, context=_Context)
     try:
         session.execute((SESSION + settings).encode())
@@ -205,7 +208,7 @@ CANCEL_WITHIN_S = 2.0
 
 @contextmanager
 def cancelled_when_gone(session: Session) -> Iterator[None]:
-    """Cancel the statements of a session within the block when the HTTP client disconnects.
+    """Return a context manager that cancels statements when the HTTP client disconnects.
 
     Raises
     ------
@@ -275,13 +278,13 @@ OF_THE_ROW = (
     psycopg.errors.DataCorrupted,
     psycopg.errors.IndexCorrupted,
 )
-"""Errors caused by one row or its page; other rows can be written without it."""
+"""Errors caused by one row or its database page; other rows can still be written."""
 
 UNREACHABLE = "check that PostgreSQL runs and can be reached; padwatch retries"
 
 
 def sentence(where: str, error: psycopg.Error) -> str:
-    """Return a one-line error message with advice."""
+    """Return a one-line message about a PostgreSQL error, with advice on the remedy."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     said = (error.diag.message_primary or (lines[0] if lines else type(error).__name__)).rstrip(".")
     advice = _advice(error)
@@ -299,7 +302,7 @@ def _advice(error: psycopg.Error) -> str | None:
 
 @contextmanager
 def renamed(where: str) -> Iterator[None]:
-    """Convert errors of PostgreSQL, psycopg and the operating system to `StoreError`."""
+    """Return a context manager that converts database and OS errors to `StoreError`."""
     try:
         yield
     except psycopg.Error as error:

@@ -209,7 +209,7 @@ class Writer:
 
 
 def writing_session(address: PostgresAddress) -> Session:
-    """Open a writing session.
+    """Return a new writing session on a suitable server.
 
     Raises
     ------
@@ -355,7 +355,7 @@ class PostgresDatabase:
             yield reader
 
     def ever_had(self, connection: Connection, table: str) -> bool:  # noqa: ARG002
-        """Return True; a missing head file is written when the store is opened."""
+        """Return True, so that a head file missing after the store was opened is an error."""
         return True
 
     def hold(self, name: str) -> PostgresHold:

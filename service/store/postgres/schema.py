@@ -122,7 +122,7 @@ HYPERTABLE = (
 
 
 def statements_to(number: int) -> list[str]:
-    """Return the statements that migrate a database to a schema number from the previous one."""
+    """Return the statements that migrate a database from schema `number` - 1 to `number`."""
     migration = INSTEAD.get(number, schema.MIGRATIONS[number - 1])
     return [*for_postgres(migration), *AFTERWARDS.get(number, ())]
 
@@ -162,7 +162,7 @@ def migrate(session: Session, where: str, origin: Origin) -> None:
 
 
 def _schema_number(session: Session, where: str, origin: Origin) -> int:
-    """Return the schema number of a database; create the table of the number if it is new."""
+    """Return the schema number of a database; a new database receives the number 0."""
     if session.execute(HAS_WHAT).fetchone() == (True,):
         row = session.execute("SELECT origin, schema_number FROM padwatch").fetchone()
         if row is None:

@@ -66,7 +66,7 @@ class PostgresStore(Store):
 
 
 def _begin_head(database: PostgresDatabase, head: Path) -> bool:
-    """Write a missing head file; return whether the audit trail already had entries."""
+    """Write a missing head file; return True if it was missing although the trail has entries."""
     if head.exists():
         return False
     head.parent.mkdir(parents=True, exist_ok=True)
@@ -91,7 +91,7 @@ def _begun(head: Path) -> AuditAction:
 
 
 def server_trail(address: PostgresAddress, head: Path) -> Trail:
-    """Return the audit trail of a database with the head file of this host; no migration is run."""
+    """Return the audit trail of a database with the head file of this host, without migration."""
     return Trail(partial(_opened, address), head, is_shared=True)
 
 

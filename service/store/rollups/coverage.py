@@ -25,7 +25,7 @@ MAX_SPANS = 4096
 """Maximum number of roll-up spans that one SQL query reads, to limit memory."""
 
 MAX_CUT_SPANS = 100_000
-"""Maximum number of finer roll-ups read in place of wider ones that match a query only in part."""
+"""Maximum number of finer roll-ups read where wider roll-ups match a query only in part."""
 
 REDONE = """
     SELECT start_ns FROM rollup_redo
@@ -40,7 +40,7 @@ class Cover:
     Parameters
     ----------
     summaries
-        Roll-ups that contain requested readings only, aggregated into buckets.
+        Roll-ups, aggregated into buckets, all of whose readings match the query.
     spans
         Time spans for which single readings must be read.
     rolled_spans
@@ -74,6 +74,8 @@ def covered(
     ----------
     deleted
         Times up to which data of the bearing were deleted.
+    whole
+        Requested time range, ns.
     bucket_ns
         Width of the requested buckets.
 
@@ -108,7 +110,7 @@ class _Covering:
         self.cover = Cover()
 
     def take(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span by the widest roll-ups, and its ends by finer ones or single readings."""
+        """Cover a span by the widest roll-ups, its ends by finer roll-ups or single readings."""
         if span[0] >= span[1]:
             return
         if not widths_ns:
@@ -126,13 +128,13 @@ class _Covering:
         self.take((inner[1], span[1]), finer_ns)
 
     def take_coarse(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span whose single readings were deleted, except late readings."""
+        """Cover a span by roll-ups whose single readings, except late readings, are deleted."""
         self._take_cells(span, widths_ns)
         late = self._redone(span)
         self.cover.spans += [_within(span, (hour, hour + HOUR_NS)) for hour in late]
 
     def _take_cells(self, span: Span, widths_ns: Sequence[int]) -> None:
-        """Cover a span by the widest roll-ups inside it; the finest ones may extend beyond it."""
+        """Cover a span by the widest roll-ups in it; the finest may extend beyond the span."""
         width_ns, finer_ns = widths_ns[-1], widths_ns[:-1]
         inner = _inside(span, width_ns) if finer_ns else _around(span, width_ns)
         if finer_ns and inner[0] >= inner[1]:
@@ -235,7 +237,7 @@ def _runs(time_ns: IntArray, width_ns: int) -> Iterator[Span]:
 
 
 def read_trend(reader: Connection, query: TrendQuery) -> Trend:
-    """Return the trends of one bearing, aggregated into buckets if it has many readings.
+    """Return the trends of one bearing, in buckets if more than ``max_points`` readings match.
 
     Raises
     ------

@@ -22,9 +22,9 @@ DELETE_HOUR = "DELETE FROM assessment WHERE series = ? AND time_ns >= ? AND time
 def merge_late(writer: Connection, series: int, hour_ns: int, deleted: DeletedUntil) -> None:
     """Merge late readings into the roll-ups of an hour whose single readings were deleted.
 
-    The late readings are deleted in the same transaction, so that each is either stored or merged.
-    A reading that is written twice after its hour was deleted is counted twice, since padwatch
-    cannot recognize it.
+    The late readings are deleted in the same transaction, so that a late reading is either stored
+    or merged. A reading that is written twice after the deletion of its hour is counted twice,
+    since padwatch cannot recognize the repetition.
     """
     hour = (hour_ns, hour_ns + HOUR_NS)
     minutes = minutes_of(writer, series, hour)
@@ -56,7 +56,7 @@ SET_MARK = """
 
 
 def gather_next(writer: Connection, series: int, now_ns: int) -> None:
-    """Aggregate the next complete minutes of readings of a bearing."""
+    """Aggregate the readings of the next complete minutes of a bearing into roll-ups."""
     mark_ns = select_mark(writer, series)
     until_ns = _until(writer, series, mark_ns, now_ns)
     if until_ns > mark_ns:
@@ -65,7 +65,7 @@ def gather_next(writer: Connection, series: int, now_ns: int) -> None:
 
 
 def gather_again(writer: Connection, series: int) -> None:
-    """Aggregate hours with late readings again."""
+    """Aggregate again the next hours of a bearing for which readings were stored late."""
     mark_ns = select_mark(writer, series)
     hours = writer.execute(
         "SELECT start_ns FROM rollup_redo WHERE series = ? ORDER BY start_ns LIMIT ?",
@@ -89,7 +89,7 @@ def _gather_hour(writer: Connection, series: int, span: Span) -> None:
 
 
 def _until(writer: Connection, series: int, mark_ns: int, now_ns: int) -> int:
-    """Return the end of the next step; only minutes before a later reading are complete."""
+    """Return the end of the next step; a minute is complete once a later minute has a reading."""
     end_ns = now_ns + 1
     times = writer.execute(NEXT_TIMES, (series, mark_ns, end_ns, MAX_READINGS)).fetchall()
     if not times:
@@ -133,7 +133,7 @@ class RollupStore(Tables):
     """Store of roll-ups; readings that are not aggregated yet are read as single readings."""
 
     def due(self, now_ns: int) -> list[int]:
-        """Return the series numbers of bearings with readings to aggregate, most delayed first."""
+        """Return the numbers of the bearings with readings to aggregate, longest delayed first."""
         with self._reading() as reader:
             rows = reader.execute(DUE, {"now_ns": now_ns, "width_ns": MINUTE_NS})
             return [int(row[0]) for row in rows]

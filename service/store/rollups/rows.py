@@ -30,8 +30,14 @@ class Conditions:
         Operating state, `NO_STATE` if unknown.
     n_readings : (n,)
         Number of aggregated readings, usable or not.
-    eccentricity_low, eccentricity_high, oil_low_c, oil_high_c : (n,)
-        Minimum and maximum of eccentricity ratio and oil temperature, NaN if unknown.
+    eccentricity_low : (n,)
+        Minimum of the eccentricity ratio, NaN if unknown.
+    eccentricity_high : (n,)
+        Maximum of the eccentricity ratio, NaN if unknown.
+    oil_low_c : (n,)
+        Minimum of the oil temperature in °C, NaN if unknown.
+    oil_high_c : (n,)
+        Maximum of the oil temperature in °C, NaN if unknown.
     """
 
     state: IntArray
@@ -43,12 +49,20 @@ class Conditions:
 
     @classmethod
     def of(cls, state: IntArray, eccentricity: FloatArray, oil_c: FloatArray) -> "Conditions":
-        """Return the conditions of single readings."""
+        """Return the conditions of n single readings, given in arrays of shape (n,)."""
         one = np.ones(state.size, dtype=np.int64)
         return cls(state, one, eccentricity, eccentricity, oil_c, oil_c)
 
     def summed(self, order: IntArray, starts: IntArray) -> "Conditions":
-        """Return the aggregate of each run of sorted rows; the rows of a run are of one cell."""
+        """Return the aggregate of each run of rows that have the same time span and cell.
+
+        Parameters
+        ----------
+        order : (n,)
+            Row indices that sort the rows by time span and cell.
+        starts : (m,)
+            Position in `order` of the first row of each run.
+        """
         return Conditions(
             self.state[order][starts],
             np.add.reduceat(self.n_readings[order], starts),
@@ -67,7 +81,7 @@ class Cells:
     summaries: Summaries
 
     def gathered(self, width_ns: int) -> "Cells":
-        """Return the cells aggregated over spans of a width; one row per span and condition."""
+        """Return the cells aggregated over wider time spans, one row per span and grid cell."""
         bucket = self.summaries.time_ns // width_ns
         keys = np.stack(
             [
@@ -86,7 +100,7 @@ class Cells:
         )
 
     def slots(self) -> IntArray:
-        """Return the index of each cell within its time span."""
+        """Return the number of each cell within its time span, from 0; shape (n,)."""
         time_ns = self.summaries.time_ns
         first = np.flatnonzero(np.concatenate([[True], np.diff(time_ns) != 0]))
         lengths = np.diff(np.append(first, time_ns.size))
@@ -105,7 +119,7 @@ def together(one: Cells, other: Cells) -> Cells:
 
 
 def bins(value: FloatArray, width: float) -> IntArray:
-    """Return the bin number of each value, with decimal bin edges; `NO_BIN` for NaN."""
+    """Return the bin number of each value, `NO_BIN` for NaN; bin edges are multiples of `width`."""
     known = np.isfinite(value)
     safe = np.clip(np.where(known, value, 0.0), -1e9, 1e9)
     number = np.floor(safe / width).astype(np.int64)
@@ -177,7 +191,7 @@ def _record(n_columns: int, n_usable: int) -> np.dtype[np.void]:
 
 
 def _alike(patterns: list[bytes]) -> list[tuple[bytes, npt.NDArray[np.int64]]]:
-    """Group row indices by the bit pattern of usable columns; there are few patterns."""
+    """Return the row indices of each distinct bit pattern of usable columns."""
     rows: dict[bytes, list[int]] = {}
     for row, pattern in enumerate(patterns):
         rows.setdefault(pattern, []).append(row)
@@ -285,7 +299,7 @@ def select_cells(
     names: tuple[str, ...],
     asked: Mapping[str, object] = ANYTHING,
 ) -> Cells | None:
-    """Return the cells of a time span that may contain requested readings; None without cells.
+    """Return the cells of a time span that may contain requested readings; None if none may.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ INSERT_NUMBERS = "INSERT INTO rollup_numbers VALUES (?,?,?,?,?,?)"
 
 
 def select_mark(reader: Connection, series: int) -> int:
-    """Return the time up to which the readings of a bearing are aggregated; 0 if none are."""
+    """Return the time, in ns, up to which a bearing's readings are aggregated; 0 if none are."""
     found = reader.execute(
         "SELECT until_ns FROM rollup_mark WHERE series = ?", (series,)
     ).fetchone()
@@ -50,7 +50,7 @@ def minutes_of(writer: Connection, series: int, span: Span) -> Cells | None:
 
 
 def insert_cells(writer: Connection, series: int, width_ns: int, cells: Cells) -> None:
-    """Insert roll-ups of one width."""
+    """Insert roll-ups of one width for a bearing."""
     width_s, slots = width_ns // NS_PER_S, cells.slots().tolist()
     start_ns = cells.summaries.time_ns.tolist()
     writer.executemany(INSERT_CELL, _cell_rows(series, width_s, start_ns, slots, cells.conditions))
@@ -79,7 +79,7 @@ def _cell_rows(
 
 
 def forget_width(writer: Connection, series: int, width_ns: int, span: Span) -> None:
-    """Delete the roll-ups of one width in a time span."""
+    """Delete the roll-ups of one width of a bearing in a time span."""
     layouts = [row[0] for row in writer.execute("SELECT id FROM layout").fetchall()]
     its = (series, width_ns // NS_PER_S)
     writer.execute(
@@ -100,7 +100,7 @@ def rolled_columns() -> tuple[str, ...]:
 
 
 SINGLE_S = 0
-"""Width that stands for single readings in the table of deleted data."""
+"""Width of single readings in the table of deleted data, in seconds."""
 
 SELECT_DELETED = "SELECT width_s, until_ns FROM retention_mark WHERE series = ?"
 SET_DELETED = """
@@ -116,7 +116,7 @@ class DeletedUntil:
     Parameters
     ----------
     until_ns
-        Time by width in seconds, 0 for single readings; no earlier data of that width exist.
+        Time in ns, by width in seconds (0 for single readings); earlier data no longer exist.
     """
 
     until_ns: dict[int, int]
@@ -127,19 +127,19 @@ class DeletedUntil:
         return self.of(SINGLE_S)
 
     def of(self, width_s: int) -> int:
-        """Return the time up to which roll-ups of a width were deleted; 0 if none were deleted."""
+        """Return the time, in ns, up to which data of a width were deleted; 0 if never."""
         return self.until_ns.get(width_s, 0)
 
     def kept_ns(self, time_ns: int) -> tuple[int, ...]:
-        """Return the widths of the roll-ups that are stored for a time, finest first."""
+        """Return the widths, in ns, of the roll-ups that still exist at `time_ns`, finest first."""
         return tuple(width for width in WIDTHS_NS if self.of(width // NS_PER_S) <= time_ns)
 
     def finest_ns(self, start_ns: int) -> int | None:
-        """Return the finest roll-up width available since a start; None for single readings."""
+        """Return the finest roll-up width, ns, that exists at a time; None if readings exist."""
         return self.kept_ns(start_ns)[0] if start_ns < self.readings_ns else None
 
     def stretches(self, span: tuple[int, int]) -> list[tuple[int, int]]:
-        """Split a time span at the times up to which data were deleted."""
+        """Return the parts of a time span, split at the times up to which data were deleted."""
         cuts = sorted({*span, *(t for t in self.until_ns.values() if span[0] < t < span[1])})
         return list(pairwise(cuts))
 

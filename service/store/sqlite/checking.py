@@ -23,12 +23,14 @@ NULL_FINDING = "NULL value in "
 
 @dataclass(frozen=True)
 class Finding:
-    """Defect of a database, with a description.
+    """Defect of a database.
 
     Parameters
     ----------
     kind
         "structure", "altered" (row), "missing" (row) or "high_water".
+    detail
+        Description of the defect.
     """
 
     kind: str
@@ -86,10 +88,10 @@ def _mark_inside(reader: sqlite3.Connection) -> Mark | None:
 
 
 def structure_findings(connection: sqlite3.Connection) -> Iterator[str]:
-    """Yield structural defects.
+    """Yield a description of each structural defect of a database.
 
-    NULL findings are checked by a query: SQLite before 3.41 reports false ones in WITHOUT ROWID
-    tables.
+    NULL values that SQLite reports are verified by a query, since SQLite before 3.41 reports them
+    falsely in WITHOUT ROWID tables.
     """
     nulls = set()
     for (finding,) in connection.execute(f"PRAGMA integrity_check({EVERY})"):
@@ -125,11 +127,11 @@ def _damage(log: DamageLog) -> Iterator[Finding]:
 
 
 ROWS_AT_ONCE = 500
-"""Rows per read transaction, a few milliseconds, so that the WAL can be moved into the file."""
+"""Number of rows per read transaction, which takes milliseconds and rarely delays a checkpoint."""
 
 HEX = "hex"
 REMEMBER_EVERY = 300
-"""Number of steps between two writes of the progress."""
+"""Number of calls of `check_some` between two writes of the progress to the database."""
 
 RECALL = "SELECT place FROM main.seal_walk WHERE id = 1"
 REMEMBER = """
@@ -154,7 +156,7 @@ class Scrubber:
         self._n_looks = 0
 
     def check_some(self) -> bool:
-        """Check the next rows; return whether this completes a check of all rows.
+        """Check the next rows; return True if the check of all rows is then complete.
 
         Raises
         ------
@@ -198,7 +200,7 @@ class Scrubber:
 
 
 def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
-    """Return the walk and the key at which to resume; the first walk if the progress is unknown."""
+    """Return the number and the last key of the check to resume; 0 and None if unknown."""
     row = reader.execute(RECALL).fetchone()
     try:
         name, is_of_seals, after = json.loads(row[0]) if row else (None, False, None)
@@ -211,7 +213,7 @@ def _place(ways: list[Walk], reader: Connection) -> tuple[int, Key | None]:
 
 
 def _json_cell(cell: Any) -> Any:
-    """Return a key value as a JSON value; bytes, as in the keys of sessions, as hexadecimal."""
+    """Return a key value as a JSON value, with bytes, such as session keys, in hexadecimal."""
     return {HEX: cell.hex()} if isinstance(cell, bytes) else cell
 
 

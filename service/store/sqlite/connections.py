@@ -14,8 +14,8 @@ from service.store.sqlite.file import leaves_in_doubt
 BUSY_TIMEOUT_S = 5.0
 N_KEPT = 4
 LOOK_AFTER_STEPS = 20_000
-"""Number of SQLite instructions, some tens of microseconds, between two checks of a read for a
-timeout or a disconnected client."""
+"""Number of SQLite instructions, some tens of microseconds, between two checks whether a query has
+timed out or its client has disconnected."""
 
 CLOCK = SystemClock()
 LONGEST_S = 120.0
@@ -28,7 +28,7 @@ class Readers:
     Parameters
     ----------
     now_s
-        Monotonic clock.
+        Function that returns monotonic time in seconds.
     prepare
         Function that prepares a new connection for reading.
     require
@@ -50,7 +50,7 @@ class Readers:
 
     @contextmanager
     def reading(self) -> Iterator[sqlite3.Connection]:
-        """Open a read-only transaction on a pooled connection; close it after an error."""
+        """Open a read-only transaction on a pooled connection; an error closes the connection."""
         reader = self._taken()
         try:
             reader.set_progress_handler(self._should_end(), LOOK_AFTER_STEPS)
@@ -73,7 +73,7 @@ class Readers:
             reader.close()
 
     def _should_end(self) -> Callable[[], bool]:
-        """Return a callback that interrupts a read after a timeout or if the client disconnects."""
+        """Return a callback that is true when a query has timed out or its client is gone."""
         asker, end_s = ASKER.get(), self._now_s() + LONGEST_S
         return lambda: self._now_s() > end_s or (asker is not None and asker.has_gone)
 
@@ -108,7 +108,7 @@ MAX_LOG_BYTES = 67_108_864
 
 MIN_FREE_PAGES = 2000
 MIN_FREE_SHARE = 0.1
-"""Minimum share of free pages that are released; fewer are soon used again."""
+"""Minimum share of free pages in the file for a release; fewer pages are soon used again."""
 
 PAGES_AT_ONCE = 200
 
@@ -119,9 +119,9 @@ ONLY_THEN = 2
 class Writer:
     """Writing connection to a migrated file; used by one thread at a time, under `lock`.
 
-    A failed sync is not repeated: the operating system may have dropped the data and report
-    success. The file is opened again before the next transaction and compared with the high-water
-    mark beside it.
+    A failed sync is not repeated: the operating system may have lost the data, and a second sync
+    may nevertheless succeed. Instead, the file is opened again before the next transaction and
+    compared with the high-water mark beside it.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ class Writer:
             raise
 
     def give_back(self) -> bool:
-        """Truncate the file by some free pages; return False if none were released.
+        """Release some free pages at the end of the file; return False if no page was released.
 
         A file created without incremental vacuum keeps its free pages for reuse.
         """

@@ -25,7 +25,7 @@ from service.store.sqlite.file import (
 from service.store.sqlite.migrating import migrate
 
 PAGE_BYTES = 8192
-"""Page size; a result row with all quantities would fill a page of 4096 bytes."""
+"""Page size in bytes; a result row with all quantities would fill a page of 4096 bytes."""
 
 EVER_HAD = "SELECT 1 FROM sqlite_sequence WHERE name = ?"
 HAS_TRAIL = "SELECT 1 FROM sqlite_master WHERE name = 'audit'"
@@ -90,7 +90,7 @@ class SqliteDatabase:
 
     @contextmanager
     def writing(self) -> Iterator[sqlite3.Connection]:
-        """Open a writing transaction; at the end of its block it is counted and durable."""
+        """Open a writing transaction; after its block it is durable and the commit is counted."""
         with self.writer.lock, self._store_errors():
             self.file.require()
             with self.writer.transaction() as writer:
@@ -119,7 +119,7 @@ class SqliteDatabase:
         return connection.execute(EVER_HAD, (table,)).fetchone() is not None
 
     def hold(self, name: str) -> FileHold:
-        """Return an exclusive lock for a name, a lock file beside the database."""
+        """Return an exclusive lock on a name, implemented by a lock file beside the database."""
         return held(self._path, name)
 
     def _prepare(self, connection: sqlite3.Connection, origin: Origin) -> bool:

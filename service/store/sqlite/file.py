@@ -56,9 +56,9 @@ class OpenedFile:
             )
 
     def keep_logs_apart(self) -> None:
-        """Rename WAL files of a database file that was replaced; call after closing.
+        """Rename the WAL files of a database file that was replaced; call after `close`.
 
-        SQLite would apply them to the new file at the next start and damage it.
+        At the next start SQLite would apply these WAL files to the new database and damage it.
         """
         if self._opened is None or self._opened == _identity(self._path):
             return
@@ -86,7 +86,7 @@ _LARGEST_PAGE = 65_536
 def truncation_of(path: Path) -> str | None:
     """Return a message if a database file is truncated; None if its length is plausible.
 
-    The length is not checked if a WAL file exists, since the last page may be in the WAL only.
+    The length is not checked if a WAL file exists, since the last page may be only in the WAL file.
     """
     log = path.with_name(path.name + "-wal")
     if not path.is_file() or (log.exists() and log.stat().st_size):
@@ -117,20 +117,20 @@ BY_TRIGGER = 1811
 """Extended result code of an error raised by a trigger, which no insertion of padwatch causes."""
 
 PAGE_ROOM = 65_536
-"""Distance from the limit of file sizes, bytes, at which a transaction may no longer fit."""
+"""Distance from the file size limit, bytes, below which a transaction may not fit."""
 
 
 def leaves_in_doubt(error: BaseException) -> bool:
     """Return whether the state of the last transaction on the disk is unknown after an error.
 
-    It is known after a full disk, since SQLite has rolled the transaction back.
+    The state is known if the disk is full, since SQLite has rolled the transaction back.
     """
     code = getattr(error, "sqlite_errorcode", None)
     return code is not None and code & 0xFF == IOERR
 
 
 def is_of_the_row(error: BaseException) -> bool:
-    """Return whether one row caused the error, so that other rows can be written without it."""
+    """Return whether one row caused the error, so that all other rows can be written."""
     code = getattr(error, "sqlite_errorcode", None)
     if code is None:  # raised by Python: an integer above 64 bits, or invalid text
         return isinstance(error, OverflowError | UnicodeEncodeError)
@@ -146,7 +146,7 @@ def is_of_the_data(error: BaseException | None) -> bool:
 
 
 def error_message(path: Path, error: BaseException) -> str:
-    """Return the error message; add advice if the limit of file sizes is reached."""
+    """Return the message of a database error, with advice if the file size limit is reached."""
     if not leaves_in_doubt(error):
         return f"{path}: {error}"
     limit = _limit_reached(path)
@@ -173,7 +173,7 @@ class FileHold:
     Parameters
     ----------
     path
-        Path of the lock file, which stays after the lock is released.
+        Path of the lock file, which is not deleted when the lock is released.
     name
         Name of the lock, for error messages.
     """
@@ -184,7 +184,7 @@ class FileHold:
 
     @property
     def is_held(self) -> bool:
-        """Whether the lock is held; a file lock cannot be lost."""
+        """Whether this process holds the lock, which it cannot lose."""
         return self._descriptor is not None
 
     def __enter__(self) -> "FileHold":
@@ -212,6 +212,6 @@ class FileHold:
 
 
 def held(database: Path, name: str) -> FileHold:
-    """Return an exclusive lock for a name, a lock file beside the database."""
+    """Return an exclusive lock on a name, implemented by a lock file beside the database."""
     safe = re.sub(r"[^A-Za-z0-9_-]", lambda found: f"%{ord(found[0]):x}", name)
     return FileHold(database.with_name(f"{database.name}.{safe}.lock"), name)
