@@ -67,11 +67,11 @@ class AlarmSettings(Settings):
     """Delays and limits of alarms that apply to all units."""
 
     channel_on_delay_s: DelayS = 0.5
-    """Time for which a channel must be bad to raise its alarm, s, in time of the samples."""
+    """Time for which a channel must be bad to raise its alarm, s, by the times of the samples."""
 
     slow_channel_on_delay_s: DelayS = 5.0
-    """Time for which a slow channel that a limit depends on must be bad to raise its alarm, s, in
-    time of the samples."""
+    """Time for which a slow channel that a limit depends on must be bad to raise its alarm, s, by
+    the times of the samples."""
 
     channel_off_delay_s: DelayS = 10.0
     """Time for which a channel must be good again for the alarm to return, s."""
@@ -80,7 +80,7 @@ class AlarmSettings(Settings):
     """Time without samples after which the link to a device counts as lost, s."""
 
     clock: Literal["judged", "ignored"] = "judged"
-    """Whether the clocks of the devices are "judged" against the clock of this host or
+    """Whether the clocks of the devices are compared with the clock of this host ("judged") or
     "ignored"."""
 
     max_clock_offset_s: Annotated[float, Field(gt=0.0, le=1e9)] = 2.0
