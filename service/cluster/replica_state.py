@@ -41,7 +41,7 @@ NO_SIGNS = UnitSigns(UnitStatus(), None, {})
 
 @dataclass(frozen=True)
 class LatestReport:
-    """Latest report on a unit, with its derived status.
+    """Latest report on a unit, and the link status derived from the report.
 
     Parameters
     ----------
@@ -52,6 +52,8 @@ class LatestReport:
         first report of a process, whose age is unknown.
     status
         Link status of the unit, valid while reports arrive.
+    results
+        Newest result of each bearing, by bearing id.
     """
 
     beat: tuple[str, int] | None = None
@@ -64,9 +66,9 @@ class LatestReport:
 class ReplicaLive:
     """Live view of a replica, from the latest reports; outdated values are not shown as current.
 
-    Ages are measured by the monotonic clock of this process from the arrival of a report, less the
-    delay of the report. The clocks of the hosts need not agree, and the delay of a report by the
-    database does not reduce the ages of its values.
+    Ages count from the send time of a report, by the monotonic clock of this process: the arrival
+    minus the estimated delay. The clocks of the hosts need not agree, and the delay of a report by
+    the database does not reduce the ages of its values.
     """
 
     def __init__(self, units: Iterable[str], clock: Clock, stale_after_s: float) -> None:
@@ -75,7 +77,7 @@ class ReplicaLive:
         self._latest = dict.fromkeys((*units, PLANT, SHARED), LatestReport())
         self.revision = 0
         self.read_error: str | None = None
-        """Error of the last read of the reports; None if it succeeded."""
+        """Error of the newest attempt to read the reports; None if the attempt succeeded."""
 
     @property
     def units(self) -> Sequence[str]:
@@ -99,7 +101,7 @@ class ReplicaLive:
         self._latest[unit] = replace(latest, beat=beat, sent_s=sent_s, signs=signs, status=status)
 
     def set_results(self, unit: str, results: Mapping[str, BearingState]) -> None:
-        """Set the newest results of a unit, by bearing."""
+        """Set the newest results of a unit, by bearing id."""
         self.revision += 1
         found = {
             bearing: Assessment(unit, bearing, spectrum=NO_SPECTRUM, orbit=None, **vars(state))
@@ -130,7 +132,7 @@ class ReplicaLive:
         return sum({each.beat[0]: each.signs.n_unstored for each in latest if each.beat}.values())
 
     def status(self, unit: str) -> UnitStatus:
-        """Return the link status of a unit; it is not connected while reports are missing."""
+        """Return the link status of a unit; "not connected" while no reports on the unit arrive."""
         latest = self._latest[unit]
         if latest.beat is None:
             return NOT_REPORTED
@@ -252,17 +254,18 @@ class ReplicaFilms:
         return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """Return the newest film news of a bearing; None before the first report of a verdict."""
+        """Return the newest film reading of a bearing with its verdicts; None without one."""
         return self._newest.get((unit, bearing))
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
-        """Return the baseline that is in force for a bearing; None without a baseline."""
+        """Return the baseline in force for a bearing; None if no baseline is in force."""
         return self._baselines.get((unit, bearing))
 
     def fetch(self, unit: str, state: UnitState) -> Mapping[str, BearingBaseline]:
-        """Return the baselines in force in a unit state, from the store if not in memory; blocks.
+        """Return the baselines, by bearing, whose versions a reported unit state gives as in force.
 
-        Raises `StoreError` if a baseline cannot be read.
+        Baselines that are not in memory are read from the store, which blocks the thread. Raises
+        `StoreError` if a baseline cannot be read.
         """
         found = {}
         for bearing, in_force in state.baselines.items():
@@ -274,7 +277,7 @@ class ReplicaFilms:
         return found
 
     def take(self, unit: str, state: UnitState, baselines: Mapping[str, BearingBaseline]) -> None:
-        """Apply a reported unit state, with the baselines that `fetch` returned for it."""
+        """Apply a reported unit state, and the baselines that `fetch` returned for this state."""
         for bearing, film in state.films.items():
             news = FilmNews(film.reading, film.findings, (INITIAL_DECISION, INITIAL_DECISION))
             self._newest[unit, bearing] = news
@@ -283,7 +286,10 @@ class ReplicaFilms:
 
 
 class ReplicaAlarms:
-    """Alarms of a replica, from reports and the alarm table; those of silent units are unjudged."""
+    """Alarms of a replica, from reports and the stored alarms.
+
+    While a unit is not reported on, the conditions of its alarms are unknown.
+    """
 
     def __init__(
         self, units: Iterable[str], is_alive: Callable[[str], bool], chatter_rule: ChatterRule
@@ -349,5 +355,5 @@ class ReplicaAlarms:
         return unit if unit in self._units else PLANT
 
     def count(self) -> AlarmCount:
-        """Return the numbers of alarms by state."""
+        """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""
         return count_of(self.alarms, self.is_judged)

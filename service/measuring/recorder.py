@@ -29,17 +29,17 @@ from service.store.store import Store
 FILE = "parked.jsonl"
 
 MAX_BYTES = 16_000_000
-"""Maximum size of the file and of its predecessor; on a damaged database all rows are refused."""
+"""Size in bytes above which a new file is begun; only one predecessor is kept."""
 
 
 class ParkedRows:
-    """File of refused rows with the reasons, one JSON object per line; readable by the owner."""
+    """File of refused rows with the reasons, one JSON object per line; private to its owner."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def add(self, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
-        """Append pairs of row and reason, and sync the file to the disk.
+        """Append refused rows, as pairs of row and reason, and sync the file to the disk.
 
         Raises
         ------
@@ -91,7 +91,10 @@ class NotStoredError(Exception):
 
 @dataclass(frozen=True)
 class Findings:
-    """Results, gaps and news from one block, stored in one transaction."""
+    """Results of one block, stored in one transaction, and the stream position after the block.
+
+    The results are assessments, gaps in the samples, changes of alarms, and film readings.
+    """
 
     assessments: Sequence[Assessment] = ()
     gaps: Sequence[UnitGap] = ()
@@ -101,7 +104,7 @@ class Findings:
 
     @property
     def parts(self) -> Iterator["Findings"]:
-        """Findings with one row each, in an order in which they can be stored."""
+        """The same findings divided into findings of one row each, in the order of storing."""
         yield from (Findings(alarms=[news]) for news in self.alarms)
         yield from (Findings([assessment]) for assessment in self.assessments)
         yield from (Findings(gaps=[gap]) for gap in self.gaps)
@@ -132,7 +135,7 @@ class Recorder:
     timed
         Factory of a context manager around each write, in the thread.
     finds_again
-        Whether the next process reproduces the findings that were not written, from a stream.
+        Whether the next start reproduces unwritten findings from the stream of blocks.
     """
 
     def __init__(
@@ -220,7 +223,7 @@ class Recorder:
         await loop.run_in_executor(self._thread, self._store.append, [], [])
 
     async def settled(self) -> None:
-        """Wait until the queue is written or the store has failed."""
+        """Wait until all queued findings are written, or the store has failed."""
         async with self._progress:
             await self._progress.wait_for(
                 lambda: self._live.store_error or not (self._waiting or self._alarms)
@@ -238,7 +241,7 @@ class Recorder:
                     await self._clock.sleep(RETRY_S)
 
     async def flush(self) -> None:
-        """Try once to write the queue, at the end of the process."""
+        """Try once to write all queued findings, at the end of the process."""
         if (self._waiting or self._alarms) and not await self._write():
             counts = {"n_findings": len(self._waiting), "n_alarm_news": len(self._alarms)}
             if self._finds_again:
@@ -283,7 +286,7 @@ class Recorder:
         return True
 
     def _append(self, batch: Iterable[Findings]) -> list[tuple[object, str]]:
-        """Store findings; write refused rows to the file and return them with the reasons."""
+        """Store findings; write refused rows to the file, and return pairs of row and reason."""
         refused: list[tuple[object, str]] = []
         with self._timed():
             self._append_parts([part for findings in batch for part in findings.parts], refused)

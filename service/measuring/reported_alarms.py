@@ -1,4 +1,4 @@
-"""Alarms whose conditions are reported by components other than the monitors."""
+"""Alarms about units that no process analyses, and about refused stream messages."""
 
 from collections.abc import Iterable, Sequence
 
@@ -43,7 +43,7 @@ SHARED = "shared work"
 
 
 def is_shared(alarm: Alarm) -> bool:
-    """Return whether an alarm belongs to the process with the shared work."""
+    """Return whether an alarm belongs to the process that does the shared work of the plant."""
     return alarm.identity.kind == ANALYSIS_GONE
 
 
@@ -55,7 +55,10 @@ def gone_alarms(units: Iterable[str]) -> ReportedAlarms:
 def report_silence(
     alarms: ReportedAlarms, silent: Sequence[str], alive: Sequence[str], after_s: float
 ) -> None:
-    """Update the alarms of units that are analysed, and of units not analysed for `after_s` s."""
+    """Set the conditions of the alarms of ``silent`` and ``alive`` units.
+
+    A unit is silent if no process has analysed it for ``after_s`` seconds.
+    """
     reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
     gone = Judgement(AlarmLevel.DANGER, reason=reason)
     for units, condition in ((silent, gone), (alive, WITHIN)):
@@ -72,7 +75,7 @@ REFUSED_FOR_S = 600.0
 """Duration of the alarm after the last refused message, s."""
 
 MAX_REASON = 200
-"""Maximum length of a reason, which may contain arbitrary text of a refused message."""
+"""Maximum number of characters of a reason, which may contain text of a refused message."""
 
 
 def stream_alarms(units: Iterable[str]) -> ReportedAlarms:

@@ -264,7 +264,7 @@ class ChannelSettings(Settings):
 
     @property
     def unit_per_v(self) -> float:
-        """Engineering units per volt, or per count with `unit_per_count`; 1 for a key_phase in volts."""
+        """Engineering units per volt, or per count; 1 V per volt for a key_phase in volts."""
         if self.unit_per_count is not None:
             return self.unit_per_count
         if self.sensitivity is None or self.sensitivity_unit is None:
@@ -273,7 +273,7 @@ class ChannelSettings(Settings):
 
     @property
     def scale(self) -> dict[str, float]:
-        """Arguments of `ChannelCalibration`; with `unit_per_count`, a count is treated as a volt."""
+        """Arguments of `ChannelCalibration`; with `unit_per_count`, one count is treated as 1 V."""
         full_scale, low, high = (getattr(self, key) for key in SCALE_KEYS_V)
         if self.unit_per_count is not None:
             limits = (

@@ -98,7 +98,7 @@ class BaselineModel(Settings):
         return self
 
     def settings(self, reading_h: float = BaselineSettings.reading_h) -> BaselineSettings:
-        """Return the settings as `BaselineSettings`, for one reading each ``reading_h`` running hours."""
+        """Return the settings as `BaselineSettings`; ``reading_h`` is the interval of readings."""
         rest = self.model_dump(exclude=set(GRID_KEYS))
         grid = CellGrid(*(getattr(self, key) for key in GRID_KEYS))
         return BaselineSettings(grid=grid, reading_h=reading_h, **rest)

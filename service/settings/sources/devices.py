@@ -98,7 +98,7 @@ class MappedDeviceSettings(ModbusLinkSettings):
         )
 
     def require_known(self, known: Sequence[str], *at: int | str) -> None:
-        """Raise `MisfitError` if the map has a value of a channel that is not in the list ``known``."""
+        """Raise `MisfitError` if the map has a value of a channel that is not in ``known``."""
         for n, value in enumerate(self._map.value):
             if value.channel not in known:
                 place = (*at, "map", "value", n, "channel") if self.map else (*at, "map_file")

@@ -210,7 +210,7 @@ class ValueSettings(CellSettings):
 
     @property
     def rim_factor(self) -> float:
-        """Factor from the reading to zero-to-peak amplitude or phase lead; 1 for other quantities."""
+        """Factor from the reading to zero-to-peak amplitude or phase lead; else 1."""
         factor = PK_PER[self.detector] if self.detector else 1.0
         return factor * (SIGN_OF[self.phase] if self.phase else 1.0)
 
