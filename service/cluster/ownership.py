@@ -132,7 +132,7 @@ FORM = re.compile(r"([0-9]{1,4})/([0-9]{1,4})")
 
 @dataclass(frozen=True)
 class Partition:
-    """Partition of the units of a plant: part ``number``, from 1, of ``n_parts``."""
+    """Part of the units of a plant for one of several processes: number 1 to ``n_parts``."""
 
     number: int = 1
     n_parts: int = 1
@@ -166,7 +166,7 @@ class Partition:
         return plant.model_copy(update={"unit": tuple(u for u in plant.unit if u.id in mine)})
 
     def share_of(self, plant: PlantFile) -> PlantPart:
-        """Return the units of this part and of the other parts; the process of part 1 leads."""
+        """Return the responsibilities of the process of this part; part 1 leads."""
         every = [unit.id for unit in plant.unit]
         own = frozenset(self.units(every))
         return PlantPart(own, frozenset(every) - own, leads=self.number == 1)

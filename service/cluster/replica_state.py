@@ -85,7 +85,10 @@ class ReplicaLive:
         return tuple(self._latest)
 
     def update(self, unit: str, process: str, n_beats: int, signs: UnitSigns) -> None:
-        """Apply the latest report on a unit; a report that was applied before has no effect."""
+        """Apply the latest report on a unit; a report that was applied before has no effect.
+
+        ``n_beats`` is the sequence number of the report in its ``process``.
+        """
         latest, beat = self._latest[unit], (process, n_beats)
         if latest.beat == beat:
             return
@@ -304,7 +307,7 @@ class ReplicaAlarms:
 
     @property
     def revision(self) -> int:
-        """Counter that increases with every change of an alarm or of the silence of a unit."""
+        """Counter that increases if an alarm changes, or if reports on a unit stop or resume."""
         alive = {unit: self._is_alive(unit) for unit in self._judged}
         if alive != self._alive:  # a unit falls silent without a report
             self._alive = alive
@@ -332,7 +335,7 @@ class ReplicaAlarms:
         return list(self._alarms.values())
 
     def alarm(self, id_: str) -> Alarm:
-        """Return an alarm. Raises `LookupError` if it does not exist."""
+        """Return the alarm with an id; raise `LookupError` if it does not exist."""
         return self._alarms[id_]
 
     def is_judged(self, alarm: Alarm) -> bool:
@@ -345,7 +348,7 @@ class ReplicaAlarms:
         return alarm.identity.id in self._chattering.get(self._owner(alarm), ())
 
     def owner(self, id_: str) -> str:
-        """Return the unit whose process changes an alarm. Raises `LookupError` if it is unknown."""
+        """Return the unit whose process changes an alarm; raise `LookupError` for an unknown id."""
         return self._owner(self.alarm(id_))
 
     def _owner(self, alarm: Alarm) -> str:

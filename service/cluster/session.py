@@ -102,7 +102,7 @@ PING_S = 5
 
 @asynccontextmanager
 async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStreamContext]:
-    """Connect to the NATS servers; yield the JetStream context, and cancel the body after a loss.
+    """Connect to the NATS servers; yield the JetStream context. A lost link cancels the body.
 
     Raises
     ------

@@ -113,7 +113,7 @@ class AlarmEngine:
         alarms: Iterable[Alarm],
         memories: Mapping[str, AlarmMemory] = MappingProxyType({}),
     ) -> None:
-        """Restore stored alarms, before the first block.
+        """Restore stored alarms; called before the first block.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class AlarmEngine:
         self.revision += 1
 
     def refuse(self, unit: str, reason: str) -> None:
-        """Report a refused message of a unit."""
+        """Raise the alarm about a refused stream message of a unit, with the reason."""
         if self._stream is not None:
             report_refused(self._stream, unit, reason)
 

@@ -32,7 +32,7 @@ def in_force(
 ) -> tuple[BearingBaseline | None, tuple[Decision, ...]]:
     """Return the baseline in force for a bearing, and the newest decisions x and y based on it.
 
-    Without a baseline in force for the estimator of ``place``, None and an empty tuple.
+    Returns None and an empty tuple if no baseline for the estimator of ``place`` is in force.
     """
     version = versions_after(store.steps(place.unit, place.bearing)).in_force
     baseline = None if version is None else store.baseline(place.unit, place.bearing, version)
@@ -70,7 +70,7 @@ def resume_films(
     response: ShaftResponse | None,
     watch: FilmWatch,
 ) -> None:
-    """Restore the film watch of a unit from stored readings."""
+    """Restore the state of the film monitoring of a unit, ``watch``, from stored readings."""
     places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
     start_ns = _newest_ns(store, places[0]) - TAIL_NS
     found = {

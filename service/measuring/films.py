@@ -50,7 +50,7 @@ class FilmMonitor:
     Parameters
     ----------
     rules
-        Rules of each unit, or the reason why the films of the unit cannot be monitored, by unit id.
+        Rules for the films of each unit, or the reason why they cannot be monitored, by unit id.
     """
 
     def __init__(
@@ -216,7 +216,7 @@ class FilmMonitor:
         return baseline_step(action, place, versions, entries, actor, reason, self._clock.now_ns())
 
     async def put_in_force(self, place: FilmPlace) -> None:
-        """Activate the baseline that is in force for a bearing by its stored steps."""
+        """Activate the baseline of a bearing that is in force according to the stored steps."""
         films = self._films[place.unit]
         held = films.watch.judge.baseline(place.bearing)
         found, decisions = await asyncio.to_thread(in_force, self._store, place, films.rules)

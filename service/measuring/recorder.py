@@ -78,7 +78,7 @@ log = structlog.get_logger()
 RETRY_S = 1.0
 
 MAX_NEWS = 100_000
-"""Maximum number of queued `AlarmNews`; about 100 MB."""
+"""Maximum number of queued changes of alarms (`AlarmNews`); about 100 MB."""
 
 GIVEN_UP = "given_up"
 
@@ -86,7 +86,7 @@ T = TypeVar("T")
 
 
 class NotStoredError(Exception):
-    """Alarm news was not stored; the message states why."""
+    """Changes of alarms were not stored; the message states why."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Findings:
 
     @property
     def parts(self) -> Iterator["Findings"]:
-        """The same findings divided into findings of one row each, in the order of storing."""
+        """Findings of one row each that together equal these findings, in the order of storing."""
         yield from (Findings(alarms=[news]) for news in self.alarms)
         yield from (Findings([assessment]) for assessment in self.assessments)
         yield from (Findings(gaps=[gap]) for gap in self.gaps)
@@ -129,9 +129,9 @@ class Recorder:
         File of refused rows.
     capacity
         Maximum number of queued findings; above it the oldest are dropped and counted in
-        :attr:`LiveView.n_unstored`. Alarm news has its own queue, up to `MAX_NEWS`.
+        :attr:`LiveView.n_unstored`. Changes of alarms have a separate queue of `MAX_NEWS`.
     on_stored
-        Function that is called after alarm news was written.
+        Function that is called after changes of alarms were written.
     timed
         Factory of a context manager around each write, in the thread.
     finds_again
@@ -165,12 +165,12 @@ class Recorder:
 
     @property
     def n_waiting(self) -> int:
-        """Number of queued findings and alarm news."""
+        """Number of queued findings and changes of alarms."""
         return len(self._waiting) + len(self._alarms)
 
     @property
     def behind_s(self) -> float:
-        """Time that queued findings have waited without any write, s; 0 if the queue is empty."""
+        """Time for which findings have waited without a successful write, s; 0 if none wait."""
         if not (self._waiting or self._alarms):
             return 0.0
         return self._clock.monotonic_s() - self._waits_since_s
@@ -189,12 +189,12 @@ class Recorder:
         self._news.set()
 
     async def stored(self) -> None:
-        """Wait without limit until the newest alarm news is on the disk.
+        """Wait without limit until the newest change of an alarm is on the disk.
 
         Raises
         ------
         NotStoredError
-            If the alarm news was dropped or refused.
+            If the change was dropped, or refused by the database.
         """
         if not self._alarms:
             return
@@ -330,7 +330,7 @@ class Recorder:
             log.error("results cannot be stored", n_parked=len(refused), reason=reason)
 
     def _resolve(self, news: AlarmNews, refusal: str | None) -> None:
-        """Resolve the future of alarm news; `refusal` is None if it was stored."""
+        """Resolve the future of a change of an alarm; `refusal` is None if it was stored."""
         outcome = self._outcomes.pop(id(news), None)
         if outcome is not None and not outcome.done():
             outcome.set_result(refusal)

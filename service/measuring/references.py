@@ -195,7 +195,7 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
 
 
 def doubts(newest: StoredReadings) -> list[str]:
-    """Return a warning for each gap that is usable but uncertain."""
+    """Return a warning for each gap of the newest result that is usable but uncertain."""
     gaps = {name: newest.readings.get(name) for name in (*NEAR_GAPS, *OPPOSITE_GAPS)}
     return [
         f"{name} is uncertain: {reading.quality.reason}"

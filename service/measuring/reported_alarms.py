@@ -48,7 +48,7 @@ def is_shared(alarm: Alarm) -> bool:
 
 
 def gone_alarms(units: Iterable[str]) -> ReportedAlarms:
-    """Return the alarms about units that no process analyses."""
+    """Return the alarms about missing analysis, one for each unit."""
     return ReportedAlarms(Watch(identity_of(unit), rule_of(0.0, 0.0), unit) for unit in units)
 
 
@@ -79,7 +79,7 @@ MAX_REASON = 200
 
 
 def stream_alarms(units: Iterable[str]) -> ReportedAlarms:
-    """Return the alarms about refused messages of units."""
+    """Return the alarms about refused stream messages, one for each unit."""
     alarms = ReportedAlarms(
         Watch(_refused(unit), rule_of(0.0, REFUSED_FOR_S), STREAM) for unit in units
     )
@@ -89,7 +89,7 @@ def stream_alarms(units: Iterable[str]) -> ReportedAlarms:
 
 
 def report_refused(alarms: ReportedAlarms, unit: str, reason: str) -> None:
-    """Report a refused message of a unit."""
+    """Raise the alarm about a refused stream message of a unit, with the reason."""
     words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
     alarms.report_event(_refused(unit).id, Judgement(AlarmLevel.ALERT, reason=words))
 

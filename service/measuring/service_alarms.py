@@ -46,7 +46,7 @@ class ServiceHealth:
     accounts
         Sample account of each unit that has sent samples since the start.
     disk
-        Function that judges the free space of the fullest disk; its argument is the previous level.
+        Function that judges the space on the fullest disk; argument: the previous alarm level.
     """
 
     readings: Mapping[str, float | str | None] = field(default_factory=dict)

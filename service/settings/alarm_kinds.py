@@ -82,7 +82,7 @@ SERVICE_KINDS = kind_table(
 `ServiceHealth.readings`, whose value is compared with limits or is the text of a fault."""
 
 DANGER_KINDS = frozenset(("stored_data_damaged", "stream_away"))
-"""Alarm kinds of the service for which a fault with a text is a danger; otherwise an alert."""
+"""Alarm kinds of the service whose fault is a danger; a fault of other kinds is an alert."""
 
 ALARM_KINDS: Mapping[str, AlarmKind] = MappingProxyType({**units.ALARM_KINDS, **SERVICE_KINDS})
 

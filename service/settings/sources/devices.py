@@ -238,7 +238,7 @@ class ModbusFifoSettings(ModbusLinkSettings):
         return self
 
     def fifo_layout(self, n_channels: int) -> FifoLayout:
-        """Return the layout of the queues of a number of channels, as a `FifoLayout`.
+        """Return the layout of the queues for ``n_channels`` channels, as a `FifoLayout`.
 
         Raises `MisfitError` if the number of addresses is wrong, or if a record of all channels
         exceeds a FIFO read of 31 registers.

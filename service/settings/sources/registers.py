@@ -210,7 +210,7 @@ class ValueSettings(CellSettings):
 
     @property
     def rim_factor(self) -> float:
-        """Factor from the reading to zero-to-peak amplitude or phase lead; else 1."""
+        """Factor from the reading to zero-to-peak amplitude or phase lead; 1 otherwise."""
         factor = PK_PER[self.detector] if self.detector else 1.0
         return factor * (SIGN_OF[self.phase] if self.phase else 1.0)
 
@@ -306,7 +306,7 @@ def require_apart(values: Sequence[MapValue], base: int) -> None:
     Raises
     ------
     MisfitError
-        If two values do; the error has the location of the second value.
+        If two values do; for a shared register, with the location of the second value.
     """
     taken: dict[tuple[int, int], MapValue] = {}
     for n, value in enumerate(values):
