@@ -305,7 +305,7 @@ def _block(frame: Frame, identity: UnitIdentity) -> Taken:
 
 @lru_cache(maxsize=1024)
 def _shared(calibration: UnitCalibration) -> UnitCalibration:
-    """Return one shared object for equal calibrations, as in the blocks of a local source."""
+    """Return one shared object for equal calibrations; local sources also share it among blocks."""
     return calibration
 
 

@@ -28,7 +28,7 @@ def written(memory: UnitMemory) -> bytes:
 
 
 def read(document: bytes) -> UnitMemory | None:
-    """Parse a serialized analysis state; return None if it has another version."""
+    """Parse a serialized analysis state; return None if it is invalid or of another version."""
     try:
         memory = _MEMORY.validate_json(document)
     except ValidationError:
@@ -98,7 +98,7 @@ MAY_ARRIVE = (LinkState.CONNECTING, LinkState.CONNECTED)
 
 
 class UnitProgress:
-    """Processor of the messages of one unit, in order and each once.
+    """Processor of the stream messages of one unit; each message is processed once, in order.
 
     Messages up to the stored position are replayed without publishing results, which restores the
     state of the monitor. Later messages are processed as if the process had never stopped.

@@ -118,7 +118,7 @@ def silences_s(units: Iterable[UnitSettings], least_s: float) -> dict[str, float
 
 
 class SilenceWatch:
-    """Monitor that marks units as not connected if no messages of them arrive.
+    """Monitor that marks a unit as not connected if no messages of the unit arrive.
 
     This includes units that were connected before a restart, while the stream is not reached.
 

@@ -35,7 +35,7 @@ class LinkNews:
 
     @property
     def is_connected(self) -> bool:
-        """Whether samples arrive."""
+        """Whether the link state is connected, so that samples arrive."""
         return self.state is LinkState.CONNECTED
 
 

@@ -87,7 +87,12 @@ class Learner:
         return baseline
 
     def learn_response(self, unit: str, rules: FilmRules, now_ns: int) -> ShaftResponse | None:
-        """Learn and store the response of a unit's shaft to its films; return it, or None."""
+        """Learn and store the response of a unit's shaft to its films.
+
+        Returns
+        -------
+        The response; None if there are too few readings at times common to all bearings.
+        """
         places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
         found = {p.bearing: self._readings(p, self.versions(p), now_ns) for p in places}
         rows = common_rows(found)

@@ -23,7 +23,7 @@ from service.runtime.metrics import Rows, counter, gauge, histogram, plain_histo
 from service.runtime.polls import TimedSource
 
 MAX_REASONS = 24
-"""Maximum number of reasons per unit; further reasons are counted as `OTHER`."""
+"""Maximum number of rejection reasons per unit; further reasons are counted as `OTHER`."""
 
 OTHER = "other"
 

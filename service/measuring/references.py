@@ -61,7 +61,7 @@ class HasUnit(Protocol):
 
 
 class ReferencesInForce:
-    """Gap references in force: of each bearing the newest stored one, else that of the plant file.
+    """Gap references in force: the newest stored reference of a bearing, or its plant-file gaps.
 
     Parameters
     ----------

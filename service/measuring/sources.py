@@ -124,7 +124,7 @@ QUEUE_RETRY_S = 0.25
 def watched_units(
     plant: PlantFile, source: Callable[[UnitSettings], SampleSource]
 ) -> dict[str, WatchedUnit]:
-    """Return the source and the monitor of every unit of a plant, by unit."""
+    """Return the source and the monitor of every unit of a plant, by unit id."""
     return {
         unit.id: WatchedUnit(source(unit), monitor_of(unit, plant.analysis), retry_s(unit))
         for unit in plant.unit

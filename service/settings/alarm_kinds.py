@@ -99,7 +99,7 @@ else:
 
 
 def kind_label(kind: str) -> str:
-    """Return the label of an alarm kind; for an unknown kind, the name with spaces."""
+    """Return the label of an alarm kind; for an unknown kind, its name without underscores."""
     found = ALARM_KINDS.get(kind)
     return kind.replace("_", " ") if found is None else found.label
 

@@ -23,7 +23,7 @@ KEY = re.compile(r"^\s*([A-Za-z0-9_.-]+)\s*=")
 
 
 def line_of(location: Location, text: str) -> int:
-    """Return the line number, from 1, of a key; else of the innermost table around it, or 1."""
+    """Return the line number of a key, or of the innermost table around the key; else 1."""
     lines = dict(_lines(text))
     starts = (location[:n] for n in range(len(location), 0, -1))
     return next((lines[start] for start in starts if start in lines), 1)

@@ -203,7 +203,7 @@ class ValueSettings(CellSettings):
 
     @property
     def id(self) -> str:
-        """Id of the value: that of its row in a sample block, or of its slow channel."""
+        """Id of the row of a sample block, or of the slow channel, that contains the value."""
         if isinstance(self.quantity, VectorPart):
             return VectorRow(self.channel, self.quantity).id
         return self.channel
