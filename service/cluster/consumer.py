@@ -1,4 +1,4 @@
-"""Consumer of the stream: messages are analysed, and acknowledged after storing the results."""
+"""Consumer of the stream; a message is acknowledged after the results of its block are stored."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Iterator, Mapping
@@ -45,8 +45,8 @@ MAX_UNACKNOWLEDGED = 256
 ACK_WAIT_S = 60.0
 
 Begin = Callable[[str, int], Awaitable[Mapping[str, UnitProgress]]]
-"""Function that returns the progress of all units on a stream. Its arguments are the stream's name
-with creation time, and the sequence number of the newest message."""
+"""Function that returns the `UnitProgress` of all units on a stream, by unit id. Its arguments are
+the stream's name with creation time, and the sequence number of the newest message."""
 
 
 class Consumer:
@@ -84,7 +84,7 @@ class Consumer:
 
     @property
     def waiting(self) -> frozenset[str]:
-        """Units with fetched messages that are not processed yet, such as during store failures."""
+        """Ids of units with fetched messages that are not processed, as while the store fails."""
         return frozenset(unit for unit, queue in self._queues.items() if not queue.empty())
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:

@@ -23,7 +23,10 @@ from service.measuring.acquirer import LinkNews
 
 
 class WireError(ValueError):
-    """A stream message cannot be used; decoding it again would fail in the same way."""
+    """A stream message cannot be used; decoding it again would fail in the same way.
+
+    ``kind`` is a code word for the reason, used as a label of metrics.
+    """
 
     def __init__(self, kind: str, message: str) -> None:
         super().__init__(message)
@@ -58,7 +61,8 @@ class UnitIdentity:
     plant
         Hash of the name of the plant.
     make
-        Fingerprint of unit id, rate, source and channels; with others, samples are misinterpreted.
+        Fingerprint of unit id, rate, source and channels; a message with a different fingerprint is
+        refused, since its samples would be misinterpreted.
     """
 
     unit: str
@@ -67,7 +71,7 @@ class UnitIdentity:
 
 
 def fingerprint(*words: object) -> bytes:
-    """Return the truncated SHA-256 hash of JSON-serializable values."""
+    """Return the first 16 bytes of the SHA-256 hash of JSON-serializable values."""
     text = json.dumps(words, ensure_ascii=True, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).digest()[:FINGERPRINT_BYTES]
 
@@ -94,7 +98,7 @@ class Kind(IntEnum):
 
 @dataclass(frozen=True)
 class Frame:
-    """Parts of a stream message, with the JSON head still encoded."""
+    """Parts of a stream message: kind, encoded JSON head and encoded samples."""
 
     kind: Kind
     head: bytes
@@ -170,7 +174,7 @@ STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="constants")
 
 
 class Cell(NamedTuple):
-    """Side values from the sample ``start`` on; ``ok`` is a bit mask of the good channels."""
+    """Time stamp, slow values and bit mask ``ok`` of good channels, from sample ``start`` on."""
 
     start: Index
     start_ns: Ns
@@ -227,7 +231,10 @@ class Taken:
 
 
 def encoded_block(block: SampleBlock, identity: UnitIdentity, taken_ns: int) -> bytes:
-    """Encode a block as a message. Raises `ValueError` if the block is too large for a message."""
+    """Encode a block, acquired at ``taken_ns``, as a message.
+
+    Raises `ValueError` if the block is too large for a message.
+    """
     side, type_ = block.side, block.counts.dtype.name
     columns = (side.starts.tolist(), side.start_ns.tolist(), side.ok.T.tolist())
     head = BlockHead(
@@ -298,7 +305,7 @@ def _block(frame: Frame, identity: UnitIdentity) -> Taken:
 
 @lru_cache(maxsize=1024)
 def _shared(calibration: UnitCalibration) -> UnitCalibration:
-    """Return one shared object for equal calibrations, as in the blocks of a local source."""
+    """Return one shared object for equal calibrations; local sources also share it among blocks."""
     return calibration
 
 

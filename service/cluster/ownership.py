@@ -26,7 +26,7 @@ class HoldLostError(StoreError):
 
 
 class Holds:
-    """Exclusive database locks for the analysis of a set of units; all or none are held."""
+    """Exclusive database locks, one for the analysis of each unit; all or none are held."""
 
     def __init__(self, store: Store, units: Iterable[str], clock: Clock) -> None:
         self._store, self._clock = store, clock
@@ -78,10 +78,10 @@ LOOK_EVERY_S = 1.0
 
 
 class Leadership:
-    """Leader election: runs loops only while this process holds a lock in the database.
+    """Leader election: periodic tasks run only while this process holds a lock in the database.
 
-    Two processes may run the loops for a short time when another process acquires the lock; the
-    work of the loops is idempotent.
+    When the lock passes to another process, both may run the tasks for a short time; the tasks are
+    idempotent.
     """
 
     def __init__(
@@ -95,7 +95,7 @@ class Leadership:
         self.is_leading = False
 
     async def run(self, pulse: Pulse) -> None:
-        """Acquire the lock whenever it is free and run the loops, until cancelled."""
+        """Acquire the lock when it is free and run the tasks while it is held; until cancelled."""
         while True:
             pulse.beat(TRY_EVERY_S)
             with ExitStack() as held:
@@ -132,7 +132,7 @@ FORM = re.compile(r"([0-9]{1,4})/([0-9]{1,4})")
 
 @dataclass(frozen=True)
 class Partition:
-    """Partition of the units of a plant: part ``number``, from 1, of ``n_parts``."""
+    """Part of the units of a plant for one of several processes: number 1 to ``n_parts``."""
 
     number: int = 1
     n_parts: int = 1
@@ -166,7 +166,7 @@ class Partition:
         return plant.model_copy(update={"unit": tuple(u for u in plant.unit if u.id in mine)})
 
     def share_of(self, plant: PlantFile) -> PlantPart:
-        """Return the units of this part and of all other parts; the process of part 1 leads."""
+        """Return the responsibilities of the process of this part; part 1 leads."""
         every = [unit.id for unit in plant.unit]
         own = frozenset(self.units(every))
         return PlantPart(own, frozenset(every) - own, leads=self.number == 1)

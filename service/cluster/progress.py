@@ -28,7 +28,7 @@ def written(memory: UnitMemory) -> bytes:
 
 
 def read(document: bytes) -> UnitMemory | None:
-    """Parse a serialized analysis state; return None if it has another version."""
+    """Parse a serialized analysis state; return None if it is invalid or of another version."""
     try:
         memory = _MEMORY.validate_json(document)
     except ValidationError:
@@ -48,7 +48,10 @@ def memories_of(stored: Iterable[StreamPosition]) -> dict[str, UnitMemory]:
 
 
 def usable(stored: StreamPosition | None, stream: str, newest: int) -> StreamPosition | None:
-    """Return a stored position if it is valid on this stream; otherwise log why and return None."""
+    """Return a stored position if it is valid on this stream; otherwise log why and return None.
+
+    ``stream`` is the stream's name with creation time, ``newest`` its newest sequence number.
+    """
     if stored is None:
         return None
     if stored.stream != stream:
@@ -74,13 +77,13 @@ class Window:
         self._seen: deque[_Seen] = deque()
 
     def note(self, sequence: int, block: SampleBlock, state: MonitorState) -> None:
-        """Add the message of an analysed block, and remove messages that are no longer needed."""
+        """Add the message of an analysed block; remove messages that a replay no longer needs."""
         self._seen.append(_Seen(sequence, state.epoch, block.stop_index))
         while len(self._seen) > 1 and not self._is_needed(self._seen[0], state):
             self._seen.popleft()
 
     def first(self, otherwise: int) -> int:
-        """Return the sequence number of the first needed message; ``otherwise`` without any."""
+        """Return the sequence number of the oldest message; ``otherwise`` if there is none."""
         return self._seen[0].sequence if self._seen else otherwise
 
     @staticmethod
@@ -95,7 +98,7 @@ MAY_ARRIVE = (LinkState.CONNECTING, LinkState.CONNECTED)
 
 
 class UnitProgress:
-    """Processor of the messages of one unit, in order and each once.
+    """Processor of the stream messages of one unit; each message is processed once, in order.
 
     Messages up to the stored position are replayed without publishing results, which restores the
     state of the monitor. Later messages are processed as if the process had never stopped.
@@ -110,7 +113,8 @@ class UnitProgress:
         Clock of this host. The error of the measured delay of a block is the difference between
         this clock and the clock of the acquiring host.
     done
-        End of the stored results, if their position on the stream is unknown.
+        Epoch, sample index and time at which the stored results end, if their position on the
+        stream is unknown.
     """
 
     def __init__(
@@ -142,11 +146,11 @@ class UnitProgress:
 
     @property
     def first_needed(self) -> int:
-        """Sequence number of the first message that is needed at the start."""
+        """Sequence number of the oldest message that is needed after a start."""
         return 1 if self._stored is None else self._stored.window_sequence
 
     def reaches_back(self, first_sequence: int) -> None:
-        """Log an error or a warning if the stream no longer has the needed messages.
+        """Log a fault if the stream, which begins at ``first_sequence``, lacks needed messages.
 
         Missing messages are a gap in the samples, which the monitor detects by the sample index.
         """
@@ -199,11 +203,14 @@ class UnitProgress:
 
     @property
     def is_replaying(self) -> bool:
-        """Whether the last message was not after the stored position."""
+        """Whether the newest processed message is at or before the stored position."""
         return self._stored is not None and self.sequence <= self._stored.sequence
 
     def fall_silent(self, after_s: float, trouble: str | None = None) -> None:
-        """Mark the unit as not connected if no usable message arrived for ``after_s``."""
+        """Mark the unit as not connected if no usable message arrived for ``after_s`` seconds.
+
+        ``trouble`` is the known reason why no messages arrive, or None.
+        """
         if self._clock.monotonic_s() - self._arrived_s <= after_s:
             return
         if self._live.status(self.unit).state in MAY_ARRIVE or self._analyser.is_connected(
@@ -225,7 +232,7 @@ class UnitProgress:
         self._window.note(sequence, message.block, self._analyser.state(self.unit))
 
     def _is_done(self, message: Taken | LinkNews) -> bool:
-        """Return whether the results of a block are already stored; False from the first new block.
+        """Return whether a message contains a block whose results are already stored.
 
         After the first new block the result is always False. A second analysis, with differently
         placed segments, would store results twice.

@@ -1,4 +1,4 @@
-"""Publisher of blocks on the stream; queues each block until the servers have confirmed it."""
+"""Publisher of sample blocks on the stream; each block is queued until the servers confirm it."""
 
 import asyncio
 from collections import deque
@@ -76,7 +76,7 @@ class Outbound:
 
     @property
     def behind_s(self) -> float:
-        """Time for which messages have been queued without a confirmed message, s."""
+        """Time since the servers last confirmed a message, s; 0 while the queue is empty."""
         return self._clock.monotonic_s() - self._last_s if self.n_waiting else 0.0
 
     async def put(self, unit: str, message: Outgoing) -> None:
@@ -86,7 +86,7 @@ class Outbound:
             self.add(unit, message)
 
     def add(self, unit: str, message: Outgoing) -> None:
-        """Queue a message without waiting; a link state replaces a queued link state before it."""
+        """Queue a message without waiting; of successive link states, only the last is kept."""
         queue = self._waiting[unit]
         if not self.n_waiting:
             self._last_s = self._clock.monotonic_s()
@@ -97,7 +97,7 @@ class Outbound:
         self._news[unit].set()
 
     async def first(self, unit: str) -> Outgoing:
-        """Wait for the oldest message of a unit; `published` removes it from the queue."""
+        """Wait for the oldest message of a unit and return it; `published` removes it later."""
         while not self._waiting[unit]:
             self._news[unit].clear()
             await self._news[unit].wait()
@@ -113,7 +113,7 @@ class Outbound:
             self._room.notify_all()
 
     async def drained(self) -> None:
-        """Wait until the queue is empty."""
+        """Wait until the queues of all units are empty."""
         async with self._room:
             await self._room.wait_for(lambda: not self.n_waiting)
 

@@ -1,4 +1,4 @@
-"""Notification receivers, captures and Prometheus metrics of a replica."""
+"""Notification receivers and Prometheus metrics of a replica, a process that only serves HTTP."""
 
 import asyncio
 import platform
@@ -74,7 +74,7 @@ class ReplicaMetrics:
     receivers: Sequence[ReceiverView] | None = None
 
     async def scrape(self) -> "ReplicaMetrics":
-        """Return a copy with the receiver states; without them if the outbox cannot be read."""
+        """Return a copy with the receiver states; `self` if the outbox cannot be read."""
         try:
             return replace(self, receivers=await self.deliveries.look())
         except StoreError:
@@ -108,7 +108,7 @@ class ReplicaMetrics:
 
 
 def unit_metrics(live: ReplicaLive, units: Sequence[str]) -> Iterator[Metric]:
-    """Yield link state, report age and data age of each unit, from the latest reports."""
+    """Yield the metrics of link state, report age and data age of each unit."""
     connected = (((u,), live.status(u).state is LinkState.CONNECTED) for u in units)
     yield gauge("link_connected", "1 while the device is connected.", UNIT, connected)
     alive = (((u,), live.is_alive(u)) for u in units)

@@ -41,7 +41,7 @@ NO_SIGNS = UnitSigns(UnitStatus(), None, {})
 
 @dataclass(frozen=True)
 class LatestReport:
-    """Latest report on a unit, with its derived status.
+    """Latest report on a unit, and the link status derived from the report.
 
     Parameters
     ----------
@@ -52,6 +52,8 @@ class LatestReport:
         first report of a process, whose age is unknown.
     status
         Link status of the unit, valid while reports arrive.
+    results
+        Newest result of each bearing, by bearing id.
     """
 
     beat: tuple[str, int] | None = None
@@ -64,9 +66,9 @@ class LatestReport:
 class ReplicaLive:
     """Live view of a replica, from the latest reports; outdated values are not shown as current.
 
-    Ages are measured by the monotonic clock of this process from the arrival of a report, less the
-    delay of the report. The clocks of the hosts need not agree, and the delay of a report by the
-    database does not reduce the ages of its values.
+    Ages count from the send time of a report, by the monotonic clock of this process: the arrival
+    minus the estimated delay. The clocks of the hosts need not agree, and the delay of a report by
+    the database does not reduce the ages of its values.
     """
 
     def __init__(self, units: Iterable[str], clock: Clock, stale_after_s: float) -> None:
@@ -75,7 +77,7 @@ class ReplicaLive:
         self._latest = dict.fromkeys((*units, PLANT, SHARED), LatestReport())
         self.revision = 0
         self.read_error: str | None = None
-        """Error of the last read of the reports; None if it succeeded."""
+        """Error of the newest attempt to read the reports; None if the attempt succeeded."""
 
     @property
     def units(self) -> Sequence[str]:
@@ -83,7 +85,10 @@ class ReplicaLive:
         return tuple(self._latest)
 
     def update(self, unit: str, process: str, n_beats: int, signs: UnitSigns) -> None:
-        """Apply the latest report on a unit; a report that was applied before has no effect."""
+        """Apply the latest report on a unit; a report that was applied before has no effect.
+
+        ``n_beats`` is the sequence number of the report in its ``process``.
+        """
         latest, beat = self._latest[unit], (process, n_beats)
         if latest.beat == beat:
             return
@@ -99,7 +104,7 @@ class ReplicaLive:
         self._latest[unit] = replace(latest, beat=beat, sent_s=sent_s, signs=signs, status=status)
 
     def set_results(self, unit: str, results: Mapping[str, BearingState]) -> None:
-        """Set the newest results of a unit, by bearing."""
+        """Set the newest results of a unit, by bearing id."""
         self.revision += 1
         found = {
             bearing: Assessment(unit, bearing, spectrum=NO_SPECTRUM, orbit=None, **vars(state))
@@ -130,7 +135,7 @@ class ReplicaLive:
         return sum({each.beat[0]: each.signs.n_unstored for each in latest if each.beat}.values())
 
     def status(self, unit: str) -> UnitStatus:
-        """Return the link status of a unit; it is not connected while reports are missing."""
+        """Return the link status of a unit; "not connected" while no reports on the unit arrive."""
         latest = self._latest[unit]
         if latest.beat is None:
             return NOT_REPORTED
@@ -252,17 +257,18 @@ class ReplicaFilms:
         return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """Return the newest film news of a bearing; None before the first report of a verdict."""
+        """Return the newest film reading of a bearing with its verdicts; None without one."""
         return self._newest.get((unit, bearing))
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
-        """Return the baseline that is in force for a bearing; None without a baseline."""
+        """Return the baseline in force for a bearing; None if no baseline is in force."""
         return self._baselines.get((unit, bearing))
 
     def fetch(self, unit: str, state: UnitState) -> Mapping[str, BearingBaseline]:
-        """Return the baselines in force in a unit state, from the store if not in memory; blocks.
+        """Return the baselines, by bearing, whose versions a reported unit state gives as in force.
 
-        Raises `StoreError` if a baseline cannot be read.
+        Baselines that are not in memory are read from the store, which blocks the thread. Raises
+        `StoreError` if a baseline cannot be read.
         """
         found = {}
         for bearing, in_force in state.baselines.items():
@@ -274,7 +280,7 @@ class ReplicaFilms:
         return found
 
     def take(self, unit: str, state: UnitState, baselines: Mapping[str, BearingBaseline]) -> None:
-        """Apply a reported unit state, with the baselines that `fetch` returned for it."""
+        """Apply a reported unit state, and the baselines that `fetch` returned for this state."""
         for bearing, film in state.films.items():
             news = FilmNews(film.reading, film.findings, (INITIAL_DECISION, INITIAL_DECISION))
             self._newest[unit, bearing] = news
@@ -283,7 +289,10 @@ class ReplicaFilms:
 
 
 class ReplicaAlarms:
-    """Alarms of a replica, from reports and the alarm table; those of silent units are unjudged."""
+    """Alarms of a replica, from reports and the stored alarms.
+
+    While a unit is not reported on, the conditions of its alarms are unknown.
+    """
 
     def __init__(
         self, units: Iterable[str], is_alive: Callable[[str], bool], chatter_rule: ChatterRule
@@ -298,7 +307,7 @@ class ReplicaAlarms:
 
     @property
     def revision(self) -> int:
-        """Counter that increases with every change of an alarm or of the silence of a unit."""
+        """Counter that increases if an alarm changes, or if reports on a unit stop or resume."""
         alive = {unit: self._is_alive(unit) for unit in self._judged}
         if alive != self._alive:  # a unit falls silent without a report
             self._alive = alive
@@ -326,7 +335,7 @@ class ReplicaAlarms:
         return list(self._alarms.values())
 
     def alarm(self, id_: str) -> Alarm:
-        """Return an alarm. Raises `LookupError` if it does not exist."""
+        """Return the alarm with an id; raise `LookupError` if it does not exist."""
         return self._alarms[id_]
 
     def is_judged(self, alarm: Alarm) -> bool:
@@ -339,7 +348,7 @@ class ReplicaAlarms:
         return alarm.identity.id in self._chattering.get(self._owner(alarm), ())
 
     def owner(self, id_: str) -> str:
-        """Return the unit whose process changes an alarm. Raises `LookupError` if it is unknown."""
+        """Return the unit whose process changes an alarm; raise `LookupError` for an unknown id."""
         return self._owner(self.alarm(id_))
 
     def _owner(self, alarm: Alarm) -> str:
@@ -349,5 +358,5 @@ class ReplicaAlarms:
         return unit if unit in self._units else PLANT
 
     def count(self) -> AlarmCount:
-        """Return the numbers of alarms by state."""
+        """Return the numbers of active, unacknowledged, hidden and unjudged alarms."""
         return count_of(self.alarms, self.is_judged)

@@ -50,7 +50,7 @@ class CommandClient:
         self._store, self._alarms, self._clock = store, alarms, clock
 
     async def operate(self, id_: str, action: Action) -> Alarm:
-        """Apply an operator's action to an alarm; return the stored alarm after the action."""
+        """Apply an operator's action to the alarm with an id; return the alarm as then stored."""
         unit = self._alarms.owner(id_)
         answer = await self._send(unit, AlarmCommand(id_, action), action.actor)
         if answer.state is CommandState.UNKNOWN:
@@ -61,13 +61,16 @@ class CommandClient:
         return self._alarms.alarm(id_)
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
-        """Apply an engineer's action to the baselines of a bearing."""
+        """Apply an engineer's action to the baselines of a bearing.
+
+        Raises `BaselineRefusedError` if the action does not fit the state of the baselines.
+        """
         answer = await self._send(place.unit, BaselineCommand(place, action, actor, reason), actor)
         if answer.state is CommandState.REFUSED:
             raise BaselineRefusedError(answer.words)
 
     async def refer_to(self, reference: VectorReference) -> None:
-        """Activate a stored reference of 1× vectors in the analysing process."""
+        """Put a stored reference of 1× vectors in force in the analysing process."""
         await self._send(reference.unit, ReferenceCommand(reference.unit), acting().actor)
 
     async def _send(self, unit: str, task: OperatorCommand, actor: str) -> Answer:

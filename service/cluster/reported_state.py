@@ -40,7 +40,7 @@ REPORT_EVERY_S = 1.0
 
 @dataclass(frozen=True)
 class UnitNow:
-    """Present signs and state of a unit, as content of a report.
+    """Content of a report on a unit: its signs (link state, ages) and state (results, alarms).
 
     Parameters
     ----------
@@ -55,13 +55,13 @@ class UnitNow:
 
 
 class Reporter:
-    """Writer of reports: reads the unit states on the event loop, writes them in a thread.
+    """Writer of reports; it reads unit states on the event loop and writes reports in a thread.
 
     Parameters
     ----------
     held
-        Returns the units that this process is responsible for; also `PLANT` if it reports the
-        alarms without a unit, and `SHARED` if it does the shared work.
+        Function that returns the ids of the units that this process is responsible for; also
+        `PLANT` if it reports the alarms without a unit, and `SHARED` if it does the shared work.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Reporter:
         await periodic(self.report, REPORT_EVERY_S, self._clock, pulse)
 
     async def report(self) -> None:
-        """Write one report per unit; while writing fails, readers treat the units as silent."""
+        """Write one report on each unit; after failed writes, readers treat the units as silent."""
         held = list(self._held())
         for unit in self._written.keys() - set(held):  # another process may now write it
             self._written[unit] = (self._written[unit][0], None)
@@ -197,7 +197,7 @@ class Feed:
         await periodic(self.look, READ_EVERY_S, self._clock, pulse)
 
     async def look(self) -> None:
-        """Read the reports once; if reading fails, the values remain and their age increases."""
+        """Read the reports once; if this fails, the old values remain and their ages increase."""
         try:
             reports = await asyncio.to_thread(self._read)
         except StoreError as error:
@@ -249,7 +249,10 @@ def process_name() -> str:
 
 @dataclass
 class UnitDescription:
-    """Description of a unit in a process without a monitor; new gap references replace it."""
+    """Holder of the description of a unit, for a process without a monitor of the unit.
+
+    A new gap reference replaces the description.
+    """
 
     unit: Unit
 

@@ -102,12 +102,13 @@ PING_S = 5
 
 @asynccontextmanager
 async def session(settings: StreamSettings, name: str) -> AsyncIterator[JetStreamContext]:
-    """Connect to the NATS servers; cancel the body of the context if the connection is lost.
+    """Connect to the NATS servers; yield the JetStream context. A lost link cancels the body.
 
     Raises
     ------
     StreamError
-        If the connection fails or is lost, or if the body raises an error of the NATS library.
+        If the connection fails or is lost, or if the body of the context manager raises an error
+        of the NATS library.
     """
     lost: asyncio.Future[None] = asyncio.get_running_loop().create_future()
     client = await _connected(settings, name, lost)
@@ -244,7 +245,7 @@ BYTES_PER_GB = 1e9
 S_PER_H = 3600.0
 
 PLANT, FORMAT = "padwatch-plant", "padwatch-format"
-"""Metadata keys of the stream for the fingerprint of its plant and for its format."""
+"""Keys of the stream's metadata for the fingerprint of the plant and for the format version."""
 
 
 def wanted(plant: PlantFile, settings: StreamSettings) -> StreamConfig:

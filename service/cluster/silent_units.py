@@ -26,14 +26,14 @@ from service.store.sharing import UnitBeat
 from service.store.store import Store
 
 SILENT_AFTER_S = 30.0
-"""Time without reports after which a unit counts as silent, s. A takeover by a standby takes a few
-seconds, a restart up to ten."""
+"""Time without reports after which a unit counts as silent, s. A takeover by a standby process
+takes a few seconds, a restart up to ten seconds."""
 
 EVERY_S = 1.0
 
 
 class SilentUnits:
-    """Monitor that raises alarms about units whose reports have stopped, while this process leads.
+    """Monitor that raises alarms about units whose reports have stopped; runs in the leader only.
 
     Ages are measured by the monotonic clock of this process from the arrival of a report, so that
     the clocks of the hosts need not agree. Time in which the database cannot be read is excluded.
@@ -50,7 +50,7 @@ class SilentUnits:
         self._board: ReportedAlarms | None = None
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Check the reports periodically while this process leads, until cancelled."""
+        """Check the reports periodically until cancelled; then remove the alarms."""
         try:
             await periodic(self.look, EVERY_S, self._clock, pulse)
         finally:
@@ -73,7 +73,7 @@ class SilentUnits:
         report_silence(self._board, silent, alive, SILENT_AFTER_S)
 
     def leave(self) -> None:
-        """Remove the alarms, for which the next leading process becomes responsible."""
+        """Remove the alarms about silent units; the next leader becomes responsible for them."""
         if self._board is not None:
             self._alarms.remove_alarms(self._board)
         self._board = None
@@ -104,21 +104,28 @@ class SilentUnits:
 log = structlog.get_logger()
 
 MIN_BLOCKS = 3
-"""Number of block durations without a block before a unit is silent; a block may take a minute."""
+"""Minimum silence of a unit in durations of a block; a block may last a minute."""
 
 
 def silences_s(units: Iterable[UnitSettings], least_s: float) -> dict[str, float]:
-    """Return the time without blocks after which a unit counts as not connected, s, by unit."""
+    """Return the time without blocks after which a unit is not connected, s, by unit id.
+
+    The time is at least ``least_s``.
+    """
     return {
         unit.id: max(least_s, MIN_BLOCKS * unit.block_samples / unit.sampling_hz) for unit in units
     }
 
 
 class SilenceWatch:
-    """Monitor that marks units as not connected if no message arrives for their maximum silence.
+    """Monitor that marks a unit as not connected if no messages of the unit arrive.
 
-    This includes units whose restored link state is connected, while the stream has not been
-    reached since the start.
+    This includes units that were connected before a restart, while the stream is not reached.
+
+    Parameters
+    ----------
+    after_s
+        Time without messages after which a unit is marked, s, by unit id.
     """
 
     def __init__(
@@ -139,7 +146,7 @@ class SilenceWatch:
         Parameters
         ----------
         begun
-            Progress of the units whose position on the stream is known.
+            Progress of the units whose position on the stream is known, by unit id.
         trouble
             Reason why no messages can arrive; None if unknown.
         waiting

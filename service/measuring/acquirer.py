@@ -35,12 +35,12 @@ class LinkNews:
 
     @property
     def is_connected(self) -> bool:
-        """Whether samples arrive."""
+        """Whether the link state is connected, so that samples arrive."""
         return self.state is LinkState.CONNECTED
 
 
 class Bus:
-    """Queue of sample blocks in one process.
+    """Queue of sample blocks between acquisition and analysis in one process.
 
     Publishers wait while the queue is full: the device buffers samples in its ring, and if the
     ring overruns, the sample index shows the exact gap. The queue drops nothing.
@@ -65,7 +65,7 @@ class Bus:
 
     @property
     def oldest_wait_s(self) -> float:
-        """Age of the oldest block whose analysis has not finished."""
+        """Age of the oldest block whose analysis has not finished, s; 0 if there is none."""
         if not self._published_s:
             return 0.0
         return self._clock.monotonic_s() - self._published_s[0]
@@ -82,7 +82,7 @@ class Bus:
             yield await self._queue.get()
 
     def done(self) -> None:
-        """Mark the block yielded last as analysed."""
+        """Mark the oldest block that `blocks` has yielded as analysed."""
         self._queue.task_done()
         self._published_s.popleft()
 
@@ -114,23 +114,23 @@ CONNECTS_PER_S = 50.0
 """Maximum rate of connection attempts over all units, if many devices return at the same time."""
 
 CONFIG_RETRY_S = 15.0
-"""Retry period of a device that does not fit the settings; replacing it takes longer."""
+"""Retry period, s, after a `ConfigError`: the device does not match its settings."""
 
 ENDED = "the recording has ended"
 
 Publish = Callable[[SampleBlock], Awaitable[None]]
-"""Coroutine function that receives a block; the source waits until it returns."""
+"""Coroutine function that receives a block; reading of the source waits until it returns."""
 
 
 class Acquirer:
-    """Reader of the sources of all units, which reconnects after lost links.
+    """Reader of the sources of all units; it reconnects after lost links.
 
     Parameters
     ----------
     publish
         Function that receives each block.
     report
-        Function that receives each link state.
+        Function that receives each reported link state.
     beats
         Heartbeats of the task of each unit; they continue while a device is disconnected and stop
         if its driver hangs.

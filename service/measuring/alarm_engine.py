@@ -1,4 +1,4 @@
-"""Alarm engine: alarms of all units and of the service, listeners, and restart."""
+"""Alarm engine: updates, announces and stores all alarms, and restores them after a restart."""
 
 import asyncio
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -56,12 +56,12 @@ log = structlog.get_logger()
 TICK_S = 0.5
 
 WITHOUT_LINK = (LINK_LOST, MESSAGES_REFUSED)
-"""Alarm kinds whose condition is known also while no samples arrive."""
+"""Alarm kinds whose conditions are known even while no samples arrive."""
 
 LOGGED = (*ANNOUNCED, AlarmChange.RETURNED)
 
 Listener = Callable[[SampleBlock, Sequence[AlarmNews]], None]
-"""Function that receives each block with the alarm news that it caused."""
+"""Function that receives each block, and the `AlarmNews` (changes of alarms) that it caused."""
 
 
 class AlarmEngine:
@@ -74,11 +74,11 @@ class AlarmEngine:
     put
         Function that queues findings for the store.
     listener
-        Function that receives each block with its alarm news.
+        Function that receives each block with the changes of alarms that it caused.
     service
         Alarms about the service itself.
     chatter
-        Definition of chattering alarms.
+        Rule that classifies alarms as chattering.
     stream
         Alarms about refused messages, if blocks come over a stream.
     """
@@ -105,7 +105,7 @@ class AlarmEngine:
         """Revision number, increased with every change of an alarm."""
 
     def set_observer(self, observer: Callable[[Sequence[AlarmNews]], None]) -> None:
-        """Set the function that is called immediately with all alarm news."""
+        """Set the function that is called at once with all changes of alarms."""
         self._observer = observer
 
     def restore(
@@ -113,12 +113,13 @@ class AlarmEngine:
         alarms: Iterable[Alarm],
         memories: Mapping[str, AlarmMemory] = MappingProxyType({}),
     ) -> None:
-        """Restore stored alarms, before the first block.
+        """Restore stored alarms; called before the first block.
 
         Parameters
         ----------
         memories
-            Alarm states, by unit; only of units without a gap in the samples since.
+            States of the alarms, by unit; given only for units without missing samples since these
+            states were saved.
         """
         now_ns, found = self._clock.now_ns(), list(alarms)
         for board in self._reported:
@@ -143,7 +144,7 @@ class AlarmEngine:
         self.revision += 1
 
     def refuse(self, unit: str, reason: str) -> None:
-        """Report a refused message of a unit."""
+        """Raise the alarm about a refused stream message of a unit, with the reason."""
         if self._stream is not None:
             report_refused(self._stream, unit, reason)
 
@@ -156,7 +157,7 @@ class AlarmEngine:
         return self._units[unit].memory
 
     def recall(self, events: Iterable[AlarmEvent]) -> None:
-        """Add past events, oldest first, to the detection of chattering alarms."""
+        """Add past alarm events, oldest first, to the detection of chattering alarms."""
         for event in events:
             self._chatter.note(event, event.time_ns)
 
@@ -166,12 +167,12 @@ class AlarmEngine:
         assessments: Sequence[Assessment],
         films: Mapping[str, Judgement] = MappingProxyType({}),
     ) -> list[AlarmNews]:
-        """Update the alarms of a unit from a block and its results; return the news.
+        """Update the alarms of a unit from a block and its results; return the changes of alarms.
 
         Parameters
         ----------
         films
-            Conditions of films by alarm id.
+            Judged conditions of the film alarms, by alarm id.
         """
         own = self._units[block.unit]
         if assessments or films:
@@ -221,7 +222,7 @@ class AlarmEngine:
         return self._board_of(id_).alarm(id_)
 
     def is_chattering(self, alarm: Alarm) -> bool:
-        """Return whether an alarm was raised too often recently."""
+        """Return whether an alarm is chattering now, by `chatter_rule`."""
         return self._chatter.is_chattering(alarm.identity.id, self._clock.now_ns())
 
     def set_reference(self, reference: VectorReference) -> None:
@@ -231,11 +232,11 @@ class AlarmEngine:
 
     @property
     def alarms(self) -> list[Alarm]:
-        """All alarms of any state."""
+        """All alarms, in any state."""
         return [alarm for board in self._boards for alarm in board.alarms]
 
     def is_judged(self, alarm: Alarm) -> bool:
-        """Return whether an alarm's condition is known now; most kinds need a connected unit."""
+        """Return whether an alarm's condition is known; most kinds require a connected unit."""
         if alarm.identity.kind in WITHOUT_LINK:
             return True
         if alarm.identity.unit not in self._units:
@@ -255,7 +256,7 @@ class AlarmEngine:
         return now_ns
 
     def _publish(self, news: list[AlarmNews]) -> None:
-        """Announce and store alarm news that no block caused."""
+        """Announce and store changes of alarms that were not caused by a block."""
         self._announce(news)
         if news:
             self._put(Findings(alarms=news))
@@ -336,13 +337,14 @@ async def alarm_engine(
     Parameters
     ----------
     rows
-        Channel of each row of the blocks, for units whose rows are not their channels.
+        Channel of each row of a block, by unit; only for units whose rows are not their channels.
     look
         Function that returns the health of the service.
     part
         Part of the plant that this process is responsible for.
     memories
-        Alarm states, by unit; only of units without a gap in the samples since.
+        States of the alarms, by unit; given only for units without missing samples since these
+        states were saved.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Analysis of blocks to findings, and transfer of a unit's state to another process."""
+"""Analysis of sample blocks, and transfer of a unit's analysis state to another process."""
 
 import asyncio
 from collections.abc import Mapping
@@ -32,7 +32,7 @@ class UnitMemory:
     films
         State of the unit's films; None if they are not monitored.
     count
-        Current sample count of the unit's blocks.
+        Current sample count of the unit's device, with its epoch; None before the first block.
     version
         Version of this format.
     """
@@ -50,7 +50,7 @@ NO_MEMORIES: Mapping[str, UnitMemory] = MappingProxyType({})
 NOTHING = Findings()
 
 TURNS = 3
-"""Iterations of the event loop between two bearings, enough to respond to a request."""
+"""Iterations of the event loop between the analysis of two bearings, for waiting requests."""
 
 
 class Analyser:
@@ -105,7 +105,7 @@ class Analyser:
     async def replay(
         self, block: SampleBlock, sampled_s: float, account: SampleAccount | None = None
     ) -> None:
-        """Analyse a block again whose findings are already stored; publish no findings.
+        """Analyse a block whose findings are already stored, to restore the monitor.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class Analyser:
         return self._monitors[unit].state
 
     def memory(self, unit: str) -> UnitMemory:
-        """Return the state of a unit for another process, which also needs the newest samples."""
+        """Return the analysis state of a unit, which another process restores by a replay."""
         return UnitMemory(
             self.state(unit),
             self._alarms.memory(unit),
@@ -134,17 +134,17 @@ class Analyser:
         )
 
     def rewind(self, unit: str, memory: UnitMemory) -> None:
-        """Prepare the monitor of a unit for the replay of its newest samples."""
+        """Prepare the monitor of a unit for a replay of its newest samples, from a stored state."""
         self._monitors[unit].go_on(None)
         self._monitors[unit].rewind(memory.monitor)
         self._counts[unit].restore(memory.count)
 
     def settle(self, unit: str, memory: UnitMemory) -> None:
-        """Restore the state of a unit's monitor after the replay."""
+        """Restore a stored state of a unit's monitor after the replay of its newest samples."""
         self._monitors[unit].settle(memory.monitor)
 
     def refuse(self, unit: str, reason: str) -> None:
-        """Report a refused message of a unit."""
+        """Report a refused stream message of a unit to the alarms."""
         self._alarms.refuse(unit, reason)
 
     def note_link(self, news: LinkNews) -> None:

@@ -23,7 +23,7 @@ PADWATCH = "padwatch"
 """Author of baselines that are learned and accepted automatically."""
 
 SURE = 3.0
-"""Smallest significant drift in standard uncertainties; a smaller drift may be chance."""
+"""Minimum ratio of a drift to its standard uncertainty; a smaller drift may be chance."""
 
 
 class Learner:
@@ -33,7 +33,7 @@ class Learner:
         self._store, self._settings = store, settings
 
     def is_due(self, place: FilmPlace, now_ns: int) -> bool:
-        """Return whether a baseline of a bearing is due, the first one or a new version."""
+        """Return whether the first baseline of a bearing, or a new version of it, is due."""
         versions = self.versions(place)
         since_ns = self._since_ns(place, versions)
         if versions.is_frozen or since_ns is None:
@@ -64,7 +64,7 @@ class Learner:
 
         Returns
         -------
-        None if there are too few readings.
+        The learned baseline; None if there are too few readings.
         """
         versions = self.versions(place)
         found = self._readings(place, versions, now_ns)
@@ -87,7 +87,12 @@ class Learner:
         return baseline
 
     def learn_response(self, unit: str, rules: FilmRules, now_ns: int) -> ShaftResponse | None:
-        """Learn and store the response of the shaft of a unit to its films."""
+        """Learn and store the response of a unit's shaft to its films.
+
+        Returns
+        -------
+        The response; None if there are too few readings at times common to all bearings.
+        """
         places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
         found = {p.bearing: self._readings(p, self.versions(p), now_ns) for p in places}
         rows = common_rows(found)
@@ -129,7 +134,7 @@ class Learner:
         return steps
 
     def _disagreement(self, baseline: BearingBaseline, versions: Versions) -> str | None:
-        """Return a text about the difference from the first accepted version; None if it is small.
+        """Return a text on the difference from the first accepted baseline; None if it is small.
 
         A comparison with the previous version would accept a film that softens slowly.
         """
@@ -151,9 +156,9 @@ def drifted(
     baseline: BearingBaseline,
     limit: float,
 ) -> str | None:
-    """Return a text about the change of a film during learning; None if it is not significant.
+    """Return a text on a stiffness change during learning; None if below ``limit`` or uncertain.
 
-    A significant change may be a fault.
+    A significant change may be a fault of the bearing. ``limit`` is a natural logarithm.
     """
     for quantity in baseline.quantities:
         found = learning_drift(history, is_healthy, quantity)
@@ -179,13 +184,13 @@ def _step(baseline: BearingBaseline, step: BaselineStep, reason: str) -> StoredS
 
 
 def healthy(film: FilmHistory) -> npt.NDArray[np.bool_]:
-    """Return a mask of the readings that are settled and without an alarm."""
+    """Return a mask (n,) of the readings in a settled state without an alarm."""
     is_healthy: npt.NDArray[np.bool_] = film.is_settled & ~np.any(film.level > 0, axis=0)
     return is_healthy
 
 
 def common_rows(found: Mapping[str, FilmHistory]) -> dict[str, npt.NDArray[np.bool_]]:
-    """Return, by bearing, a mask of the readings at times that all histories contain."""
+    """Return, by bearing, a mask (n,) of the readings at times that all histories contain."""
     times = {bearing: film.history.time_ns for bearing, film in found.items()}
     common = reduce(partial(np.intersect1d, assume_unique=True), times.values())
     return {bearing: np.isin(time_ns, common) for bearing, time_ns in times.items()}

@@ -1,4 +1,4 @@
-"""Baseline version in force, and restored state of the films after a start."""
+"""Lookup of the baseline in force, and restoring of the film state after a start."""
 
 from collections.abc import Mapping
 
@@ -21,16 +21,19 @@ from service.store.film_readings import FilmHistory, FilmQuery
 from service.store.films import FilmStore
 
 TAIL_NS = 2 * DAY_NS
-"""Length of the history that the operating state is computed from; longer than the warm-up."""
+"""Length, ns, of the history from which the operating state is computed; exceeds the warm-up."""
 
 CATCH_UP_NS = 21 * DAY_NS
-"""Length of the history that decisions are computed from; several times the longest mean."""
+"""Length of the history from which decisions are computed, ns; a multiple of the longest mean."""
 
 
 def in_force(
     store: FilmStore, place: FilmPlace, rules: FilmRules
 ) -> tuple[BearingBaseline | None, tuple[Decision, ...]]:
-    """Return the baseline in force for a bearing, and the newest decisions based on it."""
+    """Return the baseline in force for a bearing, and the newest decisions x and y based on it.
+
+    Returns None and an empty tuple if no baseline for the estimator of ``place`` is in force.
+    """
     version = versions_after(store.steps(place.unit, place.bearing)).in_force
     baseline = None if version is None else store.baseline(place.unit, place.bearing, version)
     if baseline is None or baseline.origin.estimator != place.estimator:
@@ -67,7 +70,7 @@ def resume_films(
     response: ShaftResponse | None,
     watch: FilmWatch,
 ) -> None:
-    """Restore the film watch of a unit from stored readings."""
+    """Restore the state of the film monitoring of a unit, ``watch``, from stored readings."""
     places = [FilmPlace(unit, *item) for item in rules.estimators.items()]
     start_ns = _newest_ns(store, places[0]) - TAIL_NS
     found = {
@@ -89,7 +92,10 @@ def _newest_ns(store: FilmStore, place: FilmPlace) -> int:
 
 
 def _recent(found: Mapping[str, FilmHistory], watch: FilmWatch) -> list[FloatArray]:
-    """Return the newest settled readings at common times, (5, n_films) each."""
+    """Return the newest settled readings at times common to all bearings, (5, n_films) each.
+
+    Rows: ln stiffness, ln shaft motion, deviation, eccentricity rise, and attitude angle.
+    """
     common, columns = common_rows(found), []
     settled = np.logical_and.reduce([film.is_settled[common[b]] for b, film in found.items()])
     for bearing, film in found.items():
@@ -104,7 +110,7 @@ def _recent(found: Mapping[str, FilmHistory], watch: FilmWatch) -> list[FloatArr
 
 
 def _rises(history: StiffnessHistory, baseline: BearingBaseline | None) -> FloatArray:
-    """Return the baseline's rise with eccentricity, (2, n); NaN without a baseline."""
+    """Return d ln(stiffness) / d ln(eccentricity ratio), (2, n); NaN without a baseline."""
     rises = np.full((len(DIRECTIONS), len(history)), np.nan)
     for row, direction in enumerate(DIRECTIONS):
         learned = baseline.of(direction) if baseline else None

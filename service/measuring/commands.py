@@ -12,10 +12,10 @@ from service.measuring.recorder import NotStoredError, Recorder
 from service.store.port import StoreError
 
 STORED_WITHIN_S = 10.0
-"""Maximum wait until an action is on the disk, s."""
+"""Maximum wait until the result of an action is on the disk, s."""
 
 ANSWERS_WITHIN_S = 10.0
-"""Maximum wait for the empty transaction before an action, s."""
+"""Maximum wait for the empty transaction that checks the store before an action, s."""
 
 
 class LocalCommands:
@@ -25,7 +25,7 @@ class LocalCommands:
         self._alarms, self._films, self._recorder = alarms, films, recorder
 
     async def operate(self, id_: str, action: Action) -> Alarm:
-        """Apply an action to an alarm; return after it is on the disk.
+        """Apply an operator's action to an alarm; return the alarm after it is on the disk.
 
         The action is refused while the store fails, since it must be in the audit trail.
         """
@@ -60,7 +60,7 @@ class LocalCommands:
             ) from error
 
     async def act(self, place: FilmPlace, action: BaselineAction, actor: str, reason: str) -> None:
-        """Apply an action to the baselines of a bearing."""
+        """Apply an engineer's action to the baselines of a bearing."""
         await self._films.act(place, action, actor, reason)
 
     async def refer_to(self, reference: VectorReference) -> None:

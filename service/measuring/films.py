@@ -45,12 +45,12 @@ class WatchedFilms:
 class FilmMonitor:
     """Monitor of the films of all units.
 
-    It evaluates on the event loop, and reads the store and learns in threads.
+    Films are evaluated on the event loop; threads read the store and learn baselines.
 
     Parameters
     ----------
     rules
-        Rules of each unit, or the reason why its films cannot be monitored.
+        Rules for the films of each unit, or the reason why they cannot be monitored, by unit id.
     """
 
     def __init__(
@@ -105,18 +105,23 @@ class FilmMonitor:
         return FilmPlace(unit, bearing, rules.estimators[bearing])
 
     def newest(self, unit: str, bearing: str) -> FilmNews | None:
-        """Return the newest film findings of a bearing since the service started."""
+        """Return the newest film reading and findings of a bearing; None before the first one."""
         return self._films[unit].newest.get(bearing) if unit in self._films else None
 
     def baseline(self, unit: str, bearing: str) -> BearingBaseline | None:
-        """Return the baseline in force for a bearing; None without one."""
+        """Return the baseline in force for a bearing; None if no baseline is in force."""
         films = self._films.get(unit)
         return films.watch.judge.baseline(bearing) if films else None
 
     def take(
         self, unit: str, assessments: Sequence[Assessment]
     ) -> tuple[Sequence[Assessment], list[FilmNews]]:
-        """Add the operating condition to results, and evaluate the films if a reading is due."""
+        """Add the operating condition to results, and evaluate the films if a reading is due.
+
+        Returns
+        -------
+        The results with their conditions, and the newly judged film readings.
+        """
         films = self._films.get(unit)
         if films is None or not assessments:
             return assessments, []
@@ -125,7 +130,7 @@ class FilmMonitor:
         return seen, news
 
     def conditions(self, news: Sequence[FilmNews]) -> dict[str, Judgement]:
-        """Return the conditions of the film alarms, by alarm id."""
+        """Return the judged conditions of the film alarms after new readings, by alarm id."""
         return {
             AlarmIdentity(each.reading.unit, each.reading.bearing, kind).id: alarm_condition(
                 finding, self._films[each.reading.unit].rules.change
@@ -146,7 +151,7 @@ class FilmMonitor:
             await self._clock.sleep(period_s)
 
     async def learn_due(self, pulse: Pulse = UNHEARD) -> None:
-        """Learn the baselines of all bearings that are due."""
+        """Learn all baselines that are due."""
         for unit, films in self._films.items():
             pulse.beat(MAX_LEARN_S)
             due = [
@@ -162,7 +167,10 @@ class FilmMonitor:
                 await self._learn_response(unit)
 
     async def learn(self, place: FilmPlace, **why: str) -> BearingBaseline | None:
-        """Learn a baseline of a bearing now; return None if there are too few readings."""
+        """Learn a baseline of a bearing now; return None if there are too few readings.
+
+        ``why`` are the arguments ``author`` and ``reason`` of `Learner.learn`.
+        """
         now_ns = self._clock.now_ns()
         async with self._acting:
             learned = await asyncio.to_thread(self.learner.learn, place, now_ns, **why)
@@ -208,7 +216,7 @@ class FilmMonitor:
         return baseline_step(action, place, versions, entries, actor, reason, self._clock.now_ns())
 
     async def put_in_force(self, place: FilmPlace) -> None:
-        """Activate the baseline that is in force for a bearing by its stored steps."""
+        """Activate the baseline of a bearing that is in force according to the stored steps."""
         films = self._films[place.unit]
         held = films.watch.judge.baseline(place.bearing)
         found, decisions = await asyncio.to_thread(in_force, self._store, place, films.rules)

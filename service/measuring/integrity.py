@@ -18,7 +18,7 @@ LOOK_EVERY_S = 3.0
 """Period of the integrity checks, s; the longest time until a missing database file is noticed."""
 
 MAX_REPORTED = 100
-"""Maximum number of damaged rows reported in the audit trail after a start."""
+"""Maximum number of damaged rows per run that are recorded in the audit trail."""
 
 
 class IntegrityMonitor:
@@ -32,7 +32,7 @@ class IntegrityMonitor:
     Attributes
     ----------
     rolled_back
-        Difference between the database and that of the last run; None without a difference.
+        Description of how the database differs from that of the last run; None if it does not.
     """
 
     def __init__(self, store: Store, clock: Clock, live: LiveView) -> None:
@@ -43,7 +43,7 @@ class IntegrityMonitor:
 
     @property
     def n_damaged(self) -> int:
-        """Number of damaged rows found since the start; queries leave them out."""
+        """Number of damaged rows found since the start; results of queries omit these rows."""
         return self._store.integrity.n_damaged
 
     @property
@@ -81,7 +81,7 @@ class IntegrityMonitor:
             log.error("the integrity of stored data cannot be checked", reason=str(error))
 
     async def _has_file(self) -> bool:
-        """Return whether the database file exists and is the open one."""
+        """Return whether the database file exists and is the file that this process has open."""
         before = self._no_file
         try:
             await asyncio.to_thread(self._store.integrity.require_file)

@@ -23,7 +23,7 @@ from service.runtime.metrics import Rows, counter, gauge, histogram, plain_histo
 from service.runtime.polls import TimedSource
 
 MAX_REASONS = 24
-"""Maximum number of reasons per unit; further reasons are counted as `OTHER`."""
+"""Maximum number of rejection reasons per unit; further reasons are counted as `OTHER`."""
 
 OTHER = "other"
 
@@ -128,7 +128,7 @@ def link_metrics(
 
 
 def bounded(rejected: Mapping[str, int]) -> dict[str, int]:
-    """Return counts by reason, with a limited number of reasons."""
+    """Return counts by reason; invalid reasons, and those above `MAX_REASONS`, count as `OTHER`."""
     counts: dict[str, int] = {}
     for reason, n_samples in rejected.items():
         is_label = _WORD.fullmatch(reason) and len(counts) < MAX_REASONS

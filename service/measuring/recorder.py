@@ -29,17 +29,17 @@ from service.store.store import Store
 FILE = "parked.jsonl"
 
 MAX_BYTES = 16_000_000
-"""Maximum size of the file and of its predecessor; on a damaged database all rows are refused."""
+"""Size in bytes above which a new file is begun; only one predecessor is kept."""
 
 
 class ParkedRows:
-    """File of refused rows with the reasons, one JSON object per line; readable by the owner."""
+    """File of refused rows with the reasons, one JSON object per line; private to its owner."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
 
     def add(self, time_ns: int, refused: Iterable[tuple[object, str]]) -> None:
-        """Append pairs of row and reason, and sync the file to the disk.
+        """Append refused rows, as pairs of row and reason, and sync the file to the disk.
 
         Raises
         ------
@@ -78,7 +78,7 @@ log = structlog.get_logger()
 RETRY_S = 1.0
 
 MAX_NEWS = 100_000
-"""Maximum number of queued `AlarmNews`; about 100 MB."""
+"""Maximum number of queued changes of alarms (`AlarmNews`); about 100 MB."""
 
 GIVEN_UP = "given_up"
 
@@ -86,12 +86,15 @@ T = TypeVar("T")
 
 
 class NotStoredError(Exception):
-    """Alarm news was not stored; the message states why."""
+    """Changes of alarms were not stored; the message states why."""
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Results, gaps and news from one block, stored in one transaction."""
+    """Results of one block, stored in one transaction, and the stream position after the block.
+
+    The results are assessments, gaps in the samples, changes of alarms, and film readings.
+    """
 
     assessments: Sequence[Assessment] = ()
     gaps: Sequence[UnitGap] = ()
@@ -101,7 +104,7 @@ class Findings:
 
     @property
     def parts(self) -> Iterator["Findings"]:
-        """Findings with one row each, in an order in which they can be stored."""
+        """Findings of one row each that together equal these findings, in the order of storing."""
         yield from (Findings(alarms=[news]) for news in self.alarms)
         yield from (Findings([assessment]) for assessment in self.assessments)
         yield from (Findings(gaps=[gap]) for gap in self.gaps)
@@ -126,13 +129,13 @@ class Recorder:
         File of refused rows.
     capacity
         Maximum number of queued findings; above it the oldest are dropped and counted in
-        :attr:`LiveView.n_unstored`. Alarm news has its own queue, up to `MAX_NEWS`.
+        :attr:`LiveView.n_unstored`. Changes of alarms have a separate queue of `MAX_NEWS`.
     on_stored
-        Function that is called after alarm news was written.
+        Function that is called after changes of alarms were written.
     timed
         Factory of a context manager around each write, in the thread.
     finds_again
-        Whether the next process reproduces the findings that were not written, from a stream.
+        Whether the next start reproduces unwritten findings from the stream of blocks.
     """
 
     def __init__(
@@ -162,12 +165,12 @@ class Recorder:
 
     @property
     def n_waiting(self) -> int:
-        """Number of queued findings and alarm news."""
+        """Number of queued findings and changes of alarms."""
         return len(self._waiting) + len(self._alarms)
 
     @property
     def behind_s(self) -> float:
-        """Time that queued findings have waited without any write, s; 0 if the queue is empty."""
+        """Time for which findings have waited without a successful write, s; 0 if none wait."""
         if not (self._waiting or self._alarms):
             return 0.0
         return self._clock.monotonic_s() - self._waits_since_s
@@ -186,12 +189,12 @@ class Recorder:
         self._news.set()
 
     async def stored(self) -> None:
-        """Wait without limit until the newest alarm news is on the disk.
+        """Wait without limit until the newest change of an alarm is on the disk.
 
         Raises
         ------
         NotStoredError
-            If the alarm news was dropped or refused.
+            If the change was dropped, or refused by the database.
         """
         if not self._alarms:
             return
@@ -220,7 +223,7 @@ class Recorder:
         await loop.run_in_executor(self._thread, self._store.append, [], [])
 
     async def settled(self) -> None:
-        """Wait until the queue is written or the store has failed."""
+        """Wait until all queued findings are written, or the store has failed."""
         async with self._progress:
             await self._progress.wait_for(
                 lambda: self._live.store_error or not (self._waiting or self._alarms)
@@ -238,7 +241,7 @@ class Recorder:
                     await self._clock.sleep(RETRY_S)
 
     async def flush(self) -> None:
-        """Try once to write the queue, at the end of the process."""
+        """Try once to write all queued findings, at the end of the process."""
         if (self._waiting or self._alarms) and not await self._write():
             counts = {"n_findings": len(self._waiting), "n_alarm_news": len(self._alarms)}
             if self._finds_again:
@@ -283,7 +286,7 @@ class Recorder:
         return True
 
     def _append(self, batch: Iterable[Findings]) -> list[tuple[object, str]]:
-        """Store findings; write refused rows to the file and return them with the reasons."""
+        """Store findings; write refused rows to the file, and return pairs of row and reason."""
         refused: list[tuple[object, str]] = []
         with self._timed():
             self._append_parts([part for findings in batch for part in findings.parts], refused)
@@ -327,7 +330,7 @@ class Recorder:
             log.error("results cannot be stored", n_parked=len(refused), reason=reason)
 
     def _resolve(self, news: AlarmNews, refusal: str | None) -> None:
-        """Resolve the future of alarm news; `refusal` is None if it was stored."""
+        """Resolve the future of a change of an alarm; `refusal` is None if it was stored."""
         outcome = self._outcomes.pop(id(news), None)
         if outcome is not None and not outcome.done():
             outcome.set_result(refusal)

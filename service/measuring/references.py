@@ -1,4 +1,4 @@
-"""Gap references and 1× vector references: in force, given by a user, or from the newest result."""
+"""References of gaps and 1× vectors: in force, entered by a user, or from the newest result."""
 
 import asyncio
 from collections.abc import Iterable, Mapping
@@ -31,7 +31,7 @@ Key = tuple[str, str]
 
 
 def opposite_axes(bearing: Bearing) -> tuple[bool, bool]:
-    """Return whether the axes x and y have an opposite probe."""
+    """Return whether the axis x, and whether the axis y, of a bearing has an opposite probe."""
     return bearing.opposite_x is not None, bearing.opposite_y is not None
 
 
@@ -61,12 +61,12 @@ class HasUnit(Protocol):
 
 
 class ReferencesInForce:
-    """Gap references in force: the newest stored reference, else that of the plant file.
+    """Gap references in force: the newest stored reference of a bearing, or its plant-file gaps.
 
     Parameters
     ----------
     monitors
-        Monitors by unit, built from the plant file; they receive new references.
+        Monitors by unit, built from the plant file; their descriptions receive new references.
     """
 
     def __init__(self, monitors: Mapping[str, HasUnit], store: Store, clock: Clock) -> None:
@@ -81,7 +81,7 @@ class ReferencesInForce:
         self._trouble = TroubleLog("references cannot be read", "references can be read again")
 
     def of(self, unit: str, bearing: str) -> GapReference | None:
-        """Return the stored reference of a bearing; None if the plant file's is in force."""
+        """Return the stored reference of a bearing; None if that of the plant file is in force."""
         return self._in_force.get((unit, bearing))
 
     def bearing(self, unit: str, bearing: str) -> Bearing:
@@ -151,7 +151,9 @@ class ReferenceRefusedError(Exception):
 
 
 def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
-    """Return given gaps in µm, checked against the probes of the bearing.
+    """Return gaps (x, y) in µm that a user entered, checked against the probes of the bearing.
+
+    ``near`` are gaps of the probes on the positive axes, ``opposite`` those of opposite probes.
 
     Raises
     ------
@@ -174,7 +176,7 @@ def given_gaps(bearing: Bearing, near: GivenPair, opposite: GivenPair) -> Gaps:
 
 
 def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) -> Gaps:
-    """Return the mean gaps in µm of the newest stored result.
+    """Return the mean gaps (x, y) in µm of the newest stored result of a bearing.
 
     Raises
     ------
@@ -193,7 +195,7 @@ def measured_gaps(bearing: Bearing, newest: StoredReadings | None, now_ns: int) 
 
 
 def doubts(newest: StoredReadings) -> list[str]:
-    """Return a warning for each gap that is usable but uncertain."""
+    """Return a warning for each gap of the newest result that is usable but uncertain."""
     gaps = {name: newest.readings.get(name) for name in (*NEAR_GAPS, *OPPOSITE_GAPS)}
     return [
         f"{name} is uncertain: {reading.quality.reason}"
@@ -203,7 +205,7 @@ def doubts(newest: StoredReadings) -> list[str]:
 
 
 def _across(bearing: Bearing, near: MicrometrePair, found: GivenPair) -> MicrometrePair | None:
-    """Return the gaps of the opposite probes; the value of an axis without one is a placeholder."""
+    """Return the gaps of opposite probes, with a placeholder for an axis without opposite probe."""
     if not any(opposite_axes(bearing)):
         return None
     unused = bearing.opposite_reference_um or near
@@ -233,7 +235,7 @@ def _usable(newest: StoredReadings, name: str) -> float:
 
 
 NOT_STEADY = (Reason.NON_STATIONARY, Reason.SPEED_IMPLAUSIBLE, Reason.FEW_SEGMENTS)
-"""Quality reasons with which an amplitude cannot be a reference."""
+"""Quality reasons with which an uncertain amplitude cannot be a reference."""
 
 
 class VectorRefusedError(Exception):
@@ -241,7 +243,7 @@ class VectorRefusedError(Exception):
 
 
 def measured_vectors(assessment: Assessment | None) -> VectorReference:
-    """Return the 1× vectors of a current result with its operating state.
+    """Return the 1× vectors of a current result as a reference for its operating state.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Alarms whose conditions are reported by components other than the monitors."""
+"""Alarms about units that no process analyses, and about refused stream messages."""
 
 from collections.abc import Iterable, Sequence
 
@@ -43,19 +43,22 @@ SHARED = "shared work"
 
 
 def is_shared(alarm: Alarm) -> bool:
-    """Return whether an alarm belongs to the process with the shared work."""
+    """Return whether an alarm belongs to the process that does the shared work of the plant."""
     return alarm.identity.kind == ANALYSIS_GONE
 
 
 def gone_alarms(units: Iterable[str]) -> ReportedAlarms:
-    """Return the alarms about units that no process analyses."""
+    """Return the alarms about missing analysis, one for each unit."""
     return ReportedAlarms(Watch(identity_of(unit), rule_of(0.0, 0.0), unit) for unit in units)
 
 
 def report_silence(
     alarms: ReportedAlarms, silent: Sequence[str], alive: Sequence[str], after_s: float
 ) -> None:
-    """Update the alarms of units that are analysed, and of units not analysed for `after_s` s."""
+    """Set the conditions of the alarms of ``silent`` and ``alive`` units.
+
+    A unit is silent if no process has analysed it for ``after_s`` seconds.
+    """
     reason = f"no sign of life for {after_s:g} s: is `padwatch analyse` running?"
     gone = Judgement(AlarmLevel.DANGER, reason=reason)
     for units, condition in ((silent, gone), (alive, WITHIN)):
@@ -72,11 +75,11 @@ REFUSED_FOR_S = 600.0
 """Duration of the alarm after the last refused message, s."""
 
 MAX_REASON = 200
-"""Maximum length of a reason, which may contain arbitrary text of a refused message."""
+"""Maximum number of characters of a reason, which may contain text of a refused message."""
 
 
 def stream_alarms(units: Iterable[str]) -> ReportedAlarms:
-    """Return the alarms about refused messages of units."""
+    """Return the alarms about refused stream messages, one for each unit."""
     alarms = ReportedAlarms(
         Watch(_refused(unit), rule_of(0.0, REFUSED_FOR_S), STREAM) for unit in units
     )
@@ -86,7 +89,7 @@ def stream_alarms(units: Iterable[str]) -> ReportedAlarms:
 
 
 def report_refused(alarms: ReportedAlarms, unit: str, reason: str) -> None:
-    """Report a refused message of a unit."""
+    """Raise the alarm about a refused stream message of a unit, with the reason."""
     words = "".join(c if c.isprintable() else "?" for c in reason[:MAX_REASON])
     alarms.report_event(_refused(unit).id, Judgement(AlarmLevel.ALERT, reason=words))
 

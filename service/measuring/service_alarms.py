@@ -38,7 +38,7 @@ class ServiceHealth:
     store_error
         Reason why the store refused the newest write; None if it was accepted.
     store_behind_s
-        Time that queued findings have waited without any write.
+        Time for which queued findings have waited without a successful write, s.
     n_unstored, unstored_reason
         Number of findings since the start that were not stored, and the newest reason.
     n_recordings_damaged
@@ -46,7 +46,7 @@ class ServiceHealth:
     accounts
         Sample account of each unit that has sent samples since the start.
     disk
-        Function that evaluates the fullest disk, given the previous level of the condition.
+        Function that judges the space on the fullest disk; argument: the previous alarm level.
     """
 
     readings: Mapping[str, float | str | None] = field(default_factory=dict)
@@ -71,7 +71,7 @@ class StreamStatus:
     trouble
         Function that returns the reason why no blocks arrive; None if they arrive.
     behind_s
-        Function that returns the age of the block analysed last.
+        Function that returns the delay of the block analysed last, s.
     """
 
     trouble: Callable[[], str | None]
@@ -81,7 +81,7 @@ class StreamStatus:
 log = structlog.get_logger()
 
 STEP_S = 0.5
-"""Smallest step of the clock, s, that is treated as a set clock; NTP slews smaller errors."""
+"""Clock step, s, above which the clock counts as set; NTP slews smaller errors."""
 
 
 class HostTime:
@@ -105,10 +105,10 @@ class HostTime:
 
 
 FULL_SHARE = 0.9
-"""Filled fraction of the queue above which acquisition is about to wait."""
+"""Filled fraction of the queue above which the alarm is a danger: acquisition will soon wait."""
 
 LOSS_MINUTES = 10
-"""Window of the fraction of lost samples, and duration of an alarm about lost results."""
+"""Window of the fraction of lost samples, and off-delay of alarms about lost results, minutes."""
 
 AT_ONCE, STEADY = rule_of(0.0, 0.0), rule_of(5.0, 30.0)
 
@@ -120,7 +120,7 @@ class ServiceRules:
     Parameters
     ----------
     store_behind
-        Limit of the time that results wait for the store, s.
+        Limit of the time for which results wait for the store, s.
     waiting
         Limits of the filled fraction of the queue to the analysis.
     delay
@@ -155,12 +155,12 @@ def service_rules_of(alarms: AlarmSettings) -> ServiceRules:
 
 
 def loss_key(unit: str) -> str:
-    """Return the key of a unit's lost-samples alarm."""
+    """Return the key of the alarm about lost samples of a unit."""
     return f"{SAMPLES_LOST}:{unit}"
 
 
 def reporting_unit(identity: AlarmIdentity) -> str:
-    """Return the unit whose process reports an alarm; for a lost-samples alarm, its subject."""
+    """Return the unit whose process reports an alarm: for lost samples, the alarm's subject."""
     return identity.subject if identity.kind == SAMPLES_LOST else identity.unit
 
 
@@ -180,7 +180,7 @@ class SampleLoss:
         self._seen: deque[tuple[int, int, int, int]] = deque()
 
     def share(self, account: SampleAccount, now_ns: int) -> float:
-        """Update from the unit's sample account and return the lost fraction."""
+        """Add the present state of the sample account and return the lost fraction, 0 to 1."""
         offered = account.n_offered
         lost = account.n_gap + sum(account.rejected.values())
         if self._seen and offered < self._seen[-1][1]:
@@ -195,7 +195,7 @@ class SampleLoss:
         return (lost - lost_then + n_dropped) / max(n_new + n_dropped, 1)
 
     def is_complete(self, now_ns: int) -> bool:
-        """Return whether the account covers the last ten minutes, up to one update period."""
+        """Return whether the observed time is ten minutes, except for one update period."""
         return bool(self._seen) and now_ns - self._seen[0][0] >= LOSS_NS - LOOK_EVERY_NS
 
 
@@ -290,7 +290,7 @@ class ServiceAlarms(AlarmBoard):
         return self._compared(name, reading)
 
     def _increase(self, name: str, n_found: int, level: AlarmLevel, reason: str) -> Judgement:
-        """Return the condition of a count that should not increase."""
+        """Return the condition of an alarm on a count: active if the count has increased."""
         n_more, self._counted[name] = n_found - self._counted.get(name, 0), n_found
         return Judgement(level, value=float(n_found), reason=reason) if n_more > 0 else WITHIN
 

@@ -1,4 +1,4 @@
-"""Simulated machines as sources: with constant films, or with a lifetime of wear and damage."""
+"""Simulated machines as sources: with constant films, or with a life of wear and damage."""
 
 from collections.abc import Mapping
 
@@ -34,25 +34,27 @@ NOISES = {"gap_noise_um_rms", "velocity_noise_mm_s_rms", "acceleration_noise_m_s
 """Setting keys of the transducer noise; without them, noise of real transducers is used."""
 
 MAX_MISFIT = 0.005
-"""Maximum relative difference between the settings of a unit and its simulated lifetime."""
+"""Maximum relative difference between the settings of a unit and those of its machine life."""
 
 
 def simulated_history(
     unit: UnitSettings, now_ns: int, years: float = 1.0
 ) -> Mapping[str, StiffnessHistory]:
-    """Return simulated past readings by bearing; empty if the unit has no simulated lifetime.
+    """Return simulated past readings by bearing; empty if the unit has no simulated machine life.
 
     Parameters
     ----------
     now_ns
-        End of the readings and start time of the simulated machine, whose samples continue them.
+        End of the readings, ns UTC, and start of the live samples of the same machine life.
+    years
+        Length of the history before `now_ns`.
 
     Raises
     ------
     ConfigError
-        If the settings of the unit do not fit its simulated lifetime.
+        If the settings of the unit do not fit its machine life.
     ValueError
-        If the simulated lifetime is shorter than `years`.
+        If the machine life is shorter than `years`.
     """
     simulation = unit.simulation
     if simulation is None or simulation.life_seed is None:
@@ -89,7 +91,7 @@ def _noise(simulation: SimulationSettings) -> TransducerNoise:
 
 
 def _refuse_misfit(unit: UnitSettings, simulation: SimulationSettings) -> None:
-    """Raise `ConfigError` if the settings of a unit do not fit its simulated lifetime."""
+    """Raise `ConfigError` if the settings of a unit do not fit its machine life."""
     speed_rpm = rated_speed_rpm(simulation.life_seed or 0)
     _compare(unit, "rated_speed_rpm", unit.rated_speed_rpm, speed_rpm)
     if unit.rated_power_mw is not None:
@@ -116,7 +118,7 @@ def simulated_feed(unit: UnitSettings, clock: Clock) -> SimulatedUnit:
     LookupError
         If the unit has no simulation settings.
     ConfigError
-        If the settings of the unit do not fit its simulated lifetime.
+        If the settings of the unit do not fit its machine life.
     """
     simulation, now_ns = unit.simulation, clock.now_ns()
     if simulation is None:
@@ -138,7 +140,7 @@ def scenario_of(simulation: SimulationSettings) -> Scenario:
     Raises
     ------
     LookupError
-        If the unit has a simulated lifetime instead.
+        If the unit has a machine life instead of constant films.
     """
     if simulation.speed_rpm is None or simulation.power_mw is None:
         raise LookupError("a simulated unit with a life has no constant scenario")

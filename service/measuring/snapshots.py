@@ -1,4 +1,4 @@
-"""Snapshots of unit states for publication, from the live objects of the analysing process."""
+"""Snapshots of unit states in an analysing process, for reports through the database."""
 
 from collections.abc import Sequence
 from dataclasses import fields, replace
@@ -14,7 +14,7 @@ from service.settings.units import UnitSettings
 
 
 def bearing_state(assessment: Assessment) -> BearingState:
-    """Return the state of a bearing: its result without arrays."""
+    """Return a result of a bearing without its arrays (spectrum, orbit)."""
     names = [each.name for each in fields(BearingState)]
     return BearingState(**{name: getattr(assessment, name) for name in names})
 
@@ -22,7 +22,7 @@ def bearing_state(assessment: Assessment) -> BearingState:
 def unit_state(
     settings: UnitSettings, live: LiveView, alarms: AlarmEngine, films: FilmMonitor
 ) -> UnitState:
-    """Return the state of a unit: results, alarms, films and baseline versions."""
+    """Return the state of a unit: newest results, alarms, films and baseline versions in force."""
     unit, bearings = settings.id, [bearing.id for bearing in settings.bearing]
     own = alarm_state(
         [alarm for alarm in alarms.alarms if reporting_unit(alarm.identity) == unit], alarms
@@ -39,7 +39,7 @@ def unit_state(
 
 
 def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
-    """Return a unit state with alarms only."""
+    """Return a unit state that contains only the given alarms."""
     return UnitState(
         bearings={},
         alarms=tuple(own),
@@ -51,12 +51,12 @@ def alarm_state(own: Sequence[Alarm], alarms: AlarmEngine) -> UnitState:
 
 
 def plant_signs(live: LiveView) -> UnitSigns:
-    """Return the live signs of the process itself: unstored findings and store error."""
+    """Return the `UnitSigns` of the process itself: unstored findings and store error."""
     return UnitSigns(UnitStatus(), None, {}, live.n_unstored, live.store_error)
 
 
 def unit_signs(settings: UnitSettings, live: LiveView) -> UnitSigns:
-    """Return the live signs of a unit: link state and ages of samples and results."""
+    """Return the `UnitSigns` of a unit: link state, and ages of samples and results."""
     unit = settings.id
     ages_s = {bearing.id: live.current(unit, bearing.id).age_s for bearing in settings.bearing}
     return UnitSigns(

@@ -41,7 +41,7 @@ ModbusSettings = (
 
 
 def polled_settings(device: MappedDeviceSettings) -> PolledSettings:
-    """Return the adapter settings of a device with a register map."""
+    """Return the settings of the Modbus adapter for a device with a register map."""
     return PolledSettings(
         **link_fields(device),
         poll_period_s=device.poll_period_s,
@@ -85,7 +85,7 @@ def modbus_source(
 def monitor_for(source: SourceSettings, unit: Unit, settings: AnalysisSettings) -> UnitMonitor:
     """Return the monitor of a unit that matches the kind of its source.
 
-    A poll of a polled device is a sample or a set of vectors.
+    With kind "modbus_polled" a poll is a sample; with "modbus_vector" it is a set of vectors.
     """
     match source:
         case ModbusVectorSettings():
@@ -124,7 +124,7 @@ QUEUE_RETRY_S = 0.25
 def watched_units(
     plant: PlantFile, source: Callable[[UnitSettings], SampleSource]
 ) -> dict[str, WatchedUnit]:
-    """Return the source and the monitor of every unit of a plant, by unit."""
+    """Return the source and the monitor of every unit of a plant, by unit id."""
     return {
         unit.id: WatchedUnit(source(unit), monitor_of(unit, plant.analysis), retry_s(unit))
         for unit in plant.unit
@@ -137,12 +137,12 @@ def monitor_of(unit: UnitSettings, analysis: AnalysisModel) -> UnitMonitor:
 
 
 def live_units(plant: PlantFile, clock: Clock) -> dict[str, WatchedUnit]:
-    """Return the units of the plant file with their sources and monitors, by unit."""
+    """Return the sources, with timed polls, and the monitors of all units of a plant, by unit."""
     return watched_units(plant, lambda unit: TimedSource(partial(source_of, unit), clock))
 
 
 def vector_rows(plant: PlantFile) -> dict[str, list[str]]:
-    """Return the channel of each row of the blocks of units whose devices deliver vectors."""
+    """Return, by unit, the channel of each row of the blocks, for devices that send vectors."""
     return {
         unit.id: [row.channel for row in unit.source.rows]
         for unit in plant.unit

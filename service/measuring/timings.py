@@ -1,4 +1,4 @@
-"""Measured durations of assessments and commits."""
+"""Measured durations of assessments (results of a bearing) and of database commits."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
@@ -12,15 +12,15 @@ from service.runtime.metrics import Durations
 from service.runtime.polls import TimedSource
 
 ASSESSMENT_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0)
-"""Histogram bounds of the duration of an assessment, which takes some milliseconds."""
+"""Histogram bounds of the duration of an assessment, s; typical are some milliseconds."""
 
 COMMIT_BOUNDS_S = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0)
-"""Histogram bounds of the duration of a commit, which waits for the disk and up to five seconds
-for the database lock."""
+"""Histogram bounds of the duration of a commit, s; a commit waits for the disk and up to five
+seconds for the database lock."""
 
 
 class Timings:
-    """Durations of assessments, by unit, and of commits."""
+    """Histograms of the durations of assessments, by unit, and of database commits."""
 
     def __init__(self, units: Iterable[str], clock: Clock) -> None:
         self._clock = clock
@@ -28,11 +28,11 @@ class Timings:
         self.commits = Durations(COMMIT_BOUNDS_S, clock)
 
     def begin(self) -> float:
-        """Return the time at which an assessment begins, for `assessed`."""
+        """Return the present monotonic time, s; the start of an assessment for `assessed`."""
         return self._clock.monotonic_s()
 
     def assessed(self, unit: str, began_s: float) -> None:
-        """Add the duration of an assessment that ends now."""
+        """Add the duration of an assessment that began at ``began_s`` and ends now."""
         self.assessments[unit].observe(self._clock.monotonic_s() - began_s)
 
 
@@ -60,7 +60,7 @@ class TimedMonitor(UnitMonitor):
 
 
 def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, WatchedUnit]:
-    """Return the units with timed monitors."""
+    """Return the units with each monitor replaced by a `TimedMonitor`."""
     return {
         unit: replace(watched, monitor=TimedMonitor(watched.monitor, timings))
         for unit, watched in units.items()
@@ -68,6 +68,6 @@ def timed(units: Mapping[str, WatchedUnit], timings: Timings) -> dict[str, Watch
 
 
 def timed_sources(units: Mapping[str, WatchedUnit]) -> dict[str, TimedSource]:
-    """Return the sources that measure their polls, by unit."""
+    """Return the sources that measure the durations of their polls, by unit."""
     sources = {unit: watched.source for unit, watched in units.items()}
     return {unit: each for unit, each in sources.items() if isinstance(each, TimedSource)}

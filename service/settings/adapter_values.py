@@ -112,10 +112,12 @@ def can_daq_of(
 
     Parameters
     ----------
+    feed
+        Simulated samples that the device sends.
     clock
         Clock that paces the device; if None, the device produces samples as fast as they are read.
     patient
-        Whether the device waits for a slow reader.
+        Whether the device waits for a slow reader instead of losing samples.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Table of all alarm kinds: kinds of the units and kinds of the service."""
+"""Table of all alarm kinds: alarms of the generating units, and alarms about the service itself."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -9,10 +9,10 @@ from core.alarms.kinds import AlarmKind, kind_table
 
 STORE, SERVICE, CAPTURES, DISK = "store", "service", "captures", "disk"
 RECORDINGS, STREAM, UNIT = "recordings", "stream", "unit"
-"""Subjects of alarms of the service; the subject `UNIT` stands for the id of a unit."""
+"""Subjects of alarms about the service; the subject `UNIT` stands for the id of a unit."""
 
 SAMPLES_LOST, ANALYSIS_GONE, MESSAGES_REFUSED = "samples_lost", "analysis_gone", "messages_refused"
-"""Kinds of the service with one alarm for each unit."""
+"""Alarm kinds of the service with one alarm for each unit."""
 
 OVERLOAD_ADVICE = "This computer is overloaded; stop other programs on it."
 
@@ -82,14 +82,14 @@ SERVICE_KINDS = kind_table(
 `ServiceHealth.readings`, whose value is compared with limits or is the text of a fault."""
 
 DANGER_KINDS = frozenset(("stored_data_damaged", "stream_away"))
-"""Kinds of the service whose fault is a danger; a fault of any other kind is an alert."""
+"""Alarm kinds of the service whose fault is a danger; a fault of other kinds is an alert."""
 
 ALARM_KINDS: Mapping[str, AlarmKind] = MappingProxyType({**units.ALARM_KINDS, **SERVICE_KINDS})
 
 SAMPLED_KINDS = frozenset(
     kind.name for kind in ALARM_KINDS.values() if kind.subject in (units.CHANNEL, units.BEARING)
 )
-"""Kinds of alarms about measured samples."""
+"""Names of the alarm kinds whose subject is a channel or a bearing."""
 
 if TYPE_CHECKING:
     AlarmKindName = str
@@ -99,13 +99,13 @@ else:
 
 
 def kind_label(kind: str) -> str:
-    """Return the label of an alarm kind; for an unknown kind, the name with spaces."""
+    """Return the label of an alarm kind; for an unknown kind, its name without underscores."""
     found = ALARM_KINDS.get(kind)
     return kind.replace("_", " ") if found is None else found.label
 
 
 def kind_words(kind: str) -> str:
-    """Return the label with a lower-case initial, such as "shaft vibration 1×, x"."""
+    """Return the label of an alarm kind with a lower-case initial: "shaft vibration 1×, x"."""
     label = kind_label(kind)
     return label[:1].lower() + label[1:]
 

@@ -23,13 +23,13 @@ class BearingAlarmSettings(Settings):
     """Alarm limits of a bearing; a quantity without limits raises no alarm."""
 
     shaft_order1_um_pk: AmplitudeLimitSettings | None = None
-    """Limits of the 1× amplitude of the relative shaft vibration, in x and in y each."""
+    """Limits of the 1× amplitude of the relative shaft vibration; they apply to x and to y."""
 
     shaft_overall_um_pp: SpanLimitSettings | None = None
-    """Limits of the relative shaft vibration, broad-band peak-to-peak, in x and in y each."""
+    """Limits of the relative shaft vibration, broad-band peak-to-peak; they apply to x and to y."""
 
     bearing_overall_mm_s_rms: VelocityLimitSettings | None = None
-    """Limits of the vibration velocity of the bearing, broad-band rms, in x and in y each."""
+    """Limits of the vibration velocity of the bearing, broad-band rms; they apply to x and to y."""
 
     eccentricity_ratio: EccentricityLimitSettings | None = None
     """Limits of the eccentricity ratio: eccentricity of the shaft over radial clearance."""
@@ -38,10 +38,12 @@ class BearingAlarmSettings(Settings):
     """Upper and lower limits of the mean gap of each probe."""
 
     shaft_order1_change_um_pk: VectorChangeLimitSettings | None = None
-    """Limits of the change of the shaft's 1× vector from its reference, in x and in y each."""
+    """Limits of the change of the shaft's 1× vector from its reference; they apply to x and to
+    y."""
 
     bearing_order1_change_um_pk: VectorChangeLimitSettings | None = None
-    """Limits of the change of the bearing's 1× vector from its reference, in x and in y each."""
+    """Limits of the change of the bearing's 1× vector from its reference; they apply to x and to
+    y."""
 
     order1_reference: Annotated[tuple[VectorReferenceSettings, ...], Field(max_length=6)] = ()
     """Reference 1× vectors of the healthy machine, by operating state. A reference that an engineer
@@ -67,11 +69,11 @@ class AlarmSettings(Settings):
     """Delays and limits of alarms that apply to all units."""
 
     channel_on_delay_s: DelayS = 0.5
-    """Time for which a channel must be bad to raise its alarm, s, in time of the samples."""
+    """Time for which a channel must be bad to raise its alarm, s, by the times of the samples."""
 
     slow_channel_on_delay_s: DelayS = 5.0
-    """Time for which a slow channel that a limit depends on must be bad to raise its alarm, s, in
-    time of the samples."""
+    """Time for which a slow channel that a limit depends on must be bad to raise its alarm, s, by
+    the times of the samples."""
 
     channel_off_delay_s: DelayS = 10.0
     """Time for which a channel must be good again for the alarm to return, s."""
@@ -80,7 +82,7 @@ class AlarmSettings(Settings):
     """Time without samples after which the link to a device counts as lost, s."""
 
     clock: Literal["judged", "ignored"] = "judged"
-    """Whether the clocks of the devices are "judged" against the clock of this host or
+    """Whether the clocks of the devices are compared with the clock of this host ("judged") or
     "ignored"."""
 
     max_clock_offset_s: Annotated[float, Field(gt=0.0, le=1e9)] = 2.0

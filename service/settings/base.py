@@ -11,7 +11,7 @@ CONTROL = re.compile(r"[\x00-\x08\x0a-\x1f\x7f-\x9f]")
 
 
 class MisfitError(ValueError):
-    """Validation error: a value is wrong, or contradicts other values of the file.
+    """Validation error: a value is invalid, or contradicts other values of the file.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Settings(BaseModel):
 
 
 def refuse_twice(entries: Iterable[tuple[int | str, ...]]) -> None:
-    """Refuse duplicate values; each entry is the location of a value, followed by the value."""
+    """Raise `MisfitError` if a value occurs twice; an entry is a location followed by its value."""
     seen: set[int | str] = set()
     for *at, value in entries:
         if value in seen:
@@ -62,7 +62,7 @@ def refuse_twice(entries: Iterable[tuple[int | str, ...]]) -> None:
 
 
 def refuse_unknown_units(units: Iterable[str], known: Iterable[str], *at: int | str) -> None:
-    """Refuse the id of a unit that is not in the plant file."""
+    """Raise `MisfitError` if one of ``units``, a list at location ``at``, is not ``known``."""
     for n, unit in enumerate(units):
         if unit not in known:
             raise MisfitError(f"is no unit of this plant, it has {', '.join(known)}", *at, n)

@@ -31,7 +31,7 @@ class BearingSettings(Settings):
 
     bracket_stiffness_n_per_m: Annotated[float, Field(ge=1e7, le=1e12)]
     """Radial stiffness of the bracket in N/m, between 1e7 and 1e12; example: 1.18e9. Every result
-    of equation (5) is proportional to the bracket stiffness."""
+    of equation (5) of Brito et al. is proportional to the bracket stiffness."""
 
     clearance_um: Annotated[float, Field(ge=20.0, le=5000.0)]
     """Radial clearance in operation in µm, 20 to 5000; example: 200.0."""
@@ -80,21 +80,21 @@ class BearingSettings(Settings):
     [1980.0, 2010.0]."""
 
     gap_reference_uncertainty_um: Annotated[float, Field(ge=0.0, le=1000.0)] = 5.0
-    """Half-width of the error of the reference gaps, µm."""
+    """Half-width of the error interval of the reference gaps, µm."""
 
     thermal_growth_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 50.0
-    """Half-width of the common thermal growth of all gaps since the reference gaps were measured,
-    µm; used without opposite probes."""
+    """Half-width of the interval of the common thermal growth of all gaps since the reference gaps
+    were measured, µm; used without opposite probes."""
 
     thermal_growth_change_um: Annotated[float, Field(ge=0.0, le=5000.0)] = 20.0
-    """Half-width of the change of thermal growth since the last measurement with opposite probes,
-    µm."""
+    """Half-width of the interval of the change of thermal growth since the last measurement with
+    opposite probes, µm."""
 
     clearance_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.05
-    """Half-width of the relative error of the clearance."""
+    """Half-width of the relative error interval of the clearance."""
 
     bracket_stiffness_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.10
-    """Half-width of the relative error of the bracket's stiffness; example: 0.10."""
+    """Half-width of the relative error interval of the bracket's stiffness; example: 0.10."""
 
     bracket_mass_kg: Annotated[float, Field(gt=0.0, le=1e7)] | None = None
     """Effective mass of bracket and bearing, kg; by default the estimator "dynamic" fits the mass
@@ -102,22 +102,22 @@ class BearingSettings(Settings):
     mass. Example: 45.0e3."""
 
     bracket_mass_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.2
-    """Half-width of the relative error of bracket_mass_kg; example: 0.2."""
+    """Half-width of the relative error interval of bracket_mass_kg; example: 0.2."""
 
     bracket_damping_n_s_per_m: Annotated[float, Field(ge=0.0, le=1e10)] = 0.0
     """Damping of the bracket in N·s/m; 0 if unknown."""
 
     bracket_damping_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.02
-    """Half-width of the error of the bracket's damping, as a share of critical damping; example:
-    0.02."""
+    """Half-width of the error interval of the bracket's damping, as a share of critical damping;
+    example: 0.02."""
 
     cross_coupling_uncertainty: Annotated[float, Field(ge=0.0, lt=1.0)] = 0.3
-    """Half-width of the ratio of cross-coupled to direct film stiffness. The transfer estimators
-    and equation (5) neglect the cross-coupled stiffness. Example: 0.3."""
+    """Half-width of the interval, around 0, of the ratio of cross-coupled to direct film stiffness.
+    The transfer estimators and equation (5) neglect the cross-coupled stiffness. Example: 0.3."""
 
     delay_uncertainty_s: Annotated[float, Field(ge=0.0, le=0.1)] = 2e-4
-    """Half-width of the unknown delay of the bearing channels relative to the shaft channels, s;
-    known delays are set by delay_s of a channel. Example: 0.0002."""
+    """Half-width of the interval of the unknown delay of the bearing channels relative to the shaft
+    channels, s; known delays are set by delay_s of a channel. Example: 0.0002."""
 
     runout_um_pk: Annotated[float, Field(ge=0.0, le=1000.0)] = 6.0
     """Maximum runout of the shaft surface at 1×, µm zero-to-peak. The runout increases the

@@ -18,7 +18,7 @@ ProbeName = Annotated[str, StringConstraints(min_length=1, max_length=80)]
 
 
 class SlowRollSettings(Settings):
-    """Slow-roll vector: 1× reading of a probe at a speed that is too low for vibration."""
+    """Slow-roll vector: 1× runout at a shaft probe, measured at a speed too low for vibration."""
 
     um_pk: Annotated[float, Field(ge=0.0, le=1000.0)]
     """Amplitude, µm zero-to-peak; example: 8.0."""
@@ -40,7 +40,7 @@ class SlowRollSettings(Settings):
     Example: "SN123"."""
 
     def vector(self, channel: str) -> SlowRollVector:
-        """Return the vector as a value of core."""
+        """Return the settings as the `SlowRollVector` of a channel."""
         return SlowRollVector(
             channel=channel,
             probe=self.probe,
@@ -61,7 +61,7 @@ class Transducer(StrEnum):
 
 
 class SensitivityUnit(StrEnum):
-    """Unit of a sensitivity."""
+    """Unit of a transducer's sensitivity."""
 
     V_PER_MM = "V/mm"
     MV_PER_UM = "mV/um"
@@ -111,7 +111,7 @@ LINE_FLOORS = {
     Transducer.ACCELEROMETER: 2e-5,
     Transducer.KEY_PHASE: 0.0,
 }
-"""Noise amplitude of each transducer in a spectral line, zero-to-peak in µm, mm/s or m/s²."""
+"""Default noise amplitude of a spectral line by transducer, zero-to-peak in µm, mm/s or m/s²."""
 
 SHAFT_TRANSDUCERS = (Transducer.PROXIMITY_PROBE, Transducer.DISPLACEMENT)
 """Transducers that measure shaft motion and therefore also runout."""
@@ -264,7 +264,7 @@ class ChannelSettings(Settings):
 
     @property
     def unit_per_v(self) -> float:
-        """Engineering units per volt, or per count; 1 for a key_phase in volts."""
+        """Engineering units per volt, or per count; 1 V per volt for a key_phase in volts."""
         if self.unit_per_count is not None:
             return self.unit_per_count
         if self.sensitivity is None or self.sensitivity_unit is None:
@@ -273,7 +273,7 @@ class ChannelSettings(Settings):
 
     @property
     def scale(self) -> dict[str, float]:
-        """Full scale, engineering units per volt, and OK limits; scaled counts count as volts."""
+        """Arguments of `ChannelCalibration`; with `unit_per_count`, one count is treated as 1 V."""
         full_scale, low, high = (getattr(self, key) for key in SCALE_KEYS_V)
         if self.unit_per_count is not None:
             limits = (
@@ -289,7 +289,7 @@ class ChannelSettings(Settings):
 
     @property
     def floor(self) -> float:
-        """Noise amplitude of a line: `line_floor`, or the default of the transducer."""
+        """Value of `line_floor`; by default the noise of a spectral line of the transducer."""
         return LINE_FLOORS[self.transducer] if self.line_floor is None else self.line_floor
 
     @property
@@ -301,7 +301,7 @@ class ChannelSettings(Settings):
 
 
 class SlowChannelSettings(Settings):
-    """Settings of a slow channel; slow channels are listed in the order of the device."""
+    """Settings of a slow channel (no waveform); slow channels are in the order of the device."""
 
     id: Identifier
     """Id of the slow channel, unique within the unit; example: "ujb_oil_temperature"."""

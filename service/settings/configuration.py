@@ -30,7 +30,10 @@ class Configuration:
 
 
 def configuration_of(plant: PlantFile, program: str, commit: str | None) -> Configuration:
-    """Return the configuration document of a plant file, without secrets."""
+    """Return the configuration document of a plant file, without secrets.
+
+    ``program`` is the version of padwatch; ``commit`` is its Git commit, or None if unknown.
+    """
     settings = without_secrets(plant.model_dump(mode="json"))
     document = {"format": FORMAT, "version": 1, "padwatch": program, "commit": commit}
     return Configuration(canonical(document | {"settings": settings}))

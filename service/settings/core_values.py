@@ -1,4 +1,4 @@
-"""Conversion of settings to values of core: machine, calibration, analysis and alarm rules."""
+"""Conversion of settings to the objects of the analysis: machine, calibration, alarm rules."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -34,7 +34,7 @@ from service.settings.units import UnitSettings
 
 
 def machine_of(settings: UnitSettings) -> Unit:
-    """Return the generating unit as a value of core."""
+    """Return the settings of a generating unit as a `Unit`."""
     return Unit(
         id=settings.id,
         rated_speed_rpm=settings.rated_speed_rpm,
@@ -86,7 +86,7 @@ def _gap_accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> GapAc
 
 
 def _accuracy(settings: BearingSettings, gain: Mapping[str, float]) -> BearingAccuracy:
-    """Return the accuracy of a bearing; the less accurate transducer of x and y determines it."""
+    """Return the accuracy of a bearing, by its less accurate transducer of x and y."""
     return BearingAccuracy(
         shaft_gain=max(gain[settings.shaft_x], gain[settings.shaft_y]),
         bearing_gain=max(gain[settings.bearing_x], gain[settings.bearing_y]),
@@ -110,7 +110,7 @@ def calibration_of(settings: UnitSettings) -> UnitCalibration:
 
 
 def analysis_of(settings: AnalysisModel) -> AnalysisSettings:
-    """Return the settings of segments, averaging and assessment as a value of core."""
+    """Return the settings of segments, averaging and estimation as `AnalysisSettings`."""
     dynamic = settings.dynamic
     noise = dynamic.probe_noise_um2_per_hz
     return AnalysisSettings(
@@ -135,7 +135,7 @@ ZONE_DEADBAND = 0.05
 
 
 def rules_of(unit: UnitSettings, alarms: AlarmSettings, origin: Origin) -> UnitRules:
-    """Return the alarm rules of a unit; without link and clock rules for a replay."""
+    """Return the alarm rules of a unit; a replay has no rules for link and clock."""
     is_live = origin is Origin.LIVE
     is_judged = is_live and alarms.clock == "judged"
     return UnitRules(
@@ -155,7 +155,7 @@ def chatter_rule_of(alarms: AlarmSettings) -> ChatterRule:
 
 
 def references_of(unit: UnitSettings) -> list[VectorReference]:
-    """Return the 1× reference vectors of a unit in the plant file, by bearing and state."""
+    """Return the 1× reference vectors of a unit, one entry for each bearing and operating state."""
     return [
         VectorReference(unit.id, bearing.id, state, vectors)
         for bearing in unit.bearing

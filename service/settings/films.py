@@ -18,18 +18,21 @@ class ChangeLimitSettings(Settings):
     """Magnitude, significance and duration of a stiffness change that raises an alarm."""
 
     alert_change: Share = ChangeLimits.alert_change
-    """Limit of the stiffness change in either direction, as a natural logarithm (0.035 is 3.5 %); a
-    change that exceeds the limit by one standard uncertainty is an alert."""
+    """Limit of a stiffness increase or decrease, as the natural logarithm of the ratio to the
+    baseline (0.035 is 3.5 %). A change that exceeds the limit by one standard uncertainty is an
+    alert."""
 
     danger_change: Share = ChangeLimits.danger_change
-    """Limit of the stiffness change, as a natural logarithm; a change that exceeds the limit by
-    three standard uncertainties is a danger. Must be above alert_change; example: 0.15."""
+    """Limit of a stiffness change, as alert_change; a change that exceeds the limit by three
+    standard uncertainties is a danger. Must be above alert_change; example: 0.15."""
 
     deadband: Share = ChangeLimits.deadband
-    """Amount by which a change must fall below its limit to leave the level; example: 0.01."""
+    """Amount, as a natural logarithm, by which a change must fall below its limit for the alarm
+    level to end; example: 0.01."""
 
     significance: Annotated[float, Field(gt=0.0, le=100.0)] = ChangeLimits.significance
-    """Minimum ratio of the mean change to its standard uncertainty, for a mean over four hours."""
+    """Minimum ratio of the mean change to its standard uncertainty for an alarm, for a mean over
+    four running hours."""
 
     significance_fall: Annotated[float, Field(gt=0.0, le=10.0)] = ChangeLimits.significance_fall
     """Reduction of the ratio `significance` for each fourfold increase of the averaging time."""
@@ -52,12 +55,12 @@ class ChangeLimitSettings(Settings):
         return self
 
     def limits(self) -> ChangeLimits:
-        """Return the change limits as a value of core; latching is a setting of the alarm."""
+        """Return the settings as `ChangeLimits`."""
         return ChangeLimits(**self.model_dump())
 
 
 class BaselineModel(Settings):
-    """Condition cells, and requirements for learning a baseline."""
+    """Settings of condition cells, and requirements for learning a baseline."""
 
     eccentricity_width: Annotated[float, Field(ge=0.005, le=0.5)] = CellGrid.eccentricity_width
     """Width of a condition cell in eccentricity ratio; example: 0.05."""
@@ -73,17 +76,19 @@ class BaselineModel(Settings):
     """Whether the baseline depends on the attitude angle."""
 
     min_readings: Annotated[int, Field(ge=1, le=100_000)] = BaselineSettings.min_readings
-    """Minimum number of readings for a cell to have its own support in the baseline."""
+    """Minimum number of readings in a condition cell for the baseline to apply there without
+    support by neighbouring cells."""
 
     min_days: Annotated[int, Field(ge=1, le=1000)] = BaselineSettings.min_days
-    """Minimum number of days with readings for a cell to have its own support in the baseline."""
+    """Minimum number of days with readings in a condition cell for the baseline to apply there
+    without support by neighbouring cells."""
 
     min_learning_days: Annotated[int, Field(ge=1, le=3650)] = BaselineSettings.min_learning_days
     """Minimum number of days with readings before the first baseline."""
 
     max_surface_std: Annotated[float, Field(gt=0.0, le=1.0)] = BaselineSettings.max_surface_std
-    """Standard uncertainty of the expected stiffness, as a natural logarithm, above which a
-    condition is not supported by the baseline."""
+    """Standard uncertainty of the expected stiffness, as a natural logarithm, above which the
+    baseline does not apply to an operating condition."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -93,7 +98,7 @@ class BaselineModel(Settings):
         return self
 
     def settings(self, reading_h: float = BaselineSettings.reading_h) -> BaselineSettings:
-        """Return the baseline settings as a value of core, for readings of `reading_h` each."""
+        """Return the settings as `BaselineSettings`; ``reading_h`` is the interval of readings."""
         rest = self.model_dump(exclude=set(GRID_KEYS))
         grid = CellGrid(*(getattr(self, key) for key in GRID_KEYS))
         return BaselineSettings(grid=grid, reading_h=reading_h, **rest)
@@ -153,7 +158,7 @@ class OperatingModel(Settings):
         return self
 
     def limits(self, rated_speed_rpm: float, rated_power_mw: float) -> OperatingLimits:
-        """Return the operating limits of a machine as a value of core."""
+        """Return the settings as `OperatingLimits` of a machine with this rated speed and power."""
         return OperatingLimits(rated_speed_rpm, rated_power_mw, **self.model_dump())
 
 
@@ -167,8 +172,8 @@ class FilmAlarmSettings(Settings):
     """Settings of stiffness baselines by condition, and of alarms of stiffness change."""
 
     reading_period_s: Annotated[float, Field(ge=1.0, le=3600.0)] = 600.0
-    """Interval between film readings, s; at least one averaging time, so that readings are
-    independent."""
+    """Interval between film readings, s; should be at least the averaging time, so that readings
+    are independent."""
 
     time_lapse: Annotated[float, Field(ge=1.0, le=1000.0)] = 1.0
     """Factor by which running hours are accelerated, for demonstrations only."""
@@ -207,5 +212,5 @@ class FilmAlarmSettings(Settings):
 
     @property
     def reading_h(self) -> float:
-        """Running hours per reading."""
+        """Interval between film readings, in running hours."""
         return self.reading_period_s * self.time_lapse / 3600.0

@@ -1,4 +1,4 @@
-"""Alarm limits: alert and danger limits, limit tables by condition, ISO 20816-5 zones."""
+"""Settings of alarm limits, of limits by operating condition, and of ISO 20816-5 zones."""
 
 import math
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ from core.condition.operating_state import OperatingState
 from service.settings.base import MisfitError, Settings, refuse_twice
 
 DelayS = Annotated[float, Field(ge=0.0, le=86_400.0)]
-"""Delay in seconds, at most a day."""
+"""Delay, 0 to 86400 s (one day)."""
 
 StateName = Literal["standstill", "run_up", "speed_no_load", "part_load", "full_load", "run_down"]
 
@@ -31,18 +31,21 @@ Bounds = tuple[float, float]
 
 
 class RegionSettings(Settings):
-    """Region of the operating conditions, such as a condition cell; ranges are [from, up to)."""
+    """Region of operating conditions, such as a condition cell; ranges exclude the upper end."""
 
     states: StateNames | None = None
 
     eccentricity_ratio: Annotated[Bounds, Field(examples=[[0.6, 0.7]])] | None = None
-    """Range of the eccentricity ratio, within 0 to 5; any by default; example: [0.35, 0.4]."""
+    """Range of the eccentricity ratio, within 0 to 5; not limited by default; example:
+    [0.35, 0.4]."""
 
     oil_temperature_c: Annotated[Bounds, Field(examples=[[45.0, 47.5]])] | None = None
-    """Range of oil temperature, °C, within -50 to 200; any by default; example: [45.0, 47.5]."""
+    """Range of the oil temperature, °C, within -50 to 200; not limited by default; example:
+    [45.0, 47.5]."""
 
     attitude_deg: Annotated[Bounds, Field(examples=[[0.0, 90.0]])] | None = None
-    """Range of attitude angle, degrees, within 0 to 360; any by default; example: [0.0, 90.0]."""
+    """Range of the attitude angle, degrees, within 0 to 360; not limited by default; example:
+    [0.0, 90.0]."""
 
     @model_validator(mode="after")
     def _check_region(self) -> Self:
@@ -54,7 +57,7 @@ class RegionSettings(Settings):
         return self
 
     def region(self, states: StateNames) -> Region:
-        """Return the region as a value of core; ``states`` apply if the region has no states."""
+        """Return the settings as a `Region`; ``states`` apply if the region has no states."""
         return Region(states_of(self.states or states), *(getattr(self, key) for key in RANGES))
 
 
@@ -67,7 +70,7 @@ RANGES = {
 
 
 def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None:
-    """Refuse overlapping tables; a table without states applies in ``states``."""
+    """Raise `MisfitError` if two tables overlap; a table without states applies in ``states``."""
     regions = [table.region(states) for table in tables]
     for n, m in combinations(range(len(tables)), 2):
         if regions[n].overlaps(regions[m]):
@@ -75,11 +78,11 @@ def refuse_overlap(tables: Sequence[RegionSettings], states: StateNames) -> None
 
 
 class WatchSettings(Settings):
-    """Delays and latching of the alarm of a measurement."""
+    """Delays and latching of the alarm on one measured quantity."""
 
     on_delay_s: DelayS = 10.0
-    """Time for which the limit must be exceeded to raise the alarm, s, in time of the samples;
-    results are computed once per refresh."""
+    """Time for which the limit must be exceeded to raise the alarm, s, by the times of the samples.
+    Results are computed once per hop of the segments."""
 
     off_delay_s: DelayS = 30.0
     """Time for which the value must be within the limit again for the alarm to return, s."""
@@ -89,32 +92,33 @@ class WatchSettings(Settings):
 
 
 class LimitTableSettings(RegionSettings):
-    """Limits in a region of the operating conditions; a missing value is that of the main limit."""
+    """Limits in one region of operating conditions; keys not given are those of the main table."""
 
     states: StateNames | None = None
-    """Operating states in which these limits apply; by default the states of the limit."""
+    """Operating states in which these limits apply; by default `states` of the main table."""
 
     alert: float | None = None
-    """Alert limit in this region; see `alert` of the limit."""
+    """Alert limit in this region; by default `alert` of the main table."""
 
     danger: float | None = None
-    """Danger limit in this region; see `danger` of the limit."""
+    """Danger limit in this region; by default `danger` of the main table."""
 
     alert_below: float | None = None
-    """Lower alert limit in this region, for gaps only; see `alert_below` of the limit."""
+    """Lower alert limit in this region, for gaps only; by default `alert_below` of the main
+    table."""
 
     danger_below: float | None = None
-    """Lower danger limit in this region, for gaps only; see `danger_below` of the limit."""
+    """Lower danger limit in this region, for gaps only; by default that of the main table."""
 
     deadband: float | None = None
-    """Deadband in this region; see `deadband` of the limit."""
+    """Deadband in this region; by default `deadband` of the main table."""
 
 
 LIMITS = ("alert", "danger", "alert_below", "danger_below", "deadband")
 
 
 class LimitSettings(WatchSettings):
-    """Alarm limits of a measured value; alert, danger or both must be given."""
+    """Main table of alarm limits of a measured value; alert, danger or both must be given."""
 
     alert: float | None
     danger: float | None
@@ -127,7 +131,7 @@ class LimitSettings(WatchSettings):
 
     table: Annotated[tuple[LimitTableSettings, ...], Field(max_length=100)] = ()
     """Different limits for individual operating states or condition cells; at most 100 tables.
-    While the condition is unknown, all tables that may apply are evaluated."""
+    While the operating condition is unknown, all tables that may apply are evaluated."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -146,7 +150,7 @@ class LimitSettings(WatchSettings):
         return self
 
     def within(self, table: LimitTableSettings) -> Self:
-        """Return the limits in the region of a table, completed by the values of the main limit."""
+        """Return the limits of a table, completed by the keys of this main table."""
         own = {key: getattr(self, key) for key in LIMITS if hasattr(self, key)}
         given = {key: getattr(table, key) for key in LIMITS if getattr(table, key) is not None}
         return type(self).model_validate(own | given)
@@ -163,7 +167,7 @@ class LimitSettings(WatchSettings):
 
 
 class AmplitudeLimitSettings(LimitSettings):
-    """Limits of the 1× amplitude of a shaft; for information, padwatch is no protection system."""
+    """Alarm limits of the 1× amplitude of a shaft; they do not replace a protection system."""
 
     alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
     """Value above which the alarm is an alert, µm zero-to-peak; example: 150.0."""
@@ -177,7 +181,7 @@ class AmplitudeLimitSettings(LimitSettings):
 
 
 class SpanLimitSettings(LimitSettings):
-    """Limits of the broad-band relative vibration of a shaft, peak-to-peak."""
+    """Alarm limits of the broad-band relative vibration of a shaft, peak-to-peak."""
 
     alert: Annotated[float, Field(gt=0.0, le=10_000.0)] | None = None
     """Value above which the alarm is an alert, µm peak-to-peak; example: 300.0."""
@@ -191,7 +195,7 @@ class SpanLimitSettings(LimitSettings):
 
 
 class VelocityLimitSettings(LimitSettings):
-    """Limits of the broad-band vibration velocity of a bearing."""
+    """Alarm limits of the broad-band vibration velocity of a bearing."""
 
     alert: Annotated[float, Field(gt=0.0, le=1000.0)] | None = None
     """Value above which the alarm is an alert, mm/s rms; example: 2.0."""
@@ -204,7 +208,7 @@ class VelocityLimitSettings(LimitSettings):
 
 
 class EccentricityLimitSettings(LimitSettings):
-    """Limits of the eccentricity ratio: eccentricity of the shaft over radial clearance."""
+    """Alarm limits of the eccentricity ratio: eccentricity of the shaft over radial clearance."""
 
     alert: Annotated[float, Field(gt=0.0, le=5.0)] | None = None
     """Value above which the alarm is an alert; example: 0.7."""
@@ -217,7 +221,10 @@ class EccentricityLimitSettings(LimitSettings):
 
 
 class VectorChangeLimitSettings(LimitSettings):
-    """Limits of the change of a 1× vector from its reference; without a phase, of its amplitude."""
+    """Alarm limits of the change of a 1× vector from its reference.
+
+    Without a phase, the limits apply to the change of the 1× amplitude.
+    """
 
     alert: Annotated[float, Field(gt=0.0, le=5000.0)] | None = None
     """Value above which the alarm is an alert, µm zero-to-peak; example: 30.0."""
@@ -231,7 +238,7 @@ class VectorChangeLimitSettings(LimitSettings):
 
 
 class TemperatureLimitSettings(LimitSettings):
-    """Limits of an oil temperature; the bearing must set its slow channel, oil_temperature."""
+    """Alarm limits of the oil temperature; the bearing must have the key oil_temperature."""
 
     alert: Annotated[float, Field(gt=0.0, le=200.0)] | None = None
     """Value above which the alarm is an alert, °C; example: 65.0."""
@@ -251,7 +258,7 @@ GapUm = Annotated[float, Field(gt=0.0, le=10_000.0)]
 
 
 class GapLimitSettings(LimitSettings):
-    """Upper and lower limits of the mean gap of each probe, within the range of the probe."""
+    """Upper and lower alarm limits of the mean gap of each probe."""
 
     alert: GapUm | None = None
     """Gap above which the alarm is an alert, µm; example: 2400.0."""
@@ -290,11 +297,11 @@ Boundary = Annotated[float, Field(gt=0.0, le=10_000.0)]
 
 
 class ZoneTableSettings(RegionSettings):
-    """Zone boundaries for a region of the operating conditions."""
+    """Zone boundaries for one region of the operating conditions."""
 
     states: StateNames = AT_SPEED
     """Operating states in which the boundaries apply. In a condition without a table the alarm is
-    suppressed by design; while the condition is unknown, the strictest of the tables that may apply
+    suppressed by design. While the condition is unknown, the strictest of the tables that may apply
     is used."""
 
     a_b: Boundary
@@ -307,8 +314,8 @@ class ZoneTableSettings(RegionSettings):
     """Boundary between zones C and D, above b_c; above this boundary the alarm is a danger."""
 
     deadband: Annotated[float, Field(ge=0.0, le=10_000.0)] | None = None
-    """Amount by which the value must fall below a boundary to leave the zone; a twentieth of a_b by
-    default; example: 5.0."""
+    """Amount by which the value must fall below a boundary to leave the zone, in the unit of the
+    measurement; a twentieth of a_b by default; example: 5.0."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -335,30 +342,34 @@ class ZoneSettings(WatchSettings):
 
 
 class ZonesSettings(Settings):
-    """Evaluation zones by measured quantity; the values of ISO 20816-5 are not included."""
+    """Evaluation zones by measured quantity; the boundaries of ISO 20816-5 are not built in."""
 
     shaft_um_pp: ZoneSettings | None = None
-    """Zones of the relative shaft displacement, µm peak-to-peak, in x and in y each."""
+    """Zones of the relative shaft displacement, µm peak-to-peak, evaluated in x and in y."""
 
     shaft_max_um_pk: ZoneSettings | None = None
     """Zones of the maximum shaft displacement from its mean position in any direction, µm
     zero-to-peak."""
 
     bearing_mm_s_rms: ZoneSettings | None = None
-    """Zones of the vibration velocity of the bearing housing, mm/s rms, in x and in y each."""
+    """Zones of the vibration velocity of the bearing housing, mm/s rms, evaluated in x and
+    in y."""
 
 
 MAX_UM_PK, FULL_TURN_DEG = 5000.0, 360.0
 
 Vector = Annotated[tuple[float, ...], Field(min_length=1, max_length=2)]
-"""1× vector, [amplitude] or [amplitude, phase]: µm zero-to-peak, degrees of lead to the
-key-phase."""
+"""1× vector, [amplitude] or [amplitude, phase]: amplitude in µm zero-to-peak, phase in degrees,
+positive for lead relative to the key-phase pulse."""
 
 PLACES = ("shaft_x", "shaft_y", "bearing_x", "bearing_y")
 
 
 class VectorReferenceSettings(Settings):
-    """Reference 1× vectors of a healthy bearing, each [amplitude] or [amplitude, phase]."""
+    """Reference 1× vectors of a healthy bearing, each [amplitude] or [amplitude, phase].
+
+    The amplitude is in µm zero-to-peak; the phase is in degrees, positive for lead.
+    """
 
     states: StateNames = AT_SPEED
     """Operating states in which the reference applies."""

@@ -102,7 +102,7 @@ class ReceiverSettings(Settings):
     """Alarm kinds that are sent; all kinds by default. Example: ["link_lost"]."""
 
     changes: Annotated[tuple[AlarmChange, ...], Field(min_length=1)] = DEFAULT_CHANGES
-    """Alarm changes that are sent."""
+    """Alarm changes that are sent; by default raised, escalated, eased and returned."""
 
     lowest_priority: Literal["alert", "danger"] = "alert"
     """Lowest priority that is sent: "alert" sends all alarms, "danger" only alarms that are, or
@@ -133,7 +133,7 @@ class ReceiverSettings(Settings):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the queues of this receiver in the outbox: its id."""
+        """Names of the queues of this receiver in the outbox: one queue, named by its id."""
         return (self.id,)
 
 
@@ -164,7 +164,7 @@ class WebhookSettings(ReceiverSettings):
 
 
 class SmtpSettings(ReceiverSettings):
-    """Settings of a mail server, by which each event is sent as a mail to every recipient."""
+    """Settings of a mail server, which sends a mail about each event to every recipient."""
 
     kind: Literal["smtp"]
     """Kind of the receiver, always "smtp"."""
@@ -214,7 +214,7 @@ if TYPE_CHECKING:
     ChannelKind = str
 else:
     ChannelKind = Literal[tuple(t.model_fields["kind"].annotation for t in get_args(AnyReceiver))]
-"""Kind of a receiver."""
+"""Kind of a receiver, "webhook" or "smtp"."""
 
 
 class DeliverySettings(Settings):

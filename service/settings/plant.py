@@ -33,7 +33,7 @@ Count = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 class SpectraSettings(Settings):
-    """Spectra stored for each bearing: recent spectra at short intervals, older at long intervals.
+    """Settings of stored spectra: recent ones at short intervals, older ones at long intervals.
 
     A spectrum up to 25 Hz at the default settings takes 4 kB of disk space.
     """
@@ -52,7 +52,7 @@ class SpectraSettings(Settings):
     GB."""
 
     n_lines: Annotated[int, Field(ge=8, le=20_000)] = 1000
-    """Maximum number of stored lines of a spectrum, from the lowest frequency."""
+    """Maximum number of stored lines of a spectrum, counted from the lowest frequency."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -71,7 +71,7 @@ MIN_SPECTRUM_ORDERS = 2
 
 
 class PlantSettings(Settings):
-    """Settings of the plant."""
+    """Settings of the power plant as a whole."""
 
     name: Annotated[str, StringConstraints(min_length=1, max_length=80)]
     """Name of the plant, shown on every page of the dashboard; example: "Itaipu"."""
@@ -99,8 +99,8 @@ class ServiceSettings(Settings):
     """Folder of the database and other stored data, relative to the working directory."""
 
     hosts: Annotated[tuple[HostName, ...], Field(max_length=32)] = ()
-    """Allowed host names of requests besides loopback, the configured host and the host of
-    dashboard_url; required behind a proxy that forwards the host name; example:
+    """Host names allowed in the Host header of requests, besides loopback, the configured host and
+    the host of dashboard_url. Required behind a proxy that forwards the header; example:
     ["padwatch.plant.example"]."""
 
     limits: HttpLimitSettings = HttpLimitSettings()
@@ -123,7 +123,7 @@ class ServiceSettings(Settings):
 
 
 class DynamicModel(Settings):
-    """Settings of the estimator of all eight film coefficients, between the harmonics of 1×."""
+    """Settings of the estimator of eight film coefficients, from lines between harmonics of 1×."""
 
     band_hz: tuple[float, float] = (0.6, 12.0)
     """Frequency band [low, high] of the spectral lines in the fit, Hz."""
@@ -142,8 +142,8 @@ class DynamicModel(Settings):
     estimated, Hz."""
 
     max_relative_uncertainty: Annotated[float, Field(gt=0.0, le=1.0)] = 0.2
-    """Maximum relative standard uncertainty of a direct stiffness, random part; no stiffness is
-    returned above it."""
+    """Maximum relative standard uncertainty of a direct stiffness, random part; above
+    this limit no stiffness is returned."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -155,7 +155,7 @@ class DynamicModel(Settings):
 
 
 class AnalysisModel(Settings):
-    """Settings of segments and averaging; the defaults are those of Brito et al., section 3.1."""
+    """Settings of segments and averaging, with defaults from Brito et al., section 3.1."""
 
     segment_samples: Annotated[int, Field(ge=256, le=1_048_576)] = 8192
     """Number of samples in one Hann-tapered segment."""
@@ -259,7 +259,7 @@ class PlantFile(Settings):
     """Continuous recording of all samples."""
 
     evidence: EvidenceSettings = EvidenceSettings()
-    """Evidence of alarms: size, age and number."""
+    """Limits of the size, age and number of stored alarm evidence."""
 
     spectra: SpectraSettings = SpectraSettings()
     """Number and interval of stored spectra."""

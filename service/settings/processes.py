@@ -1,4 +1,4 @@
-"""Settings of the HTTP server, logins and TLS, and of the stream between processes."""
+"""Settings of logins, TLS and limits of the HTTP server, and of the stream between processes."""
 
 from ipaddress import ip_address
 from typing import Annotated, Literal
@@ -11,7 +11,7 @@ FilePath = Annotated[str, StringConstraints(min_length=1, max_length=4096)]
 
 
 class TlsSettings(Settings):
-    """TLS (1.2 or newer) of the HTTP server; not required behind a proxy with TLS."""
+    """Settings of TLS (1.2 or newer) of the HTTP server; not required behind a proxy with TLS."""
 
     certificate: FilePath
     """File with the certificate and its chain (PEM), relative to the working directory; example:
@@ -23,7 +23,7 @@ class TlsSettings(Settings):
 
 
 class AccessSettings(Settings):
-    """Requirement and duration of logins."""
+    """Settings of logins: when they are required, and their duration."""
 
     login: bool = False
     """Whether clients on this computer must log in to read. Clients on other computers or behind a
@@ -44,7 +44,7 @@ HostName = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9:][A-Za-z0-9.:-
 
 
 class HttpLimitSettings(Settings):
-    """Limits of the HTTP server; an incomplete request is closed within head_s + body_s."""
+    """Limits of HTTP; a connection with an incomplete request is closed after head_s + body_s."""
 
     head_s: DeadlineS = 4.0
     """Time limit for receiving the request line and headers, s, from the start of the connection or
@@ -97,7 +97,7 @@ CredentialPath = Annotated[str, StringConstraints(min_length=1, max_length=1000)
 
 
 class StreamSettings(Settings):
-    """NATS JetStream between acquiring and analysing processes; not used by `padwatch run`."""
+    """Settings of the NATS JetStream stream from `padwatch acquire` to `padwatch analyse`."""
 
     servers: Annotated[tuple[ServerUrl, ...], Field(min_length=1, max_length=16)] = (
         "nats://127.0.0.1:4222",
@@ -166,7 +166,7 @@ def is_loopback(host: str) -> bool:
 def why_closed(
     host: str, *, is_unix_socket: bool = False, has_tls: bool = False, has_account: bool = False
 ) -> str | None:
-    """Return the reason why the service must not listen on an address; None if it may.
+    """Return the reason why the service must not listen on an address; None if it may listen.
 
     A Unix socket is reachable only by a proxy on the same host.
     """

@@ -67,8 +67,9 @@ FINER = (
 
 
 class RetentionSettings(Settings):
-    """Retention: ages in days above which only coarser roll-ups of results are kept; 0: no limit.
+    """Settings of the retention of results, in days; 0 keeps them without limit.
 
+    Older results are kept only as coarser roll-ups.
     One bearing takes 3 GB a year as single results, and as roll-ups 2.2 GB (minutes), 0.25 GB (ten
     minutes) and 0.05 GB (hours), at the default refresh of 12 s. Never removed: hourly roll-ups
     with minimum, maximum, mean, count and worst quality; alarms and their history; baselines,
@@ -129,8 +130,8 @@ class RecordingSettings(Settings):
     removed. Twelve channels at 600 Hz take about half a GB a day."""
 
     max_days: Annotated[float, Field(gt=0.0, le=36_500.0)] = 30.0
-    """Age above which recordings are removed, days. The limit applies once a day of recordings of
-    the unit exists, so that a wrong clock does not remove recordings."""
+    """Age above which recordings are removed, days. The limit applies only if a unit has one
+    day of recordings, so that a wrong clock does not remove all recordings."""
 
     def keeps(self, unit: str) -> bool:
         """Return whether all samples of a unit are recorded."""
@@ -138,15 +139,15 @@ class RecordingSettings(Settings):
 
 
 class EvidenceSettings(Settings):
-    """Settings of evidence: state of the plant when an alarm was raised, in the data folder."""
+    """Settings of alarm evidence: files with the state of the plant at the time of an alarm."""
 
     max_gb: Annotated[float, Field(gt=0.0, le=10_000.0)] = 2.0
-    """Maximum total size, GB (10^9 bytes), above which the oldest evidence is removed, if it is
-    older than keep_days."""
+    """Total size of all evidence, GB (10^9 bytes), above which the oldest evidence is removed if it
+    is older than keep_days."""
 
     hard_max_gb: Annotated[float, Field(gt=0.0, le=10_000.0)] = 4.0
-    """Maximum total size, GB, above which the oldest evidence is removed at any age; must not be
-    below max_gb."""
+    """Total size of all evidence, GB, above which the oldest evidence is removed at any age; must
+    not be below max_gb."""
 
     keep_days: Annotated[float, Field(ge=0.0, le=36_500.0)] = 30.0
     """Age up to which evidence is kept while the total size is below hard_max_gb, days."""
@@ -172,7 +173,7 @@ Gigabytes = Annotated[float, Field(gt=0.0, le=1_000_000.0)]
 class SpaceSettings(Settings):
     """Limits of free disk space below which the alarm disk_nearly_full is raised.
 
-    The limit that is reached first applies, the share of the disk or the gigabytes.
+    Of the two limits, as a share of the disk and in GB, the limit that is reached first applies.
     """
 
     alert_free_share: Share = 0.1
@@ -182,12 +183,12 @@ class SpaceSettings(Settings):
     """Free share of a disk below which the alarm is a danger; must be below alert_free_share."""
 
     alert_free_gb: Gigabytes = 2.0
-    """Free space, GB (10^9 bytes), below which the alarm is an alert, at most a quarter of the
-    disk."""
+    """Free space, GB (10^9 bytes), below which the alarm is an alert; limited to a quarter of the
+    size of the disk."""
 
     danger_free_gb: Gigabytes = 1.0
-    """Free space, GB, below which the alarm is a danger, at most an eighth of the disk; must be
-    below alert_free_gb."""
+    """Free space, GB, below which the alarm is a danger; limited to an eighth of the size of the
+    disk. Must be below alert_free_gb."""
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -200,7 +201,7 @@ class SpaceSettings(Settings):
 
 
 class Origin(StrEnum):
-    """Origin of samples: live plant or replay; a replay never shares a database with the plant."""
+    """Origin of samples: live plant or replayed recording; the two never share a database."""
 
     LIVE = "live"
     REPLAY = "replay"

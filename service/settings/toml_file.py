@@ -16,14 +16,14 @@ from acquisition.delivery.small_file import read_small_file
 from service.settings.base import MisfitError, MissingError, SecretMisfitError, Settings
 
 Location: TypeAlias = tuple[int | str, ...]
-"""Location of a value in a TOML file: keys, and after an array the index of the element."""
+"""Path to a value in a TOML file: nested keys; the key of an array is followed by an index."""
 
 HEADER = re.compile(r"^\s*(\[\[?)\s*([A-Za-z0-9_.\"-]+?)\s*\]\]?\s*(?:#.*)?$")
 KEY = re.compile(r"^\s*([A-Za-z0-9_.-]+)\s*=")
 
 
 def line_of(location: Location, text: str) -> int:
-    """Return the line number of a key, or of the innermost enclosing table with its own line."""
+    """Return the line number of a key, or of the innermost table around the key; else 1."""
     lines = dict(_lines(text))
     starts = (location[:n] for n in range(len(location), 0, -1))
     return next((lines[start] for start in starts if start in lines), 1)
@@ -44,7 +44,7 @@ def _lines(text: str) -> Iterator[tuple[Location, int]]:
 
 
 def _table_location(names: list[str], is_array: bool, counts: dict[Location, int]) -> Location:
-    """Return the location of a table header: key names, and an index after each array of tables."""
+    """Return the location of a table; the key of an array of tables is followed by an index."""
     location: Location = ()
     for position, name in enumerate(names):
         location = (*location, name.strip('"'))
@@ -124,7 +124,7 @@ def is_echo(error: ErrorDetails) -> bool:
 
 
 def located(error: ErrorDetails, data: Mapping[str, Any]) -> Location:
-    """Return the location of an error in the file."""
+    """Return the location of a validation error in ``data``, the content of the file."""
     location = _without_tags(error["loc"], data)
     reason = error.get("ctx", {}).get("error")
     if isinstance(reason, MisfitError):
@@ -135,7 +135,7 @@ def located(error: ErrorDetails, data: Mapping[str, Any]) -> Location:
 def sentence(
     schema: Schema, error: ErrorDetails, location: Location, data: Mapping[str, Any]
 ) -> str:
-    """Return the message of an error: key, value, problem and description of the key."""
+    """Return the message of a validation error: key, value, problem and description of the key."""
     key = "".join(_entry(part) for part in location).lstrip(".")
     found, value = _value(data, location)
     holds_tables = isinstance(value, list) and any(isinstance(each, dict) for each in value)
@@ -171,7 +171,7 @@ def _shown(value: Any) -> str:
 
 
 def _value(data: Any, location: Location) -> tuple[bool, Any]:
-    """Return whether the file has a value at a location, and the value."""
+    """Return whether the file has a value at a location, and the value (None without one)."""
     for part in location:
         inside = isinstance(data, dict) and part in data
         listed = isinstance(data, list) and isinstance(part, int) and part < len(data)
@@ -192,10 +192,10 @@ def _without_tags(location: Location, data: Any) -> Location:
 
 
 MAX_FILE_BYTES = 4_000_000
-"""Maximum file size. Limits the memory if the path is wrong, such as a device or a recording."""
+"""Maximum size of a file, bytes; limits the memory if the path is that of a recording."""
 
 FOLDER = "folder"
-"""Key of the validation context: folder of the file, base of relative paths in the file."""
+"""Key of the validation context of pydantic for the file's folder, the base of relative paths."""
 
 TOO_DEEP = "nested too deeply"
 

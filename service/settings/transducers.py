@@ -116,7 +116,7 @@ class HighPassSettings(Settings):
     """Damping ratio for order 2; default: -3 dB at the natural frequency."""
 
     def response(self) -> Response:
-        """Return the response as a value of core."""
+        """Return the settings as a `HighPass` response."""
         return HighPass(self.corner_hz, self.order, self.damping)
 
 
@@ -133,7 +133,7 @@ class ResonanceSettings(Settings):
     """Damping ratio of the resonance; example: 0.02."""
 
     def response(self) -> Response:
-        """Return the response as a value of core."""
+        """Return the settings as a `Resonance` response."""
         return Resonance(self.natural_hz, self.damping)
 
 
@@ -160,18 +160,18 @@ class SheetSettings(Settings):
         return self
 
     def response(self) -> Response:
-        """Return the response as a value of core."""
+        """Return the response that was read from the calibration sheet."""
         return self._table
 
 
 ResponseSettings: TypeAlias = Annotated[
     HighPassSettings | ResonanceSettings | SheetSettings, Field(discriminator="kind")
 ]
-"""Element of a frequency response."""
+"""Settings of one element of a frequency response, of any kind."""
 
 
 def response_of(parts: Sequence[ResponseSettings]) -> Response | None:
-    """Return the response of a chain of elements as a value of core; None for a flat response."""
+    """Return the combined frequency response of a chain of elements; None without elements."""
     if not parts:
         return None
     return ResponseChain(tuple(part.response() for part in parts))

@@ -29,9 +29,10 @@ def require_source_fit(
     channels: Sequence[str],
     slow: Sequence[str],
 ) -> None:
-    """Refuse a source or a second device that does not match the ids of the channels.
+    """Check that the devices of a unit provide its channels; raise `MisfitError` otherwise.
 
-    Raises `MisfitError`. ``beside`` is the second device, which reads slow channels.
+    ``beside`` is the second device of the unit, for slow channels, or None; ``channels`` and
+    ``slow`` are the ids of all waveform and slow channels.
     """
     if beside is not None:
         beside.require_fit(slow)
@@ -46,9 +47,9 @@ def require_source_fit(
 
 
 def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]]) -> None:
-    """Refuse two devices on one serial line, as a line has one master.
+    """Raise `MisfitError` if two devices are on one serial line, since a line has one master.
 
-    ``readers`` are pairs of location and device settings.
+    ``readers`` are pairs of the location in the plant file and the settings of each device.
     """
     taken: dict[str, tuple[int | str, ...]] = {}
     for at, device in readers:
@@ -67,7 +68,7 @@ def require_lines_apart(readers: Iterable[tuple[tuple[int | str, ...], object]])
 
 
 FROM_WAVEFORMS = ("shaft_overall_um_pp", "bearing_overall_mm_s_rms")
-"""Limit keys of broad-band quantities, which a vector rack does not measure."""
+"""Keys of the limits of broad-band quantities, which a rack that sends vectors does not report."""
 
 ZONES = ("shaft_um_pp", "shaft_max_um_pk", "bearing_mm_s_rms")
 
@@ -79,7 +80,10 @@ def require_alarm_fit(
     channels: Iterable[ChannelSettings],
     bearings: Sequence[BearingSettings],
 ) -> None:
-    """Refuse alarm limits of quantities that the unit does not measure."""
+    """Raise `MisfitError` if there are alarm limits of a quantity that the unit does not measure.
+
+    The id `plant` is also refused, since it is reserved for alarms of the whole plant.
+    """
     if unit == PLANT:
         raise MisfitError("is reserved for alarms of the whole plant; choose another", "id")
     is_rack = isinstance(source, ModbusVectorSettings)
@@ -136,8 +140,8 @@ class UnitSettings(Settings):
     """Rated running speed in r/min, 20 to 1500; example: 92.3."""
 
     rated_power_mw: Annotated[float, Field(gt=0.0, le=2000.0)] | None = None
-    """Rated active power in MW, at most 2000; required with power_channel for operating states and
-    film monitoring, and the reference of load changes; example: 700.0."""
+    """Rated active power in MW, at most 2000; example: 700.0. Operating states and film monitoring
+    require this key and power_channel. Load changes are relative to the rated power."""
 
     rate_hz: Annotated[float, Field(ge=20.0, le=100_000.0)] = 600.0
     """Sampling rate of each channel, Hz; example: 600.0. Has no effect on polled registers, whose

@@ -80,7 +80,7 @@ class MappedDeviceSettings(ModbusLinkSettings):
 
     @property
     def registers(self) -> RegisterMap:
-        """Register map as a value of the Modbus adapter."""
+        """Register map of the device, as a `RegisterMap` of the Modbus adapter."""
         return self._map.register_map()
 
     @property
@@ -98,7 +98,7 @@ class MappedDeviceSettings(ModbusLinkSettings):
         )
 
     def require_known(self, known: Sequence[str], *at: int | str) -> None:
-        """Raise `MisfitError` if the map has a value of an unknown channel."""
+        """Raise `MisfitError` if the map has a value of a channel that is not in ``known``."""
         for n, value in enumerate(self._map.value):
             if value.channel not in known:
                 place = (*at, "map", "value", n, "channel") if self.map else (*at, "map_file")
@@ -109,7 +109,7 @@ class MappedDeviceSettings(ModbusLinkSettings):
 
 
 class ModbusPolledSettings(MappedDeviceSettings):
-    """Settings of polled registers, where each poll is a sample; for slow machines."""
+    """Settings of a device with polled registers; each poll gives one sample. For slow machines."""
 
     kind: Literal["modbus_polled"]
     """Kind of the source, always "modbus_polled"."""
@@ -138,12 +138,12 @@ class ModbusVectorSettings(MappedDeviceSettings):
     """Number of averaged polls; 60 polls at 5 s are five minutes."""
 
     hop_polls: Annotated[int, Field(ge=1, le=100_000)] = 4
-    """Number of polls from one result and check of limits to the next; 4 polls at 5 s are 20 s; not
-    above n_polls."""
+    """Number of polls from one result to the next, not above n_polls; 4 polls at 5 s are 20 s.
+    Alarm limits are checked with each result."""
 
     min_polls: Annotated[int, Field(ge=2, le=100_000)] = 4
-    """Minimum number of polls with a changed vector; a result of fewer polls is uncertain; not
-    above n_polls."""
+    """Number of polls with a changed vector below which a result is uncertain; not above
+    n_polls."""
 
     @model_validator(mode="after")
     def _check_polls(self) -> Self:
@@ -154,7 +154,7 @@ class ModbusVectorSettings(MappedDeviceSettings):
 
     @property
     def averaging(self) -> PollSettings:
-        """Averaging settings of the polls as a value of core."""
+        """Settings of the averaging of polls, as `PollSettings`."""
         return PollSettings(self.n_polls, self.hop_polls, self.min_polls)
 
     def require_fit(self, channels: Sequence[str], slow: Sequence[str]) -> None:
@@ -238,7 +238,7 @@ class ModbusFifoSettings(ModbusLinkSettings):
         return self
 
     def fifo_layout(self, n_channels: int) -> FifoLayout:
-        """Return the queue layout as a value of the Modbus adapter.
+        """Return the layout of the queues for ``n_channels`` channels, as a `FifoLayout`.
 
         Raises `MisfitError` if the number of addresses is wrong, or if a record of all channels
         exceeds a FIFO read of 31 registers.

@@ -33,7 +33,7 @@ class SignatureIdentity(Settings):
 
 
 class IdentificationIdentity(Settings):
-    """Expected device identification (function 43/14); an object is not checked by default."""
+    """Expected device identification (function 43/14); objects that are not set are not checked."""
 
     kind: Literal["identification"]
     """Kind of the identity, always "identification"."""

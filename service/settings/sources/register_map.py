@@ -51,7 +51,7 @@ class EpochTimeSettings(Settings):
     """Resolution of `parts`, in parts per second; example: 1000.0."""
 
     def plain(self, default: MapDefaults) -> EpochTime:
-        """Return the time stamp as a value of the Modbus adapter."""
+        """Return the settings as an `EpochTime` of the Modbus adapter, completed by defaults."""
         return EpochTime(
             seconds=default.cell(self.seconds, "time", "seconds"),
             parts=_optional(default, self.parts, "time", "parts"),
@@ -81,7 +81,7 @@ class CalendarTimeSettings(Settings):
         return self
 
     def plain(self, default: MapDefaults) -> CalendarTime:
-        """Return the time stamp as a value of the Modbus adapter."""
+        """Return the settings as a `CalendarTime` of the Modbus adapter, completed by defaults."""
         first = default.cell(self.first, "time", "first")
         default.require_in_space(first.address, len(self.fields), "time", "first")
         return CalendarTime(first=first, fields=self.fields, utc_offset_s=self.utc_offset_s)
@@ -148,7 +148,7 @@ class RegisterMapSettings(Settings):
         return self
 
     def register_map(self) -> RegisterMap:
-        """Return the map as a value of the Modbus adapter. Raises `MisfitError` if invalid."""
+        """Return the settings as a `RegisterMap`; raise `MisfitError` if they are invalid."""
         default = MapDefaults(self.base, self.function, self.byte_order)
         register = 4 if self.function == 4 else 3
         for n, block in enumerate(self.together):

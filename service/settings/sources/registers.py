@@ -1,4 +1,4 @@
-"""Settings of values in Modbus registers, and their conversion to adapter values."""
+"""Settings of values in Modbus registers, and their conversion for the Modbus adapter."""
 
 import math
 from collections.abc import Sequence
@@ -55,7 +55,7 @@ class CellSettings(Settings):
 
 
 class ScaleRegisterSettings(CellSettings):
-    """Register with the scale of a mantissa: value = raw / divisor * this register.
+    """Register with the full-scale value of a mantissa: value = raw / divisor * content.
 
     The mantissa and this register must be read in one request.
     """
@@ -96,7 +96,7 @@ class FullScaleSettings(Settings):
 
 
 class FlagSettings(CellSettings):
-    """Status register, or bits of it, that state whether a value is good, bad or clipped."""
+    """Status register, or selected bits, that state whether a value is good, bad or clipped."""
 
     mask: Annotated[int, Field(ge=1, le=ALL_BITS)] = ALL_BITS
     """Bit mask of the evaluated bits of the register; example: 0x0020."""
@@ -203,14 +203,14 @@ class ValueSettings(CellSettings):
 
     @property
     def id(self) -> str:
-        """Id of the row of a sample block, or of the slow channel."""
+        """Id of the row of a sample block, or of the slow channel, that contains the value."""
         if isinstance(self.quantity, VectorPart):
             return VectorRow(self.channel, self.quantity).id
         return self.channel
 
     @property
     def rim_factor(self) -> float:
-        """Factor to zero-to-peak amplitude, or to phase lead."""
+        """Factor from the reading to zero-to-peak amplitude or phase lead; 1 otherwise."""
         factor = PK_PER[self.detector] if self.detector else 1.0
         return factor * (SIGN_OF[self.phase] if self.phase else 1.0)
 
@@ -227,14 +227,14 @@ class MapDefaults:
     byte_order: ByteOrder
 
     def require_in_space(self, address: int, count: int, *at: int | str) -> None:
-        """Refuse registers outside the Modbus address space."""
+        """Raise `MisfitError` if ``count`` registers from ``address`` exceed the address space."""
         last = self.base + ADDRESS_SPACE - count
         if not self.base <= address <= last:
             words = f"must be {self.base} to {last}, since the map counts from {self.base}"
             raise MisfitError(words, *at, "address")
 
     def cell(self, settings: CellSettings, *at: int | str) -> Cell:
-        """Return a cell as a value of the adapter, completed by the defaults."""
+        """Return the settings as a `Cell` of the Modbus adapter, completed by the defaults."""
         cell = Cell(
             address=settings.address,
             function=settings.function or self.function,
@@ -256,7 +256,7 @@ class MapDefaults:
         return cell
 
     def value(self, settings: ValueSettings, *at: int | str) -> MapValue:
-        """Return a value of the adapter, converted to zero-to-peak amplitude and phase lead."""
+        """Return the settings of a value as a `MapValue`, scaled to zero-to-peak and phase lead."""
         low, high = settings.invalid_below, settings.invalid_above
         return MapValue(
             id=settings.id,
@@ -301,12 +301,12 @@ class MapDefaults:
 
 
 def require_apart(values: Sequence[MapValue], base: int) -> None:
-    """Refuse two values on the same register, unless they are different bits of the register.
+    """Check that no two values have the same id, or the same register except for different bits.
 
     Raises
     ------
     MisfitError
-        With the location of the second value.
+        If two values do; for a shared register, with the location of the second value.
     """
     taken: dict[tuple[int, int], MapValue] = {}
     for n, value in enumerate(values):

@@ -54,8 +54,8 @@ class SimulatedLifeSettings(Settings):
     """Settings of a machine life, the simulated history and future operation of a machine."""
 
     life_seed: Annotated[int, Field(ge=0, le=2**63 - 1)] | None = None
-    """Seed of a machine life, instead of fixed films. The speed is 92.3 r/min for an even seed and
-    90.9 r/min for an odd seed. The seed determines starts and stops, load, oil temperature and
+    """Seed of a machine life, instead of constant films. The speed is 92.3 r/min for an even seed
+    and 90.9 r/min for an odd seed. The seed determines starts and stops, load, oil temperature and
     shaft position."""
 
     held_load: Annotated[float, Field(gt=0.0, le=1.0)] | None = None
