@@ -33,10 +33,10 @@ class SlowRollSettings(Settings):
     of the rated speed. Example: 8.0."""
 
     taken: AwareDatetime
-    """Time of the measurement, with time zone; example: 2026-03-01T10:00:00Z."""
+    """Time of the measurement, with offset from UTC; example: 2026-03-01T10:00:00Z."""
 
     probe: ProbeName
-    """Serial number or mark of the measured probe; the vector is not used for other probes.
+    """Serial number or mark of the measured probe; the vector is not used for another probe.
     Example: "SN123"."""
 
     def vector(self, channel: str) -> SlowRollVector:
