@@ -28,7 +28,7 @@ which is below their noise."""
 
 
 class MovingRotor:
-    """Rotor on films and brackets that follow a course of scenarios; outputs transducer motion.
+    """Rotor on time-varying films and brackets, which returns the motion at the transducers.
 
     Raises
     ------
