@@ -17,7 +17,7 @@ class FeedEndedError(Exception):
 
 
 class SampleFeed(Protocol):
-    """Protocol of a sample source of a simulated device: raw blocks of converter counts."""
+    """Protocol of the source of raw sample blocks of a simulated device."""
 
     def advance(self, n_samples: int) -> RawBlock:
         """Return the next samples, at most `n_samples`.

@@ -22,7 +22,7 @@ class Delivered:
 
 @dataclass(frozen=True)
 class Refused:
-    """Outcome of a delivery attempt: the receiver rejected the message permanently."""
+    """Outcome of a delivery attempt: permanent rejection, with the reply `answer`."""
 
     answer: str
 
@@ -145,7 +145,7 @@ async def _connected(address: str, port: int) -> socket.socket:
 
 
 def error_text(error: BaseException) -> str:
-    """Return the message of an exception, or its class name if the message is empty."""
+    """Return the message of an exception; if empty, a text for time-outs, or the class name."""
     if isinstance(error, TimeoutError) and not str(error):
         return "no answer in time"
     text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)

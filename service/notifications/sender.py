@@ -94,11 +94,11 @@ class SenderStatus:
     n_failures
         Number of failed attempts since the last delivery.
     failing_since_ns
-        Time of the first of these failures; None without failures.
+        Time of the first of these failures, in ns since 1970 UTC; None without failures.
     reason
         Reason of the newest failure.
     next_attempt_ns
-        Time of the next attempt; None if the sender is not in a retry delay.
+        Time of the next attempt, in ns since 1970 UTC; None outside a retry delay.
     """
 
     state: SenderState = SenderState.IDLE

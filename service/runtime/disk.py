@@ -70,13 +70,13 @@ S_PER_DAY = 86_400.0
 
 
 class Growth:
-    """Growth rate of the used space of a disk, from the measurements of the last day."""
+    """Estimator of the growth rate of the used space of a disk over the last day."""
 
     def __init__(self) -> None:
         self._seen: deque[tuple[float, int]] = deque()
 
     def note(self, space: DiskSpace, now_s: float) -> None:
-        """Add a measurement at the monotonic time ``now_s``; discard those older than one day."""
+        """Add a measurement at the monotonic time ``now_s``, at most one per `EVERY_S`."""
         if not self._seen or now_s - self._seen[-1][0] >= EVERY_S:
             self._seen.append((now_s, space.free_bytes))
         while len(self._seen) > 2 and now_s - self._seen[1][0] >= OVER_S:

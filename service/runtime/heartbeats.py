@@ -80,7 +80,7 @@ class Heartbeats:
             self._pulses.pop(name, None)
 
     def look(self) -> dict[str, str | None]:
-        """Return by loop name why the loop is dead or stuck, or None if it is alive."""
+        """Return the reason why each loop is dead or stuck, by loop name; None if it is alive."""
         return {name: pulse.trouble for name, pulse in self._pulses.items()}
 
     @property

@@ -54,7 +54,7 @@ class ServiceManager:
 
 
 def _address(named: str) -> str | None:
-    """Return the address of a socket given by path or by abstract name (@…); None if invalid."""
+    """Return the address of a socket given by path or by abstract name (@…), or None."""
     if named.startswith("@"):
         return "\0" + named[1:]
     if named.startswith("/"):

@@ -40,7 +40,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Field:
-    """Signal of a CAN message: byte offset, data type, and `factor`, the value of 1 in `unit`."""
+    """Signal of a CAN message: byte offset, data type, and value of one count in `unit`."""
 
     name: str
     offset: int
@@ -281,6 +281,8 @@ def daq_settings(
 
     Parameters
     ----------
+    link
+        Settings of the connection to the CAN bus.
     units
         Engineering unit of each waveform channel.
     others

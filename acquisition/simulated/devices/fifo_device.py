@@ -15,7 +15,7 @@ from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import CountArray
 
 _Record: TypeAlias = tuple[int, CountArray]
-"""Sample in a queue: its counter, and its counts, (n_channels,), or (1,) in a channel's queue."""
+"""Sample in a queue: counter and counts, (n_channels,) if interleaved, otherwise (1,)."""
 
 _COUNTER_MODULUS = 65536
 _ON_DEMAND_STEPS = 16
@@ -82,7 +82,7 @@ class FifoDevice(ModbusDevice):
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Functions of a count by fault name: lost steps, overflow, frozen data, restart."""
+        """Fault functions by name, which take a count: lost steps, overflow, freeze, restart."""
         return {
             **super().faults,
             "drop": self._drop,

@@ -77,7 +77,7 @@ class MapDevice(ModbusDevice):
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Functions of a count by fault name: frozen data, invalid numbers, bad status."""
+        """Fault functions by name, which take a count: frozen data, invalid numbers, bad status."""
         spoils = {name: partial(self._spoil_values, name) for name in (_SENTINEL, _FLAG)}
         return {**super().faults, **spoils}
 
@@ -87,7 +87,7 @@ class MapDevice(ModbusDevice):
         return self.image.read_registers(function, address, count)
 
     def read_bits(self, function: int, address: int, count: int) -> bytes | None:
-        """Return bits packed in bytes; None if an address does not exist."""
+        """Return bits packed in bytes, low bit first; None if an address does not exist."""
         self._look(function, address)
         return self.image.read_bits(function, address, count)
 
@@ -116,7 +116,7 @@ class MapDevice(ModbusDevice):
         self.image.put_time(raw.start_ns)
 
     def _numbers(self, raw: RawBlock, units: FloatArray) -> dict[str, tuple[float, bool]]:
-        """Return by value id the number in engineering units, and whether its channel is OK."""
+        """Return the number in engineering units, and whether its channel is OK, by value id."""
         channels = {
             row: (float(samples[-1]), ok)
             for row, samples, ok in zip(self._rows, units, raw.ok, strict=True)

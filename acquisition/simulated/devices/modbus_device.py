@@ -18,8 +18,8 @@ _MEI_READ_IDENTIFICATION = 14
 _BASIC_CONFORMITY = 0x81
 
 _LAST_LOOKS = 2
-"""Number of reads after the end of the feed, and after all data were read, that complete a device.
-The second of these reads shows that the client has received the reply to the first."""
+"""Number of reads without new data after which an ended device is `drained`. The second of these
+reads shows that the client has received the reply to the first."""
 
 
 class ModbusDevice(ABC):
@@ -75,7 +75,7 @@ class ModbusDevice(ABC):
         return {"freeze": self._freeze}
 
     def spoil(self, fault: str, count: int) -> None:
-        """Inject the fault of the data with the name `fault` in `faults`, `count` times."""
+        """Inject a fault of the data `count` times; `fault` is a key of `faults`."""
         self.faults[fault](count)
 
     def produce(self, n_steps: int = 1) -> None:

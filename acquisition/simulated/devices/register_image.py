@@ -81,7 +81,7 @@ class RegisterImage:
         self._words[place] = word | mask if are_set else word & ~mask
 
     def put_value(self, value: MapValue, number: float) -> None:
-        """Write a number in the unit of a value; NaN or infinity is written as `no_value`."""
+        """Write a number in the unit of a value; NaN or infinity is written as a missing value."""
         wanted = (number - value.offset) / value.scale
         if value.scale_register is not None:
             scale = max(1.0, math.ceil(abs(wanted))) if math.isfinite(wanted) else 1.0

@@ -116,7 +116,7 @@ class RingDevice(ModbusDevice):
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Functions of a count by fault name: faults of the next slots, frozen data, restarts."""
+        """Fault functions by name, which take a count: faulty slots, frozen data, restarts."""
         slot_faults = {**SLOT_FAULTS, "repeat": self._repeated}
         return {
             **super().faults,

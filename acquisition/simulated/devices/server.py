@@ -40,7 +40,7 @@ class DaqServer(ABC):
         """Serve until cancelled, or until the end of the feed of the device."""
 
     def inject(self, fault: str, count: int = 1) -> None:
-        """Inject the fault of the device or of its link with the name `fault`, `count` times.
+        """Inject the fault with the name `fault` into the device or its link, `count` times.
 
         Raises
         ------

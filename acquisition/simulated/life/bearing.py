@@ -27,7 +27,7 @@ class LifeBearing:
     cold_clearance_um
         Radial clearance with shaft and housing at the same temperature.
     closing_um
-        Final decrease of the clearance at a running machine, where the shaft is warmer than the
+        Final decrease of the clearance in a running machine, where the shaft is warmer than the
         housing.
     opening_um
         Final outward displacement of the pads along one diameter at full load, when the magnetic

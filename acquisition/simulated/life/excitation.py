@@ -89,7 +89,7 @@ def order1_um_pk(
     grade_mm_s: FloatArray,
     rotor: RotorParameters,
 ) -> dict[str, ComplexArray]:
-    """Return the 1x response to an unbalance at the mass centre, by the model of `plant.rotor`.
+    """Return the response at 1× to an unbalance at the mass centre, by the model of `plant.rotor`.
 
     Brackets are eliminated: with D = K + iΩC of the film and b = k_b − m_b Ω² of the bracket, the
     stiffness of the support is (D⁻¹ + b⁻¹)⁻¹, which reduces ten equations to four.

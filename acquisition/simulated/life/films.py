@@ -15,7 +15,7 @@ from core.arrays import FloatArray
 
 UNIT_CLEARANCE_RMS = 0.02
 PAD_CLEARANCE_RMS = 0.01
-"""Relative rms differences of clearance between machines and between pads: wedge accuracy."""
+"""Relative rms differences in clearance between machines and between pads: wedge accuracy."""
 
 
 @dataclass(frozen=True, eq=False)

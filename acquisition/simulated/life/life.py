@@ -1,4 +1,4 @@
-"""Simulation of years of readings of a unit, with the true state."""
+"""Simulation of years of stiffness readings of a unit, together with the true state."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

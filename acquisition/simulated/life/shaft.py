@@ -1,4 +1,4 @@
-"""Shaft position in the bearings of a life, and changes of the operating condition."""
+"""Shaft position in the bearings over a simulated life, and changes of operating condition."""
 
 import math
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ WARM_C, COLD_C = 3.0, -3.0
 def four_fold(
     start_ns: int, days: float = 30.0, *, stiffer: bool = True
 ) -> tuple[ConditionChange, ConditionChange]:
-    """Return two condition changes that make the films four times stiffer, or softer.
+    """Return two condition changes that make healthy films about four times stiffer, or softer.
 
     For `days` before `start_ns` the shaft runs near the centre in warm oil, then for `days` at high
     eccentricity in cold oil; in reverse order if not `stiffer`. The factor is 3.5 to 8 in the most

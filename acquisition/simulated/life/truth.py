@@ -43,7 +43,7 @@ RUNOUT_UM_PK = 1.0
 """Residual runout at 1× after subtraction of the slow-roll vector."""
 
 NO_LOAD_SILENCE, LOADED_SILENCE = 0.08, 0.002
-"""Share of readings with insufficient excitation, without load and with load."""
+"""Shares of readings with insufficient excitation, without load and with load."""
 
 OUTAGES_PER_YEAR, OUTAGE_H = 3.0, (1.0, 10.0)
 """Number per year and duration of transducer outages in each direction."""
@@ -131,7 +131,7 @@ def _is_out_of_order(random: np.random.Generator, n: int, step_s: float) -> npt.
 
 @dataclass(frozen=True, eq=False)
 class BearingMoments:
-    """True state of one bearing over time, without stiffness and 1x response.
+    """True state of one bearing over time, without stiffness and response at 1×.
 
     Parameters
     ----------
@@ -140,6 +140,7 @@ class BearingMoments:
     centre_um : (2, n)
         Position of the shaft centre relative to the bearing centre.
     oil_temperature_c : (n,)
+        True oil temperature.
     altered
         Effect of damage on film, bracket and transducers.
     chain
@@ -156,14 +157,14 @@ class BearingMoments:
 
 @dataclass(frozen=True, eq=False)
 class BearingLifeTruth(BearingMoments):
-    """True state of one bearing at the rows of its readings, with stiffness and 1x response.
+    """True state of one bearing at the rows of its readings, with stiffness and response at 1×.
 
     Parameters
     ----------
     ln_k : (2, n)
         Natural logarithm of the film stiffness in N/m, with damage.
     ln_k_healthy : (2, n)
-        The same without damage.
+        Natural logarithm of the film stiffness in N/m that the film would have without damage.
     order1_um_pk : (4, n)
         Phasors at 1×: shaft relative to bearing u_x, u_y, and bearing x_b, y_b.
     """

@@ -83,7 +83,7 @@ class SlowWander:
         self._growth = _Wander(growth_random, memory, np.array(growth_rms))
 
     def now(self, scenario: Scenario) -> Conditions:
-        """Return the conditions at the current step, about the means of a scenario."""
+        """Return the conditions at the current step: means of a scenario with random variation."""
         bearings = [scenario.bearings[b.id] for b in self._machine.bearings]
         mean = [centre for b in bearings for centre in (b.centre_x_um, b.centre_y_um)]
         mean += [b.oil_temperature_c for b in bearings] + [scenario.active_power_mw]

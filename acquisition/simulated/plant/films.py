@@ -70,7 +70,7 @@ class Film:
     def effective_stiffness_n_per_m(self, frequency_rad_s: float) -> tuple[float, float]:
         """Return the magnitudes ``|k_xx + iωc_xx|`` and ``|k_yy + iωc_yy|``.
 
-        Equation (5) of Brito et al. estimates these magnitudes if cross-coupling is negligible.
+        In N/m. Equation (5) of Brito et al. estimates them if cross-coupling is negligible.
         """
         return (
             math.hypot(self.k_xx_n_per_m, frequency_rad_s * self.c_xx_n_s_per_m),
@@ -87,7 +87,7 @@ class FilmColumns:
     k_yy_n_per_m: FloatArray
 
     def at(self, row: int) -> Film:
-        """Return the film of one row.
+        """Return stiffness and damping of the film at one row.
 
         Damping is proportional to the full stiffness matrix, because the squeeze film of a tilting
         pad has the same factor μ/h³ as the sliding film.

@@ -164,7 +164,7 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
 def _motion_maps(
     parameters: RotorParameters, matrices: RotorMatrices
 ) -> dict[tuple[str, Measurand], FloatArray]:
-    """Return the maps from the state to the signals of Table 3 (Brito et al.), (6, 20) each."""
+    """Return the matrices from the state to the signals of Table 3 (Brito et al.), (6, 20) each."""
     shaft, bracket = relative_motion(parameters), bracket_motion(parameters)
     still = np.zeros_like(shaft)
     shaft_um = 1e6 * np.hstack([shaft, still])
@@ -180,10 +180,7 @@ def _motion_maps(
 
 
 def _places(machine: Unit, parameters: RotorParameters) -> dict[str, tuple[str, int]]:
-    """Return by channel id the part, shaft or bearing, and the row in the map of `_motion_maps`.
-
-    Each bearing has two rows, x and y.
-    """
+    """Return part (shaft or bearing) and row in its motion map of each channel, by channel id."""
     names = [bracket.bearing for bracket in parameters.brackets]
     places = {}
     for bearing in machine.bearings:

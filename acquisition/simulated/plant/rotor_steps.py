@@ -57,15 +57,16 @@ def discretize(
     """Return the exact discrete-time rotor for forces that are linear between samples.
 
     The spectrum of a force held over each step has an image near the sampling rate, which aliases.
-    It is negligible in displacement and velocity, but at 1.5 Hz and 600 Hz it shifts the phase of
-    the acceleration of a stiff bracket by 1.5° and more. Linear interpolation avoids this error.
+    The alias is negligible in displacement and velocity. For a force at 1.5 Hz sampled at 600 Hz,
+    it shifts the phase of the acceleration of a stiff bracket by 1.5° and more. Linear
+    interpolation avoids this error.
 
     Parameters
     ----------
     force_map
         (10, n_forces) generalized force per unit of each force.
     output_map
-        (n_outputs, 20) map from displacement and velocity to the outputs.
+        (n_outputs, 20) matrix from displacement and velocity to the outputs.
 
     Raises
     ------
@@ -199,7 +200,7 @@ def _block_states(
 
 
 def _feedthrough(observed: FloatArray, rotor: DiscreteRotor) -> FloatArray:
-    """Return the map from the forces to the outputs of a block: lower-triangular block Toeplitz."""
+    """Return the matrix from forces to outputs of a block, lower-triangular block Toeplitz."""
     n_outputs, n_steps, _ = observed.shape
     driven = (observed @ rotor.input_map).swapaxes(0, 1)
     impulse = [rotor.feedthrough, *driven[:-1]]

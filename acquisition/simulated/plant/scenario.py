@@ -138,7 +138,7 @@ class ChannelScenario:
     Parameters
     ----------
     response
-        Complex frequency response, a model and not a table; None is flat.
+        Complex frequency response, given by a model, not by a table; None is flat.
     gain
         Ratio of true to nominal sensitivity. The reference gap of a probe was measured with the
         probe itself, so the gain applies to the difference from the reference gap.
@@ -213,7 +213,7 @@ class Scenario:
 
 
 class Course(Protocol):
-    """Sequence of scenarios over time.
+    """Protocol of a sequence of scenarios of one unit over time.
 
     Films, brackets, forces, speed and the fields of `Conditions` may change between two scenarios;
     all other values remain those of the first scenario. The unit interpolates linearly between two

@@ -163,7 +163,7 @@ class SimulatedUnit:
         )
 
     def begin_at(self, start_ns: int) -> None:
-        """Set the time of sample 0, because the construction of many units takes time."""
+        """Set the time of sample 0 again, for example after the slow set-up of many units."""
         self._start_ns = start_ns
 
     def truth(self) -> UnitTruth:
