@@ -1,4 +1,4 @@
-"""Sample feeds of simulated devices: protocol, sample ledger, slots, simulated source."""
+"""Sample feeds of simulated devices: protocol, sample counts, slots, simulated source."""
 
 import math
 from collections import Counter
@@ -17,7 +17,7 @@ class FeedEndedError(Exception):
 
 
 class SampleFeed(Protocol):
-    """Protocol of a sample source of a simulated device: raw blocks of converter counts."""
+    """Protocol of the source of raw sample blocks of a simulated device."""
 
     def advance(self, n_samples: int) -> RawBlock:
         """Return the next samples, at most `n_samples`.
@@ -34,7 +34,7 @@ class SampleFeed(Protocol):
 
 
 class Ledger:
-    """Number of samples per channel produced by each unit in each epoch, including lost samples."""
+    """Count of samples per channel produced by each unit in each epoch, with lost samples."""
 
     def __init__(self) -> None:
         self._offered: Counter[tuple[str, int]] = Counter()
@@ -44,14 +44,15 @@ class Ledger:
         self._offered[unit, epoch] += n_samples
 
     def n_samples(self, unit: str, epoch: int | None = None) -> int:
-        """Return the number of samples produced by a unit, in one epoch or in all epochs."""
+        """Return the number of samples produced by a unit in an epoch; None for all epochs."""
         return sum(n for (u, e), n in self._offered.items() if u == unit and epoch in (None, e))
 
 
 class SlotFeed:
     """Sample feed divided into slots of equal length, with look-ahead by one slot.
 
-    The look-ahead shows the length of a gap. Each slot begins at a multiple of its length.
+    The sample index of the next slot shows the length of a gap before it. Each slot begins at a
+    multiple of its length.
     Incomplete slots before a gap, a restart or the end of the feed are discarded.
     """
 
@@ -92,11 +93,11 @@ SKIP_SAMPLES = 65536
 
 
 class SimulatedSource:
-    """Sample source that yields calibrated blocks of a sample feed, in real time or unpaced.
+    """Sample source that yields calibrated blocks of a sample feed.
 
-    In real time the feed starts at the first connection. Samples between two connections are lost,
-    and the sample index jumps. Unpaced, blocks are yielded as fast as they are read, and a new
-    connection continues where the previous connection ended.
+    If `paced`, the feed runs in real time from the first connection. Samples between two
+    connections are lost, and the sample index jumps. Otherwise blocks are yielded as fast as
+    they are read, and a new connection continues where the previous connection ended.
     """
 
     def __init__(
@@ -118,7 +119,7 @@ class SimulatedSource:
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link; see :class:`acquisition.source.SampleSource`."""
+        """Yield the blocks of the feed; see :class:`acquisition.source.SampleSource`."""
         if self._start_s is None:
             self._start_s = self._clock.monotonic_s()
         if self._paced:

@@ -1,4 +1,4 @@
-"""Notification channels: protocol, outcomes of an attempt, secrets, TLS and connections."""
+"""Notification channels: protocol, outcomes of a delivery attempt, secrets, TLS, connections."""
 
 import asyncio
 import os
@@ -15,21 +15,29 @@ from service.settings.notifications import SecretSettings
 
 @dataclass(frozen=True)
 class Delivered:
-    """Outcome: the receiver accepted the message."""
+    """Outcome of a delivery attempt: the receiver accepted the message, with the reply `answer`."""
 
     answer: str
 
 
 @dataclass(frozen=True)
 class Refused:
-    """Outcome: the receiver rejected the message permanently."""
+    """Outcome of a delivery attempt: permanent rejection, with the reply `answer`."""
 
     answer: str
 
 
 @dataclass(frozen=True)
 class Failed:
-    """Outcome: the attempt failed and is repeated, not before the delay `retry_after_s`."""
+    """Outcome of a delivery attempt: it failed and is repeated.
+
+    Parameters
+    ----------
+    answer
+        Reply of the receiver, or reason of the failure.
+    retry_after_s
+        Minimum delay that the receiver requested; None if not requested.
+    """
 
     answer: str
     retry_after_s: float | None = None
@@ -39,7 +47,7 @@ Outcome = Delivered | Refused | Failed
 
 
 class Channel(Protocol):
-    """Protocol of a notification channel to one receiver."""
+    """Protocol of a notification channel, which sends messages to one receiver."""
 
     @property
     def address(self) -> str:
@@ -107,9 +115,10 @@ def _context(ca_file: str | None) -> ssl.SSLContext:
 
 
 async def connected_socket(look_up: NameLookUp, port: int, timeout_s: float) -> socket.socket:
-    """Return a socket connected to the first address of a host that accepts a connection.
+    """Return a non-blocking socket connected to the first address that accepts a connection.
 
-    Raises the `OSError` of the last address if no address accepts a connection.
+    `timeout_s` limits the name resolution and each attempt. Raises the `OSError` of the last
+    address if no address accepts a connection.
     """
     failure: OSError = OSError("has no address")
     async with asyncio.timeout(timeout_s):
@@ -136,7 +145,7 @@ async def _connected(address: str, port: int) -> socket.socket:
 
 
 def error_text(error: BaseException) -> str:
-    """Return the message of an error, or the name of its class if it has none."""
+    """Return the message of an exception; if empty, a text for time-outs, or the class name."""
     if isinstance(error, TimeoutError) and not str(error):
         return "no answer in time"
     text = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
@@ -144,6 +153,6 @@ def error_text(error: BaseException) -> str:
 
 
 def printable(text: str, max_chars: int = 200) -> str:
-    """Return received text as one line without control characters, truncated to `max_chars`."""
+    """Return text as one line of printable characters, truncated to `max_chars`."""
     one_line = " ".join(text.split())
     return "".join(c if c.isprintable() else "�" for c in one_line)[:max_chars]

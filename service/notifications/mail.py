@@ -1,4 +1,4 @@
-"""Mail channel over SMTP: one recipient, one connection per attempt."""
+"""Notification channel by mail (SMTP): one recipient, one connection per delivery attempt."""
 
 import asyncio
 import contextlib
@@ -36,7 +36,7 @@ DISCLAIMER = "padwatch monitors conditions and is not a protection system; this 
 
 
 def subject(message: Message) -> str:
-    """Return the subject of the mail: one line without control characters."""
+    """Return the subject of the mail about a message: one line without control characters."""
     if message["type"] == "test":
         return printable(f"[padwatch] {message['plant']}: test message")
     priority = (message["priority"] or "").upper() if message["is_active"] else "over"
@@ -45,19 +45,19 @@ def subject(message: Message) -> str:
 
 
 def text(message: Message) -> str:
-    """Return the text of the mail."""
+    """Return the plain text of the mail about a message."""
     lines = _test(message) if message["type"] == "test" else _alarm(message)
     return "\n".join(lines) + "\n"
 
 
 def change_words(message: Message) -> str:
-    """Return the change of the alarm as text."""
+    """Return the change of the alarm that a message reports, in words."""
     change: str = message["change"]
     return CHANGES.get(change, change.replace("_", " "))
 
 
 def value_words(message: Message) -> str | None:
-    """Return the alarm value with its uncertainty and limit as text; None without a value."""
+    """Return the alarm value with 95 % uncertainty and limit as text; None without a value."""
     value, limit, std = message["value"], message["limit"], message["uncertainty"]
     if value is None:
         return None
@@ -133,7 +133,7 @@ POLICY = SMTP_POLICY.clone(cte_type="7bit", max_line_length=76)
 
 
 class Mail:
-    """Mail channel to one recipient."""
+    """Notification channel that sends each message as a mail to one recipient."""
 
     def __init__(self, settings: SmtpSettings, recipient: str, trusted: TrustedAuthorities) -> None:
         self.address = recipient
@@ -201,7 +201,7 @@ class Mail:
 
 
 def mail_of(message: Message, sender: str, recipient: str) -> EmailMessage:
-    """Return the mail, identical for every attempt and marked as auto-generated (RFC 3834)."""
+    """Return the mail of a message, equal for all attempts, marked as auto-generated (RFC 3834)."""
     mail = EmailMessage(policy=POLICY)
     mail["From"] = sender
     mail["To"] = recipient

@@ -17,7 +17,7 @@ from service.runtime.times import rfc3339
 from service.settings.alarm_kinds import value_unit
 
 Message = dict[str, Any]
-"""Notification message as a JSON object."""
+"""Notification message as a JSON object: values by key."""
 
 FORMAT = 1
 """Version of the message format, incremented if a key is removed or changes its meaning."""
@@ -32,7 +32,7 @@ QUANTITIES = {quantity.name: quantity for quantity in CATALOGUE}
 
 @dataclass(frozen=True)
 class AlarmContext:
-    """Operating data of the alarm's bearing that a message contains in addition to the alarm.
+    """Operating data of the bearing of an alarm, for the notification message about the alarm.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class AlarmContext:
     state
         Name of the operating state; None if unknown.
     condition
-        Values of the quantities of `CONDITION` by name, in the format of the message.
+        Label, value, unit and uncertainty of each quantity of `CONDITION` by name, as JSON object.
     """
 
     uncertainty: float | None = None
@@ -56,7 +56,7 @@ NewestFilm = Callable[[str, str], FilmNews | None]
 
 
 class LiveContext:
-    """Function object that returns the context of an alarm from the live results."""
+    """Function that returns the context of an alarm from the newest monitoring results."""
 
     def __init__(self, live: LiveView) -> None:
         self._live = live
@@ -67,7 +67,7 @@ class LiveContext:
         self._newest_film = newest
 
     def __call__(self, identity: AlarmIdentity) -> AlarmContext:
-        """Return the context of an alarm; empty without an assessment of the alarm's subject."""
+        """Return the context of an alarm; empty if its bearing or part has no assessment."""
         assessment = self._live.assessment(identity.unit, identity.subject)
         if assessment is None:
             return AlarmContext()
@@ -92,12 +92,16 @@ class LiveContext:
 
 
 class Composer:
-    """Factory of the messages of one plant.
+    """Factory of the notification messages of one plant.
 
     Parameters
     ----------
     url
         URL of the dashboard; None omits links.
+    unit_names
+        Displayed names of the units by id.
+    context
+        Function that returns the context of an alarm.
     new_id
         Function that returns a unique message id.
     """
@@ -115,7 +119,7 @@ class Composer:
         self._context, self._new_id = context, new_id
 
     def alarm(self, alarm: Alarm, event: AlarmEvent, is_active: bool, now_ns: int) -> Message:
-        """Return the message about an event of an alarm."""
+        """Return the message about an event of an alarm, written at the time `now_ns`."""
         identity, context = event.identity, self._context(event.identity)
         return {
             **self._head("alarm", now_ns),
@@ -144,7 +148,7 @@ class Composer:
         }
 
     def test(self, now_ns: int) -> Message:
-        """Return a test message."""
+        """Return a test message, written at the time `now_ns`."""
         return self._head("test", now_ns)
 
     def _head(self, type_: str, now_ns: int) -> Message:
@@ -159,7 +163,7 @@ class Composer:
 
 
 def dumps(message: Message) -> str:
-    """Serialize a message to JSON text, which is signed and sent."""
+    """Return a message as compact JSON text, in the form that is signed and sent."""
     return json.dumps(message, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
 
 
@@ -180,5 +184,5 @@ def _fact(name: str, value: float | None, uncertainty: float | None) -> Message:
 
 
 def _finite(number: float | None) -> float | None:
-    """Return a finite number; None if it is infinite or NaN, which JSON cannot represent."""
+    """Return `number` if it is finite, otherwise None: JSON has no infinity and NaN."""
     return number if number is not None and math.isfinite(number) else None

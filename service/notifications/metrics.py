@@ -1,4 +1,4 @@
-"""Delivery metrics by receiver of the plant file."""
+"""Prometheus metrics of notification delivery, by receiver of the plant file."""
 
 from collections.abc import Callable, Iterator, Sequence
 
@@ -10,7 +10,7 @@ from service.runtime.metrics import gauge
 
 
 def delivery_metrics(views: Sequence[ReceiverView] | None, now_ns: int) -> Iterator[Metric]:
-    """Yield the delivery metrics; ``views`` is None if the outbox cannot be read."""
+    """Yield the metrics of all receivers; ``views`` is None if the outbox cannot be read."""
     by_name: dict[str, list[ReceiverView]] = {}
     for view in views or ():
         if (

@@ -1,4 +1,4 @@
-"""Routing of alarm events: outbox messages for the receivers that subscribe to the event."""
+"""Routing of alarm events: outbox messages for the receivers that subscribe to an event."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ LEVELS = {"alert": AlarmLevel.ALERT, "danger": AlarmLevel.DANGER}
 
 @dataclass(frozen=True)
 class Notice:
-    """Alarm event as a receiver is notified of it.
+    """Alarm event in the view of receivers, which do not see hidden alarms.
 
     Parameters
     ----------
@@ -30,7 +30,8 @@ class Notice:
     is_active
         Whether the alarm is active after the event.
     ends
-        Whether the alarm is over; only receivers that were notified of the alarm need this.
+        Whether the alarm is over for the receiver; only receivers of previous notices of the alarm
+        need this notice.
     """
 
     change: AlarmChange
@@ -55,7 +56,7 @@ def notice_of(alarm: Alarm, event: AlarmEvent) -> Notice | None:
 
 
 class Router:
-    """Function object that creates the outbox messages of an event when the event is stored."""
+    """Function that creates the outbox messages of an alarm event when the event is stored."""
 
     def __init__(
         self,
@@ -96,7 +97,7 @@ class Router:
 
 
 def _wanted(receiver: ReceiverSettings, event: AlarmEvent, notice: Notice) -> Notice | None:
-    """Return the notice for one receiver; None if its settings exclude the event."""
+    """Return the notice for one receiver; None if the receiver settings exclude the event."""
     identity = event.identity
     if receiver.units is not None and identity.unit not in receiver.units:
         return None

@@ -1,4 +1,4 @@
-"""Senders: delivery of the outbox messages of each receiver, in order and one at a time."""
+"""Senders: delivery of outbox messages to each receiver, one at a time in outbox order."""
 
 import asyncio
 import random
@@ -28,14 +28,16 @@ def wait_s(
     max_s: float,
     share: Callable[[], float] = random.random,
 ) -> float:
-    """Return the delay before the next attempt: exponential back-off, reduced by random jitter.
+    """Return the delay in s before the next attempt: exponential back-off less random jitter.
 
     Parameters
     ----------
     n_failures
-        Number of consecutive failures, at least 1.
+        Number of consecutive failed attempts, 1 or more.
     retry_after_s
         Minimum delay requested by the receiver, limited to `max_s`; None if not requested.
+    max_s
+        Maximum delay.
     share
         Function that returns a random number from 0 to 1; the jitter is up to half the delay.
     """
@@ -50,8 +52,8 @@ BATCH = 50
 """Maximum number of outbox messages that a sender loads at once."""
 
 LOOK_S = 30.0
-"""Interval of outbox checks without a wake-up: another process may have requeued messages, or the
-quiet hours may have ended."""
+"""Interval of outbox checks without `Sender.wake`: another process may have requeued messages, or
+the quiet hours may have ended."""
 
 STORE_RETRY_S = 1.0
 
@@ -74,7 +76,7 @@ class Receiver:
 
 
 class SenderState(StrEnum):
-    """Activity of a sender."""
+    """Activity of a sender; `QUIET` is waiting for the end of the quiet hours of the receiver."""
 
     IDLE = "idle"
     SENDING = "sending"
@@ -85,18 +87,18 @@ class SenderState(StrEnum):
 
 @dataclass(frozen=True)
 class SenderStatus:
-    """Status of a sender: its state and its failed attempts.
+    """Status of a sender: its activity and its failed attempts.
 
     Parameters
     ----------
     n_failures
         Number of failed attempts since the last delivery.
     failing_since_ns
-        Time of the first of these failures; None without failures.
+        Time of the first of these failures, in ns since 1970 UTC; None without failures.
     reason
         Reason of the newest failure.
     next_attempt_ns
-        Time of the next attempt; None if the sender is not in a retry delay.
+        Time of the next attempt, in ns since 1970 UTC; None outside a retry delay.
     """
 
     state: SenderState = SenderState.IDLE
@@ -107,7 +109,7 @@ class SenderStatus:
 
 
 class Sender:
-    """Loop that delivers the waiting outbox messages of one receiver."""
+    """Background loop that delivers the waiting outbox messages of one receiver."""
 
     def __init__(self, receiver: Receiver, outbox: Outbox, clock: Clock) -> None:
         self.receiver, self.status = receiver, SenderStatus()
@@ -121,7 +123,7 @@ class Sender:
         self._news.set()
 
     async def run(self, pulse: Pulse = UNHEARD) -> None:
-        """Deliver messages until the task is cancelled."""
+        """Deliver messages until the task is cancelled, with heartbeats to `pulse`."""
         self._pulse = pulse
         while True:
             self._news.clear()
@@ -161,7 +163,7 @@ class Sender:
         return True
 
     async def _finish(self, letter: StoredMessage, outcome: Outcome) -> None:
-        """Store the outcome of a message; a cancellation does not interrupt the operation."""
+        """Store the final outcome of a message, even if the task is cancelled meanwhile."""
         is_delivered = isinstance(outcome, Delivered)
         state = MessageState.DELIVERED if is_delivered else MessageState.REFUSED
         now_ns = self._clock.now_ns()
@@ -193,9 +195,9 @@ class Sender:
         await self._clock.sleep(pause_s)
 
     async def _expire(self, answer: str) -> None:
-        """Expire all messages above the maximum age, after a failed attempt.
+        """Expire all messages that exceed the maximum age of the receiver, after a failed attempt.
 
-        A forward step of the host clock since the start of the sender does not count as age.
+        Forward steps of the host clock since the start of the sender do not count as age.
         """
         now = Arrival.now(self._clock)
         set_forward_s = max(0.0, now.step_s_since(self._begun))
@@ -260,14 +262,14 @@ async def _finished(work: Callable[[], T]) -> T:
 
 @dataclass(frozen=True)
 class ReceiverView:
-    """Public state of a receiver.
+    """State of a receiver and its messages, for the API and the metrics.
 
     Parameters
     ----------
     receiver, status
-        None for a receiver that was removed from the plant file; its messages remain queued.
+        None for a receiver that was removed from the plant file, whose messages remain queued.
     backlog
-        Counts of its outbox messages; None for a receiver without messages.
+        Counts of the outbox messages of the receiver; None without messages.
     """
 
     name: str
@@ -297,14 +299,14 @@ def receiver_views(
 
 
 class Deliveries:
-    """Senders of all receivers, which run independently of each other."""
+    """Group of the senders of all receivers, which deliver independently of each other."""
 
     def __init__(self, receivers: Sequence[Receiver], outbox: Outbox, clock: Clock) -> None:
         self._senders = {each.name: Sender(each, outbox, clock) for each in receivers}
         self._outbox, self._clock = outbox, clock
 
     async def run(self, beats: Heartbeats | None = None) -> None:
-        """Run all senders until the task is cancelled."""
+        """Run all senders until the task is cancelled, and record their heartbeats in `beats`."""
         beats = beats or Heartbeats(self._clock)
         loops = {f"deliver {name}": sender.run for name, sender in self._senders.items()}
         try:
@@ -321,7 +323,10 @@ class Deliveries:
             sender.wake()
 
     async def look(self) -> list[ReceiverView]:
-        """Return the state of all receivers. Raises `StoreError` if the outbox cannot be read."""
+        """Return the state of all receivers, as `receiver_views` does.
+
+        Raises `StoreError` if the outbox cannot be read.
+        """
         receivers = {name: sender.receiver for name, sender in self._senders.items()}
         return await asyncio.to_thread(
             receiver_views, receivers, self._outbox, lambda name: self._senders[name].status

@@ -1,4 +1,4 @@
-"""Webhook channel: signed POST requests, with a limit on the size of the response."""
+"""Notification channel by webhook: signed POST requests, with limited size of the response."""
 
 import asyncio
 import contextlib
@@ -32,7 +32,7 @@ from service.notifications.message import Message
 from service.settings.notifications import WebhookSettings
 
 PIECE_BYTES = 1024
-"""Maximum number of bytes per read; the event loop runs other tasks after each read."""
+"""Maximum number of bytes per read from the network; other tasks run after each read."""
 
 MAX_BYTES = 32_768
 """Maximum size of a response, including its headers."""
@@ -49,7 +49,10 @@ class BoundedStream(httpcore2.AsyncNetworkStream):
         self._stream, self._n_left = stream, n_left
 
     async def read(self, max_bytes: int, timeout: float | None = None) -> bytes:
-        """Read up to `max_bytes`. Raises `httpcore2.ReadError` if the total limit is reached."""
+        """Read and return up to `max_bytes` bytes.
+
+        Raises `httpcore2.ReadError` if the total limit is reached.
+        """
         if self._n_left <= 0:
             raise httpcore2.ReadError(f"the response is longer than {MAX_BYTES} bytes")
         found = await self._stream.read(min(max_bytes, PIECE_BYTES), timeout)
@@ -71,17 +74,17 @@ class BoundedStream(httpcore2.AsyncNetworkStream):
         server_hostname: str | None = None,
         timeout: float | None = None,
     ) -> httpcore2.AsyncNetworkStream:
-        """Return the connection encrypted with TLS, with the remaining limit."""
+        """Encrypt the connection with TLS; return the new stream, with the remaining byte limit."""
         encrypted = await self._stream.start_tls(ssl_context, server_hostname, timeout)
         return BoundedStream(encrypted, self._n_left)
 
     def get_extra_info(self, info: str) -> Any:
-        """Return information about the underlying connection."""
+        """Return the item `info` of the metadata of the underlying connection."""
         return self._stream.get_extra_info(info)
 
 
 class BoundedNetwork(httpcore2.AsyncNetworkBackend):
-    """Network backend that resolves one host name with `NameLookUp`."""
+    """Network backend that connects to one host, resolved with `NameLookUp`, in bounded streams."""
 
     def __init__(self, look_up: NameLookUp) -> None:
         self._look_up, self._network = look_up, httpcore2.AnyIOBackend()
@@ -119,14 +122,14 @@ EXCERPT_S = 2.0
 """Maximum size and read time of the excerpt of an error response."""
 
 FAULTS = (httpcore2.NetworkError, httpcore2.ProtocolError, httpcore2.UnsupportedProtocol)
-"""Network errors of `httpcore2` other than time-outs."""
+"""Exceptions of `httpcore2` for network errors other than time-outs."""
 
 RETRY_STATUSES = (408, 425, 429)
-"""Status codes of class 4xx after which the attempt is repeated."""
+"""HTTP status codes of class 4xx after which the delivery attempt is repeated."""
 
 
 class Webhook:
-    """Webhook channel: posts each message to a web server over a new connection."""
+    """Notification channel that posts each message to a web server over a new connection."""
 
     def __init__(self, settings: WebhookSettings, clock: Clock) -> None:
         self._settings, self._trusted = settings, TrustedAuthorities(settings.ca_file)
@@ -203,13 +206,19 @@ class Webhook:
 
 
 def signature(secret: str, time_s: str, body: bytes) -> str:
-    """Return the HMAC-SHA-256 of time stamp, dot and body; the time stamp prevents replay."""
+    """Return the signature of a request: ``v1=`` and the HMAC-SHA-256 of time stamp, dot and body.
+
+    The time stamp prevents replay.
+    """
     signed = time_s.encode() + b"." + body
     return "v1=" + hmac.new(secret.encode(), signed, hashlib.sha256).hexdigest()
 
 
 def retry_after_s(text: str | None, clock: Clock) -> float | None:
-    """Return the delay of a Retry-After header, seconds or date (RFC 9110, 10.2.3), or None."""
+    """Return the delay in s by a Retry-After header, which is a number of seconds or a date.
+
+    Return None if the header is missing or invalid (RFC 9110, 10.2.3).
+    """
     if text is None:
         return None
     if text.isascii() and text.isdigit():
@@ -224,7 +233,7 @@ def retry_after_s(text: str | None, clock: Clock) -> float | None:
 
 
 async def _excerpt(response: httpcore2.Response) -> str:
-    """Return the start of an error response, which may be endless or incomplete."""
+    """Return the first `EXCERPT_BYTES` of a response as text; less if it is slow or incomplete."""
     found = b""
     with contextlib.suppress(*FAULTS, httpcore2.TimeoutException, TimeoutError):
         async with asyncio.timeout(EXCERPT_S):

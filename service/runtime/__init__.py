@@ -1,1 +1,1 @@
-"""Process services: loops, heartbeats, metrics, files, disk space, time formats, sd_notify."""
+"""Process services: loops, heartbeats, metrics, files, disk space, times, service manager."""

@@ -6,7 +6,13 @@ from dataclasses import dataclass
 
 @dataclass
 class Asker:
-    """Connection state of the client of a request; read from other threads."""
+    """Connection state of the client of a request, which other threads read.
+
+    Parameters
+    ----------
+    has_gone
+        Whether the client has disconnected.
+    """
 
     has_gone: bool = False
 

@@ -1,4 +1,4 @@
-"""Free space of the disks that padwatch writes to: measurement, trend, limits, monitoring."""
+"""Free space of the disks that padwatch writes to: measurement, growth rate, limits, monitor."""
 
 import asyncio
 import os
@@ -21,7 +21,7 @@ class DiskSpace:
     Parameters
     ----------
     device
-        Number of the file system; folders with the same number share its space.
+        Device number of the file system; folders with the same number share its space.
     total_bytes
         Total capacity available to unprivileged users.
     free_bytes
@@ -42,9 +42,9 @@ Measure = Callable[[Path], DiskSpace]
 
 
 def measure_disk(folder: Path) -> DiskSpace:
-    """Measure the file system of a folder, or of its nearest parent that exists.
+    """Return capacity and free space of the file system of a folder, which need not exist.
 
-    Raises `OSError` if the file system cannot be read.
+    The nearest existing parent folder is used. Raises `OSError` if the file system cannot be read.
     """
     there = folder.absolute()
     while not there.exists() and there != there.parent:
@@ -60,8 +60,8 @@ def measure_disk(folder: Path) -> DiskSpace:
 
 EVERY_S = 600.0
 OVER_S = 86_400.0
-"""Interval and time span of the stored measurements. The span is one day, so that the mean growth
-includes captures and nightly backups."""
+"""Minimum interval and time span of the stored measurements. The span is one day, so that the mean
+growth includes captures and nightly backups."""
 
 MIN_HISTORY_S = 3600.0
 """Minimum time span of the measurements for an estimate of the growth."""
@@ -70,13 +70,13 @@ S_PER_DAY = 86_400.0
 
 
 class Growth:
-    """Growth rate of the used space of a disk, from the measurements of the last day."""
+    """Estimator of the growth rate of the used space of a disk over the last day."""
 
     def __init__(self) -> None:
         self._seen: deque[tuple[float, int]] = deque()
 
     def note(self, space: DiskSpace, now_s: float) -> None:
-        """Add a measurement at the monotonic time ``now_s``; discard old measurements."""
+        """Add a measurement at the monotonic time ``now_s``, at most one per `EVERY_S`."""
         if not self._seen or now_s - self._seen[-1][0] >= EVERY_S:
             self._seen.append((now_s, space.free_bytes))
         while len(self._seen) > 2 and now_s - self._seen[1][0] >= OVER_S:
@@ -97,15 +97,18 @@ class Growth:
 
 
 MAX_ALERT, MAX_DANGER = 0.25, 0.125
-"""Upper limits of `SpaceLimits` in bytes, as shares of the capacity, for small disks."""
+"""Shares of the capacity to which the byte limits of `SpaceLimits` are reduced on small disks."""
 
 DEADBAND_SHARE = 0.2
-"""Deadband of the limits as a share of the danger limit."""
+"""Deadband (hysteresis) of the limits as a share of the danger limit."""
 
 
 @dataclass(frozen=True)
 class SpaceLimits:
-    """Alert and danger limits of free space as a share and in bytes; the higher limit applies."""
+    """Alert and danger limits of free space, as shares of the capacity and in bytes.
+
+    The higher limit of share and bytes applies.
+    """
 
     alert_share: float = 0.1
     danger_share: float = 0.05
@@ -148,7 +151,10 @@ class DiskView:
 
 
 class SpaceWatch:
-    """Periodic measurement of the disks of some folders, in a thread, because a disk may hang."""
+    """Monitor of the free space of the disks that hold given folders.
+
+    Measurements run in a thread, because a disk may hang.
+    """
 
     def __init__(
         self,
@@ -182,7 +188,10 @@ class SpaceWatch:
         self.disks = tuple(first.values())
 
     def condition(self, held: AlarmLevel | None) -> Judgement:
-        """Return the most severe judgement of all disks; unknown if the measurement failed."""
+        """Return the most severe judgement of all disks; unknown if the last measurement failed.
+
+        `held` is the level of the previous judgement; None without an alarm.
+        """
         if self._trouble is not None:
             return unknown(self._trouble)
         found = [(self._judged(disk, held), disk) for disk in self.disks]

@@ -22,7 +22,7 @@ STORED = (".parquet",)
 
 
 def write_synced(path: Path, content: bytes) -> None:
-    """Write a file and sync its content to the disk."""
+    """Write a file, not atomically, and sync its content to the disk."""
     with path.open("wb") as file:
         file.write(content)
         file.flush()
@@ -97,7 +97,7 @@ def zipped(files: Mapping[str, Path | bytes]) -> Generator[bytes, None, None]:
 
 
 class Sink(RawIOBase):
-    """Write-only buffer; `taken` returns and removes its content."""
+    """Write-only in-memory file; `taken` returns and removes the bytes written so far."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -108,7 +108,7 @@ class Sink(RawIOBase):
         return True
 
     def write(self, piece: object) -> int:
-        """Append bytes; return their number."""
+        """Append the bytes `piece` to the buffer; return the number of bytes."""
         content = bytes(piece)  # type: ignore[call-overload]
         self._pieces.append(content)
         return len(content)

@@ -1,4 +1,4 @@
-"""Heartbeats: detection of dead and stuck loops; each heartbeat announces the next one."""
+"""Heartbeats of background loops, for the detection of loops that have ended or are stuck."""
 
 import math
 from collections.abc import Awaitable, Callable
@@ -10,10 +10,10 @@ PATIENCE_S = 60.0
 
 
 class Pulse:
-    """Receiver of the heartbeats of one loop; this base class ignores them."""
+    """Receiver of the heartbeats of one loop; this base class ignores all heartbeats."""
 
     def beat(self, after_s: float = 0.0) -> None:
-        """Record a heartbeat, with the maximum time until the next one."""
+        """Record a heartbeat; the next one follows within ``after_s`` seconds."""
 
     def rest(self) -> None:
         """Record a heartbeat of a loop that waits without a time limit."""
@@ -27,7 +27,7 @@ Loop = Callable[[Pulse], Awaitable[None]]
 
 
 class LoopPulse(Pulse):
-    """Time of the last heartbeat of one loop, and due time of the next heartbeat."""
+    """Recorder of the heartbeats of one loop, with the due time of the next heartbeat."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -36,7 +36,7 @@ class LoopPulse(Pulse):
         self._has_ended = False
 
     def beat(self, after_s: float = 0.0) -> None:
-        """Record a heartbeat; the next one is due after ``after_s`` plus `PATIENCE_S`."""
+        """Record a heartbeat; the next one is due within ``after_s`` plus `PATIENCE_S` seconds."""
         self._last_s = self._clock.monotonic_s()
         self._due_s = self._last_s + after_s + PATIENCE_S
 
@@ -60,7 +60,7 @@ class LoopPulse(Pulse):
 
 
 class Heartbeats:
-    """Heartbeats of all loops that must run as long as the program."""
+    """Recorder of the heartbeats of all loops that must run as long as the program."""
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
@@ -75,15 +75,15 @@ class Heartbeats:
             pulse.end()
 
     def release(self, *names: str) -> None:
-        """Remove loops that have finished as planned."""
+        """Remove the loops with these names, which have finished as planned, from the record."""
         for name in names:
             self._pulses.pop(name, None)
 
     def look(self) -> dict[str, str | None]:
-        """Return the fault of each loop by name; None for a loop that is alive."""
+        """Return the reason why each loop is dead or stuck, by loop name; None if it is alive."""
         return {name: pulse.trouble for name, pulse in self._pulses.items()}
 
     @property
     def troubles(self) -> dict[str, str]:
-        """Faults of the loops that are dead or stuck, by name."""
+        """Reasons why loops are dead or stuck, by loop name; empty if all loops are alive."""
         return {name: trouble for name, trouble in self.look().items() if trouble}

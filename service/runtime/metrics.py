@@ -1,4 +1,4 @@
-"""Metric families of a process, histograms of durations, and the text exposition."""
+"""Prometheus metric families, histograms of durations, and their text exposition format."""
 
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,14 +22,16 @@ from acquisition.clock import Clock
 
 @dataclass(frozen=True)
 class HistogramState:
-    """State of a histogram of durations.
+    """Snapshot of a histogram of durations.
 
     Parameters
     ----------
+    bounds_s
+        Upper bounds of the buckets.
     n_up_to
-        Cumulative count of each bucket; the last element counts all durations.
+        Number of durations up to each bound; the last element is the number of all durations.
     newest_s
-        Last duration; None before the first.
+        Last duration; None before the first duration.
     """
 
     bounds_s: tuple[float, ...]
@@ -84,11 +86,11 @@ class Durations:
 
 
 Rows = Iterable[tuple[tuple[str, ...], float]]
-"""Samples of a metric family: label values, in the order of the labels, and the value."""
+"""Samples of a metric family: label values in the order of the labels, and the sample value."""
 
 
 def gauge(name: str, meaning: str, labels: tuple[str, ...], rows: Rows) -> Metric:
-    """Return a gauge family."""
+    """Return the gauge family ``padwatch_`` + `name` with the help text `meaning`."""
     family = GaugeMetricFamily(f"padwatch_{name}", meaning, labels=labels)
     for values, number in rows:
         family.add_metric(values, number)
@@ -96,7 +98,7 @@ def gauge(name: str, meaning: str, labels: tuple[str, ...], rows: Rows) -> Metri
 
 
 def counter(name: str, meaning: str, labels: tuple[str, ...], rows: Rows) -> Metric:
-    """Return a counter family; `_total` is added to its name."""
+    """Return the counter family ``padwatch_`` + `name` + ``_total``, with help text `meaning`."""
     family = CounterMetricFamily(f"padwatch_{name}", meaning, labels=labels)
     for values, number in rows:
         family.add_metric(values, number)
@@ -104,7 +106,7 @@ def counter(name: str, meaning: str, labels: tuple[str, ...], rows: Rows) -> Met
 
 
 def histogram(name: str, meaning: str, durations: Mapping[str, Durations]) -> Metric:
-    """Return a histogram family with the label `unit`."""
+    """Return a histogram family with the label ``unit``, from histograms by unit id."""
     family = HistogramMetricFamily(f"padwatch_{name}", meaning, labels=("unit",))
     for unit, its in durations.items():
         family.add_metric((unit,), *_buckets(its.state()))
@@ -112,7 +114,7 @@ def histogram(name: str, meaning: str, durations: Mapping[str, Durations]) -> Me
 
 
 def plain_histogram(name: str, meaning: str, durations: Durations) -> Metric:
-    """Return a histogram family without labels."""
+    """Return a histogram family without labels, from one histogram."""
     return HistogramMetricFamily(f"padwatch_{name}", meaning, *_buckets(durations.state()))
 
 
@@ -127,7 +129,7 @@ OPEN_METRICS = "application/openmetrics-text; version=1.0.0; charset=utf-8"
 
 
 def rendered(metrics: Collector, accept: str) -> tuple[bytes, str]:
-    """Return metrics in a text exposition format, with the media type of the text.
+    """Return metrics in the OpenMetrics or Prometheus text format, and the media type of the text.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Functions of background loops: repetition, logging of failures, pauses with heartbeats."""
+"""Parts of background loops: repetition, logging of failures, pauses with heartbeats."""
 
 from collections.abc import Awaitable, Callable
 
@@ -10,7 +10,7 @@ from service.runtime.heartbeats import Pulse
 log = structlog.get_logger()
 
 LOOK_S = 20.0
-"""Maximum interval of heartbeats during a sleep of `rest`."""
+"""Maximum interval between heartbeats during a sleep in `rest`."""
 
 MAX_REST_S = 120.0
 """Maximum pause of `rest_after`."""
@@ -44,7 +44,7 @@ class TroubleLog:
 async def periodic(
     work: Callable[[], Awaitable[None]], every_s: float, clock: Clock, pulse: Pulse
 ) -> None:
-    """Run `work` repeatedly, with a heartbeat before and a pause after each run."""
+    """Run `work` repeatedly, with a heartbeat before and a pause of `every_s` after each run."""
     while True:
         pulse.beat(every_s)
         await work()
@@ -52,7 +52,7 @@ async def periodic(
 
 
 async def rest(duration_s: float, clock: Clock, pulse: Pulse) -> None:
-    """Sleep and send heartbeats during the sleep."""
+    """Sleep for `duration_s`, and send heartbeats to `pulse` during the sleep."""
     until_s = clock.monotonic_s() + duration_s
     while (left_s := until_s - clock.monotonic_s()) > 0.0:
         pulse.beat(LOOK_S)
@@ -60,7 +60,7 @@ async def rest(duration_s: float, clock: Clock, pulse: Pulse) -> None:
 
 
 async def rest_after(taken_s: float, share: float, clock: Clock, pulse: Pulse) -> None:
-    """Sleep for `share` times the duration `taken_s` of the last work, and send heartbeats.
+    """Sleep for `share` times the duration `taken_s` of the last run, and send heartbeats.
 
     The sleep is limited to `MAX_REST_S`, so that one slow disk access does not stall the loop.
     """

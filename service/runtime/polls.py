@@ -1,4 +1,4 @@
-"""Poll durations: time between two sleeps of a source, in which it reads its device."""
+"""Measurement of poll durations, the time between two sleeps of a source that reads a device."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Mapping
@@ -13,7 +13,8 @@ from service.runtime.heartbeats import UNHEARD, Pulse
 from service.runtime.metrics import Durations
 
 POLL_BOUNDS_S = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0)
-"""Histogram bounds, from a reply within milliseconds on the plant network up to a time-out."""
+"""Upper bounds of the histogram of poll durations, from milliseconds on the plant network up to a
+time-out."""
 
 
 class PollClock:
@@ -34,7 +35,7 @@ class PollClock:
         return self._clock.now_ns()
 
     def monotonic_s(self) -> float:
-        """Return the monotonic time in seconds; send a heartbeat."""
+        """Return the monotonic time in seconds, from an arbitrary start; send a heartbeat."""
         self._beat()
         return self._clock.monotonic_s()
 
@@ -60,7 +61,7 @@ class PollClock:
             self._pulse.beat(after_s)
 
     def forget(self) -> None:
-        """Discard the time of the last sleep: the time between two connections is not a poll."""
+        """Discard the last sleep of the calling task; time between connections is not a poll."""
         task = asyncio.current_task()
         if task is not None:
             self._woken_s.pop(task, None)
@@ -75,14 +76,14 @@ def _current_task() -> asyncio.Task[Any] | None:
 
 
 class TimedSource:
-    """Sample source with measurement of its poll durations."""
+    """Wrapper of a sample source that measures the poll durations of the source."""
 
     def __init__(self, make: Callable[[Clock], SampleSource], clock: Clock) -> None:
         self._clock = PollClock(clock)
         self._source = make(self._clock)
 
     def set_pulse(self, pulse: Pulse) -> None:
-        """Send the heartbeats of the calling task, which reads the source, to ``pulse``."""
+        """Send the heartbeats of the calling task, which must read this source, to ``pulse``."""
         self._clock.set_pulse(pulse)
 
     @property
@@ -92,12 +93,12 @@ class TimedSource:
 
     @property
     def refused_frames(self) -> Mapping[str, int]:
-        """Frames that the source dropped, by reason."""
+        """Number of frames that the source dropped, by reason."""
         return refused_frames_of(self._source)
 
     @asynccontextmanager
     async def connect(self) -> AsyncIterator[AsyncIterator[SampleBlock]]:
-        """Open the link of the source; yield its blocks and raise its errors."""
+        """Open the link of the source and yield its blocks; errors of the source are raised."""
         self._clock.forget()
         async with self._source.connect() as blocks:
             yield blocks

@@ -1,4 +1,4 @@
-"""Process set-up: event loop, signals, exit, memory allocation, logging, author of files."""
+"""Process set-up: event loop, signals, exit, memory allocation, logging, author in files."""
 
 import asyncio
 import ctypes
@@ -50,9 +50,9 @@ log = structlog.get_logger()
 
 
 def run_to_its_end(program: Coroutine[Any, Any, None]) -> None:
-    """Run the main coroutine of a program, which writes all data before it returns.
+    """Run the main coroutine `program`, which must write all data before it returns.
 
-    At its end, the event loop waits for threads of cancelled requests without a time limit. A
+    Afterwards the event loop waits for threads of cancelled requests without a time limit. A
     thread cannot be stopped, so the process exits after `LEAVE_S`.
     """
     sys.setswitchinterval(SWITCH_S)
@@ -101,7 +101,7 @@ def made_by() -> str:
 
 
 def person() -> str:
-    """Return the names of the user and the host as text."""
+    """Return the names of user and host of the process as text, ``user on host``."""
     try:
         name = getpass.getuser()
     except (KeyError, OSError):  # a user of a container may have no name

@@ -1,4 +1,4 @@
-"""Notification of the service manager by the systemd protocol, sd_notify(3)."""
+"""Notifications to the service manager by the protocol of systemd, sd_notify(3)."""
 
 import os
 import socket
@@ -54,7 +54,7 @@ class ServiceManager:
 
 
 def _address(named: str) -> str | None:
-    """Return the address of the socket from its path or its abstract name, which begins with @."""
+    """Return the address of a socket given by path or by abstract name (@…), or None."""
     if named.startswith("@"):
         return "\0" + named[1:]
     if named.startswith("/"):
@@ -65,7 +65,7 @@ def _address(named: str) -> str | None:
 
 
 def _watchdog_s(environment: Mapping[str, str]) -> float | None:
-    """Return the watchdog interval; None if the watchdog does not supervise this process."""
+    """Return the watchdog interval in seconds; None if no watchdog supervises this process."""
     if environment.get("WATCHDOG_PID", str(os.getpid())) != str(os.getpid()):
         return None
     given = environment.get("WATCHDOG_USEC", "")

@@ -1,4 +1,4 @@
-"""Simulated CAN DAQ: frames of the sample blocks of a unit; faults of frames and of the bus."""
+"""Simulated CAN data acquisition (DAQ): buffered frames of sample blocks, and frame faults."""
 
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -20,16 +20,17 @@ Item: TypeAlias = WireFrame | bytes
 _LONG_LINE = b"t100" + b"8" * 5000 + b"\r"
 _FOREIGN_ID = 0x7F0
 _FLOOD = 10
-"""Number of foreign frames that the fault ``flood`` sends before a frame."""
+"""Number of unrelated frames that the fault ``flood`` sends before one waveform frame."""
 
 
 class FrameFaults:
-    """Fault injection into waveform frames, one fault per frame, in the order of injection.
+    """Injector of faults into waveform frames, one fault per frame, in the order of injection.
 
     Parameters
     ----------
     as_line
-        Function that encodes a frame as a text line; None without a text protocol.
+        Function that encodes a frame as a line of the slcan text protocol, for faults of lines;
+        None if frames are not sent as text.
     """
 
     def __init__(self, as_line: Callable[[WireFrame], bytes] | None = None) -> None:
@@ -55,11 +56,11 @@ class FrameFaults:
             }
 
     def inject(self, fault: str, count: int) -> None:
-        """Apply a fault to each of the next `count` waveform frames."""
+        """Queue a fault, a key of `known`, for `count` waveform frames."""
         self._waiting.extend([self.known[fault]] * count)
 
     def applied(self, frames: Iterable[WireFrame]) -> list[Item]:
-        """Return the items that are sent instead of `frames`, with waiting faults applied."""
+        """Apply the queued faults to `frames`, and return the items to be sent instead."""
         items: list[Item] = []
         for frame in frames:
             if not frame.wave or not (self._waiting or self._held):
@@ -74,7 +75,7 @@ class FrameFaults:
         return items
 
     def _hold_back(self, frame: WireFrame) -> list[Item]:
-        """Hold a frame, which is sent after the next frame with the same id."""
+        """Return no items now; the frame is sent after the next frame with the same id."""
         self._held = frame
         return []
 
@@ -100,16 +101,22 @@ _U32 = 1 << 32
 
 
 class CanDevice:
-    """Converter and CAN controller of one unit; the first block is available from the start.
+    """Simulated CAN DAQ of one unit, with a buffer of sample blocks as CAN frames.
+
+    The buffer contains the first block from the start.
 
     Parameters
     ----------
     feed
         Source of the samples.
+    shape
+        Channels and message format.
     unit
         Name of the unit in the ledger.
+    ledger
+        Count of the produced samples; a new one by default.
     block_samples
-        Samples per channel of a block; a block begins with health, time and slow values.
+        Number of samples per channel in a block.
     buffer_blocks
         Maximum number of buffered blocks; a new block then replaces the oldest block.
 
@@ -118,7 +125,7 @@ class CanDevice:
     ended
         Whether the feed has ended.
     elapsed_ns
-        Total duration of the produced blocks and of the gaps between them.
+        Total duration of the produced blocks and of the gaps between them, in nanoseconds.
 
     Raises
     ------
@@ -173,7 +180,7 @@ class CanDevice:
         return self._waiting.popleft()
 
     def produce(self, n_blocks: int = 1) -> None:
-        """Produce `n_blocks` blocks, or fewer at the end of the feed."""
+        """Add the next `n_blocks` blocks of the feed to the buffer, or fewer if the feed ends."""
         for _ in range(n_blocks):
             try:
                 self._take(self._feed.advance(self.block_samples))
@@ -182,7 +189,7 @@ class CanDevice:
                 return
 
     def freeze(self, n_blocks: int) -> None:
-        """Repeat the last block in place of the next `n_blocks` blocks."""
+        """Replace each of the next `n_blocks` blocks by a copy of the last block."""
         self._n_frozen += n_blocks
 
     def restart(self) -> None:

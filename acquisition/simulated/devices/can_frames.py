@@ -15,7 +15,7 @@ _U16, _U32 = 1 << 16, 1 << 32
 
 
 class FrameKind(Enum):
-    """Kind of a CAN frame."""
+    """Kind of a CAN frame; `BUS_OFF` is the report that the controller has left the bus."""
 
     DATA = "data"
     REMOTE = "remote"
@@ -29,8 +29,12 @@ class WireFrame:
 
     Parameters
     ----------
+    extended
+        Whether the id has 29 bits rather than 11.
+    fd
+        Whether the frame is a CAN FD frame rather than a classic CAN frame.
     wave
-        Whether the frame carries samples.
+        Whether the frame is a waveform frame, which carries samples.
     """
 
     frame_id: int
@@ -42,7 +46,7 @@ class WireFrame:
 
 
 class FrameEncoder:
-    """Encoder of raw blocks as CAN frames."""
+    """Encoder of sample blocks as CAN frames in a message format."""
 
     def __init__(self, shape: CanShape) -> None:
         self._heads = [m for m in shape.messages if m.first_channel is None]
@@ -103,6 +107,6 @@ class FrameEncoder:
 
 
 def shortened(frame: WireFrame) -> WireFrame:
-    """Return the frame truncated to the next shorter valid CAN FD data length."""
+    """Return a copy of a frame with its data truncated to the next shorter CAN FD data length."""
     length = max(n for n in CAN_FD_DLC if n < len(frame.data))
     return replace(frame, data=frame.data[:length])

@@ -1,4 +1,4 @@
-"""Servers of the simulated CAN DAQ: pacing, faults and end; server for python-can buses."""
+"""Base class of the servers of the simulated CAN DAQ, and server on a python-can bus."""
 
 import asyncio
 from abc import abstractmethod
@@ -20,20 +20,20 @@ _ERROR_ID = 0x88
 
 
 class CanDaqServer(DaqServer):
-    """Server of one simulated CAN device.
+    """Base class of the servers that send the frames of one simulated CAN device.
 
     Parameters
     ----------
     clock
-        Clock that paces the device, which catches up after a delay; None produces blocks only when
-        ``produce`` is called, or `on_demand`.
+        Clock of the production of blocks; after a delay, overdue blocks are produced at once.
+        Without a clock, blocks are produced only by ``produce`` or on demand.
     on_demand
-        Without a clock: produce blocks as fast as the client reads them, without loss.
+        Whether, without a clock, a block is produced each time all previous blocks are sent.
     patient
-        With a clock: wait while no client is connected or the buffer is full, so that no block is
-        lost; otherwise the oldest blocks are lost.
+        Whether, with a clock, production waits while no client is connected or the buffer is full,
+        so that no block is lost. Otherwise the oldest blocks are lost.
     as_line
-        Function that encodes a frame as a text line, for a text protocol.
+        Function that encodes a frame as a line of a text protocol; None without text protocol.
     """
 
     def __init__(
@@ -56,24 +56,25 @@ class CanDaqServer(DaqServer):
 
     @abstractmethod
     async def _send(self, items: Sequence[Item]) -> None:
-        """Send frames; wait while the client does not read them."""
+        """Send frames and lines; wait while the client does not read them."""
 
     async def _listened_to(self) -> None:
-        """Wait until a client listens; a bus that does not report clients does not wait."""
+        """Wait until a client is connected; return at once if the bus does not report clients."""
 
     async def run(self) -> None:
         """Serve until cancelled, or until the feed has ended and all blocks are sent."""
         await asyncio.gather(*(asyncio.shield(task) for task in self._tasks))
 
     def produce(self, n_blocks: int = 1) -> None:
-        """Produce `n_blocks` blocks; needed only without a clock."""
+        """Produce the next `n_blocks` blocks at once; needed only without a clock."""
         self.device.produce(n_blocks)
         self._awake.set()
 
     def _faults_by_name(self) -> Mapping[str, Callable[[int], None]]:
-        """Return the faults of waveform frames, of blocks and of the device by name.
+        """Return the fault functions of waveform frames, of blocks and of the device, by name.
 
-        ``freeze`` repeats blocks; ``reset_epoch`` restarts the device once, with any count.
+        Their argument is a count. ``freeze`` repeats the last block in place of `count` blocks;
+        ``reset_epoch`` ignores the count and restarts the device once.
         """
         of_frames = {
             name: partial(self._frame_faults.inject, name) for name in self._frame_faults.known
@@ -122,15 +123,17 @@ class CanDaqServer(DaqServer):
 
 
 class CanBusServer(CanDaqServer):
-    """Server of one simulated CAN device on a python-can bus.
+    """Server that sends the frames of one simulated CAN device on a python-can bus.
 
     The interface "virtual" is limited to one process. "udp_multicast" reaches other processes and
     hosts over the route to its group, usually the default route; slow readers lose frames.
 
     Parameters
     ----------
-    interface, channel, options
-        Arguments of `can.Bus` of python-can.
+    interface, channel
+        Arguments of the same names of `can.Bus` of python-can.
+    options
+        Further keyword arguments of `can.Bus`; None for none.
     """
 
     def __init__(
@@ -178,7 +181,7 @@ class CanBusServer(CanDaqServer):
 
 
 def can_message(frame: WireFrame) -> can.Message:
-    """Return a frame as a python-can message."""
+    """Return the python-can message of a frame; an error message for error and bus-off frames."""
     if frame.kind in (FrameKind.BUS_OFF, FrameKind.ERROR):
         bits = _BUS_OFF_ID if frame.kind is FrameKind.BUS_OFF else _ERROR_ID
         return can.Message(

@@ -1,7 +1,8 @@
-"""Messages of the simulated CAN DAQ, their DBC file, and the settings of a source for them.
+"""Messages of the simulated CAN DAQ, their DBC file, and settings of a source that reads them.
 
-A block begins with messages of its sample index, epoch, health, time and slow values, each with a
-counter that refers to the first sample of the block. The waveform messages follow.
+A block begins with messages of its sample index, epoch, channel status, time and slow values. Each
+of these messages contains the index of the first sample of the block, or its lowest 16 bits as a
+counter. The waveform messages follow.
 """
 
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ _MAX_SLOW = 50
 
 
 class Kind(Enum):
-    """Data type of a signal; the value is the NumPy type code."""
+    """Data type of a CAN signal; the value of each member is its NumPy type code."""
 
     U8 = "u1"
     U16 = "u2"
@@ -39,7 +40,7 @@ class Kind(Enum):
 
 @dataclass(frozen=True)
 class Field:
-    """Signal of a CAN message; `offset` is in bytes."""
+    """Signal of a CAN message: byte offset, data type, and value of one count in `unit`."""
 
     name: str
     offset: int
@@ -50,10 +51,12 @@ class Field:
 
 @dataclass(frozen=True)
 class MessageShape:
-    """CAN message of the simulated DAQ.
+    """Format of one CAN message of the simulated DAQ.
 
     Parameters
     ----------
+    length
+        Number of data bytes.
     first_channel
         Index of the first channel of a waveform message; None for other messages.
     """
@@ -80,7 +83,7 @@ class MessageShape:
         )
 
     def records(self, n_frames: int) -> npt.NDArray[np.void]:
-        """Return records of `n_frames` frames, filled with zeros."""
+        """Return an array of `n_frames` records of this message, filled with zeros."""
         return np.zeros(n_frames, dtype=self.dtype)
 
 
@@ -90,8 +93,10 @@ class DaqSignal:
 
     Parameters
     ----------
-    unit, factor
-        Unit of the values, and value of one count in this unit; 1 for float32 samples.
+    unit
+        Unit of the values.
+    factor
+        Value of one count in `unit`; 1 for float32 samples.
     """
 
     id: str
@@ -105,10 +110,14 @@ class CanShape:
 
     Parameters
     ----------
+    fd
+        Whether messages are CAN FD rather than classic CAN.
     floats
         Whether samples are float32 in engineering units rather than int16 counts.
     base_id
         Id of the first message; further messages have consecutive ids.
+    extended
+        Whether ids have 29 bits rather than 11.
 
     Raises
     ------
@@ -143,7 +152,7 @@ class CanShape:
 
     @property
     def messages(self) -> tuple[MessageShape, ...]:
-        """All messages in transmission order of a block."""
+        """Formats of all messages of a block, in transmission order."""
         shapes = [*(self._fd_heads() if self.fd else self._classic_heads()), *self._waves()]
         return tuple(
             MessageShape(
@@ -160,7 +169,7 @@ class CanShape:
 
     @property
     def waves(self) -> tuple[MessageShape, ...]:
-        """Waveform messages, which carry samples."""
+        """Formats of the waveform messages, which carry samples."""
         return tuple(m for m in self.messages if m.first_channel is not None)
 
     def _classic_heads(self) -> "list[_Shape]":
@@ -217,7 +226,7 @@ _COUNTER = Field("counter", 0, Kind.U16)
 
 
 def dbc_name(channel_id: str) -> str:
-    """Return a channel id as a valid DBC name: letters, digits and underscores, no digit first."""
+    """Return the DBC name of a channel: letters, digits and underscores, no leading digit."""
     name = "".join(c if c.isalnum() and c.isascii() else "_" for c in channel_id)
     return f"_{name}" if name[0].isdigit() else name
 
@@ -251,7 +260,7 @@ BA_DEF_DEF_ "VFrameFormat" "StandardCAN";
 
 
 def daq_dbc(shape: CanShape) -> str:
-    """Return the text of the DBC file of the simulated DAQ."""
+    """Return the text of the DBC file that describes all messages of the simulated DAQ."""
     parts = [_HEADER]
     parts += [_message(message) for message in shape.messages]
     parts.append(_ATTRIBUTES)
@@ -272,6 +281,8 @@ def daq_settings(
 
     Parameters
     ----------
+    link
+        Settings of the connection to the CAN bus.
     units
         Engineering unit of each waveform channel.
     others

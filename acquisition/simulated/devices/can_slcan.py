@@ -1,7 +1,7 @@
-"""slcan servers of the simulated CAN DAQ: serial adapter on a TCP port or a pseudo-terminal.
+"""Simulated slcan adapters (CAN over a serial line) on a TCP port or a pseudo-terminal.
 
-The protocol is the text protocol of Lawicel adapters, with the FD lines ``d D b B`` of newer ones
-and the state lines ``s`` and ``e`` of the slcan driver of Linux.
+The protocol is the text protocol of Lawicel adapters, with the FD lines ``d D b B`` of newer
+adapters and the state lines ``s`` and ``e`` of the slcan driver of Linux.
 """
 
 import asyncio
@@ -27,7 +27,7 @@ _BUS_OFF_LINE, _ERROR_LINE = b"sb256256\r", b"e1B\r"
 
 
 def slcan_line(frame: WireFrame) -> bytes:
-    """Return a frame as an slcan line."""
+    """Return the slcan line of a frame, including the carriage return at its end."""
     if frame.kind is FrameKind.BUS_OFF:
         return _BUS_OFF_LINE
     if frame.kind is FrameKind.ERROR:
@@ -82,7 +82,7 @@ class _SlcanServer(CanDaqServer):
         return {**super()._faults_by_name(), "cut": lambda _: self.cut()}
 
     def _answer(self, data: bytes) -> bytes:
-        """Execute received commands; return the replies."""
+        """Execute the complete commands received so far, and return the replies to them."""
         *commands, self._command = (self._command + data).split(b"\r")
         self._command = self._command[:_MAX_COMMAND]
         return b"".join(self._carried_out(command) for command in commands)
@@ -128,7 +128,7 @@ class SlcanTcpServer(_SlcanServer):
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
-        """python-can interface and URL of the socket."""
+        """python-can interface and URL of the TCP socket, by key."""
         return {"interface": "slcan", "channel": f"socket://{self._host}:{self._port}"}
 
     async def _plug_in(self) -> None:
@@ -181,7 +181,7 @@ class SlcanPtyServer(_SlcanServer):
     Parameters
     ----------
     link
-        Symbolic link to the terminal; see `PseudoTerminal`.
+        Path of a symbolic link to the terminal; None for no link.
     """
 
     def __init__(
@@ -198,7 +198,7 @@ class SlcanPtyServer(_SlcanServer):
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
-        """python-can interface and path of the terminal."""
+        """python-can interface and path of the terminal, by key."""
         return {"interface": "slcan", "channel": self._line.name}
 
     async def _plug_in(self) -> None:

@@ -15,25 +15,27 @@ from acquisition.simulated.feed import Ledger, SampleFeed
 from core.arrays import CountArray
 
 _Record: TypeAlias = tuple[int, CountArray]
-"""Counter of a sample, and its counts, (n_channels,)."""
+"""Sample in a queue: counter and counts, (n_channels,) if interleaved, otherwise (1,)."""
 
 _COUNTER_MODULUS = 65536
 _ON_DEMAND_STEPS = 16
 
 
 class FifoDevice(ModbusDevice):
-    """Converter of one unit with sample queues; a full queue loses its oldest samples.
+    """Simulated Modbus device of one unit with sample queues; a full queue drops its oldest sample.
 
     Parameters
     ----------
     feed
         Source of the samples.
+    layout
+        Register addresses and format of the queues.
     unit
         Name of the unit in the ledger.
     depth_samples
         Maximum number of samples in a queue.
     step_samples
-        Number of samples that are produced together.
+        Number of samples per channel that are produced together.
     first_counter
         Counter of the first sample; the counter wraps after 65535.
 
@@ -75,12 +77,12 @@ class FifoDevice(ModbusDevice):
 
     @property
     def step_s(self) -> float:
-        """Duration of one step of samples."""
+        """Duration of `step_samples` samples in seconds."""
         return self._step_samples / self._rate_hz
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Faults by name: lost steps, an overflow of the queues, frozen data, a restart."""
+        """Fault functions by name, which take a count: lost steps, overflow, freeze, restart."""
         return {
             **super().faults,
             "drop": self._drop,
@@ -97,7 +99,7 @@ class FifoDevice(ModbusDevice):
             self._offset = -ahead.first_index
 
     def read_fifo(self, address: int) -> bytes | None:
-        """Return the registers of a queue for function 0x18; None if the queue does not exist."""
+        """Return the registers of the queue at an address; None if no queue has this address."""
         if address not in self._layout.addresses:
             return None
         queue = self._queues[self._layout.addresses.index(address)]
@@ -144,7 +146,7 @@ class FifoDevice(ModbusDevice):
         return run
 
     def _look(self) -> None:
-        """Record a read without new samples; produce samples if the device is on demand."""
+        """Count a read without new samples after the end of the feed; if on demand, add samples."""
         self._n_looks += self.ended
         if self.on_demand:
             self.produce(_ON_DEMAND_STEPS if self._layout.removes else 1)
@@ -161,7 +163,10 @@ class FifoDevice(ModbusDevice):
 
 
 def _jumps(records: list[_Record], kind: FifoKind) -> list[int]:
-    """Return the positions of counter jumps, at which a reply with one counter must end."""
+    """Return the indices after counter jumps, where a reply with one counter must end.
+
+    Return an empty list for interleaved queues.
+    """
     if kind is FifoKind.INTERLEAVED:
         return []
     pairs = enumerate(pairwise(records), start=1)

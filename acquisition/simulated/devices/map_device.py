@@ -1,4 +1,4 @@
-"""Simulated Modbus devices with the newest sample, or with vectors of the newest samples."""
+"""Simulated Modbus devices with registers of the newest samples, or of amplitudes and phases."""
 
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
@@ -31,21 +31,21 @@ class MapDevice(ModbusDevice):
     feed
         Source of the samples.
     registers
-        Register map. Values with an id of `rows` or of a slow channel of the calibration are
-        written; other values remain zero.
+        Register map. The device writes the values with an id in `rows`, or with the id of a slow
+        channel of the calibration; all other values remain zero.
     rows
-        Id of the map value of each channel of the feed.
+        Ids of the map values of the channels, in the channel order of the feed.
     calibration
         Calibration that converts the counts of the feed to engineering units.
     step_samples
-        Number of samples between two updates of the registers, which contain the last sample.
+        Number of samples between two updates of the registers; an update writes the last one.
 
     Attributes
     ----------
     image
         Contents of the registers.
     newest
-        Samples of the last update.
+        Block of `step_samples` samples of the last update.
     """
 
     def __init__(
@@ -72,12 +72,12 @@ class MapDevice(ModbusDevice):
 
     @property
     def step_s(self) -> float:
-        """Time between two updates of the registers."""
+        """Time between two updates of the registers in seconds."""
         return self._step_samples / self.newest.rate_hz
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Faults by name: frozen data, and invalid numbers or bad status in all values."""
+        """Fault functions by name, which take a count: frozen data, invalid numbers, bad status."""
         spoils = {name: partial(self._spoil_values, name) for name in (_SENTINEL, _FLAG)}
         return {**super().faults, **spoils}
 
@@ -87,7 +87,7 @@ class MapDevice(ModbusDevice):
         return self.image.read_registers(function, address, count)
 
     def read_bits(self, function: int, address: int, count: int) -> bytes | None:
-        """Return bits packed in bytes; None if an address does not exist."""
+        """Return bits packed in bytes, low bit first; None if an address does not exist."""
         self._look(function, address)
         return self.image.read_bits(function, address, count)
 
@@ -116,7 +116,7 @@ class MapDevice(ModbusDevice):
         self.image.put_time(raw.start_ns)
 
     def _numbers(self, raw: RawBlock, units: FloatArray) -> dict[str, tuple[float, bool]]:
-        """Return the number of each value by id, and whether it is good."""
+        """Return the number in engineering units, and whether its channel is OK, by value id."""
         channels = {
             row: (float(samples[-1]), ok)
             for row, samples, ok in zip(self._rows, units, raw.ok, strict=True)
@@ -149,13 +149,13 @@ class VectorDevice(MapDevice):
     Parameters
     ----------
     channels
-        Ids of the channels of the feed, in order.
+        Ids of the channels, in the channel order of the feed.
     rows
-        Quantities of the rack; their ids must be in the map.
+        Quantities that the rack calculates; their ids must be in the register map.
     speed_channel
-        Slow channel of the running speed in r/min, the frequency of the 1× line.
+        Id of the slow channel of the running speed in r/min, the frequency of the 1× line.
     window_samples
-        Window length: a multiple of `step_samples`, several turns long.
+        Number of samples in the window: a multiple of `step_samples`, several turns long.
     vortex_order
         Frequency of the vortex line as a multiple of the running speed.
     """
@@ -202,7 +202,7 @@ class VectorDevice(MapDevice):
     def _parts(
         self, samples: FloatArray, first_index: int, speed_rpm: float
     ) -> dict[VectorPart, FloatArray]:
-        """Return all quantities of the rack, (n_channels,); lines are NaN at standstill."""
+        """Return each quantity of the rack, (n_channels,); spectral lines are NaN at standstill."""
         rate_hz, turn_hz = self._calibration.rate_hz, hz_from_rpm(speed_rpm)
         turns = np.full((len(samples), 2), np.nan, dtype=np.complex128)
         if 0.0 < turn_hz < rate_hz / 2.0:

@@ -18,8 +18,8 @@ _MEI_READ_IDENTIFICATION = 14
 _BASIC_CONFORMITY = 0x81
 
 _LAST_LOOKS = 2
-"""Number of reads without new data after which a device is drained: the second read shows that the
-client has received the first reply, and all data before."""
+"""Number of reads without new data after which an ended device is `drained`. The second of these
+reads shows that the client has received the reply to the first."""
 
 
 class ModbusDevice(ABC):
@@ -33,14 +33,14 @@ class ModbusDevice(ABC):
     feed
         Source of the samples.
     step_samples
-        Number of samples that are produced together.
+        Number of samples per channel in a step, which are produced together.
     unit
         Name of the unit in the ledger.
 
     Attributes
     ----------
     identification
-        Objects of function 43/14 by number; if empty, the function is not supported.
+        Device identification objects by number, as bytes; if empty, function 43/14 is refused.
     frozen
         Whether the production of data is stopped; the device still replies.
     on_demand
@@ -62,7 +62,7 @@ class ModbusDevice(ABC):
     @property
     @abstractmethod
     def step_s(self) -> float:
-        """Duration of one step."""
+        """Duration of one step in seconds."""
 
     @property
     def drained(self) -> bool:
@@ -71,11 +71,11 @@ class ModbusDevice(ABC):
 
     @property
     def faults(self) -> Mapping[str, Callable[[int], None]]:
-        """Faults of the data by name; the argument of each function is a count."""
+        """Functions that inject faults of the data, by fault name; their argument is a count."""
         return {"freeze": self._freeze}
 
     def spoil(self, fault: str, count: int) -> None:
-        """Inject a fault of the data, `count` times."""
+        """Inject a fault of the data `count` times; `fault` is a key of `faults`."""
         self.faults[fault](count)
 
     def produce(self, n_steps: int = 1) -> None:
@@ -103,7 +103,7 @@ class ModbusDevice(ABC):
         return None
 
     def read_fifo(self, address: int) -> bytes | None:  # noqa: ARG002
-        """Return the registers of a queue (function 0x18); None if the queue does not exist."""
+        """Return the registers of the queue at an address; None if no queue has this address."""
         return None
 
     @abstractmethod
@@ -118,7 +118,7 @@ class ModbusDevice(ABC):
             self._position, self._feed_epoch = self._feed.number(raw), raw.epoch
 
     def _must_wait(self, ahead: RawBlock) -> bool:  # noqa: ARG002
-        """Whether the next step must be delayed until a client has read previous data."""
+        """Return whether the step `ahead` must wait until a client has read previous data."""
         return False
 
     def _freeze(self, count: int) -> None:
@@ -139,7 +139,7 @@ def answer(request: bytes, device: ModbusDevice) -> bytes:
 
 
 def refusal(function: int, code: int) -> bytes:
-    """Return an exception reply with an exception code."""
+    """Return the Modbus exception reply to a function, with an exception code."""
     return bytes((function | 0x80, code))
 
 
@@ -183,7 +183,7 @@ class RegisterMemory:
     ----------
     before_read
         Function that is called with address and count before each read, so that a test can change
-        the device between two requests.
+        the device between two requests; None calls nothing.
     """
 
     def __init__(self, start: int, n_registers: int) -> None:
@@ -192,12 +192,12 @@ class RegisterMemory:
         self.before_read: Callable[[int, int], None] | None = None
 
     def write(self, address: int, data: bytes) -> None:
-        """Write big-endian words.
+        """Write big-endian words to consecutive registers, beginning at `address`.
 
         Raises
         ------
         ValueError
-            If a register does not exist; the message contains both ranges.
+            If a register does not exist; the message contains the requested and the valid range.
         """
         offset = 2 * (address - self._start)
         if offset < 0 or offset + len(data) > len(self._data):
@@ -223,7 +223,9 @@ class RegisterMemory:
 
 Answerer: TypeAlias = Callable[[bytes], bytes]
 ReplyFault: TypeAlias = Callable[[bytes, Answerer], bytes | None]
-"""Function from a request and the correct reply function to the faulty reply; None for no reply."""
+"""Function of a request PDU, and of the function that answers requests correctly.
+
+Returns the faulty reply PDU, or None for no reply."""
 
 _DEVICE_FAILURE, _BUSY = 4, 6
 _EXCEPTION_CODES = (1, 2, 3, 4, 5, 6, 8, 10, 11)
@@ -231,27 +233,27 @@ _REGISTER_FUNCTIONS = (3, 4)
 
 
 class HangUpError(Exception):
-    """The device closes the connection instead of a reply."""
+    """The device closes the connection instead of sending a reply."""
 
 
 def hanging_up(request: bytes, answerer: Answerer) -> bytes:  # noqa: ARG001
-    """Reply fault: close the connection."""
+    """Reply fault: close the connection without a reply."""
     raise HangUpError
 
 
 def refusing(code: int) -> ReplyFault:
-    """Return a reply fault: an exception reply with a code."""
+    """Return a reply fault that answers with a Modbus exception code."""
     return lambda request, _: refusal(request[0], code)
 
 
 def shifted_map(request: bytes, answerer: Answerer) -> bytes:
-    """Reply fault: data of the next address, as after a firmware change."""
+    """Reply fault: reply with the data of the next address, as after a firmware change."""
     address = int.from_bytes(request[1:3], "big") + 1
     return answerer(request[:1] + (address & 0xFFFF).to_bytes(2, "big") + request[3:])
 
 
 def swapped_words(request: bytes, answerer: Answerer) -> bytes:
-    """Reply fault: exchanged words in each pair of registers."""
+    """Reply fault: exchange the two words of each pair of registers in the correct reply."""
     reply = answerer(request)
     n_pairs = (len(reply) - 2) // 4
     if reply[0] not in _REGISTER_FUNCTIONS or not n_pairs:

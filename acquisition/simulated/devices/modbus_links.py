@@ -134,7 +134,7 @@ class ModbusRtuServer(ModbusServer):
     Parameters
     ----------
     link
-        Symbolic link to the terminal; see `PseudoTerminal`.
+        Path of a symbolic link to the terminal; None for no link.
 
     Raises
     ------
@@ -157,7 +157,7 @@ class ModbusRtuServer(ModbusServer):
 
     @property
     def endpoint(self) -> Mapping[str, str | int]:
-        """Path of the serial line, and its parity, which is none."""
+        """Path of the pseudo-terminal, and the parity setting ``none``, by key."""
         return {"device": self._line.name, "parity": "none"}
 
     def cut(self) -> None:
@@ -203,5 +203,5 @@ class ModbusRtuServer(ModbusServer):
 
 
 def _request_bytes(frame: bytes) -> int:
-    """Return the length of the complete request frame, from its function code."""
+    """Return the number of bytes of a complete request frame, from its function code."""
     return _REQUEST_BYTES.get(frame[1] if len(frame) > 1 else 0, _MAX_REQUEST_BYTES)

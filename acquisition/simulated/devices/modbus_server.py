@@ -1,4 +1,4 @@
-"""Base class of the servers of a simulated Modbus device: pacing, reply faults and end."""
+"""Base class of the servers of a simulated Modbus device, with injected reply faults."""
 
 import asyncio
 from abc import abstractmethod
@@ -21,17 +21,17 @@ _ROUNDING = 1e-6
 
 
 class ModbusServer(DaqServer):
-    """Server of one simulated Modbus device.
+    """Base class of the servers of one simulated Modbus device.
 
     Parameters
     ----------
     device
         Device, which keeps its registers when the server exits.
     clock
-        Clock that paces the device, which catches up after a delay; None produces data only when
-        ``device.produce`` is called.
+        Clock of the production of data; after a delay, overdue data are produced at once. Without
+        a clock, data are produced only by ``device.produce``.
     patient
-        Whether pacing starts with the first request rather than on entering.
+        Whether the production of data starts with the first request rather than on entering.
 
     Attributes
     ----------
@@ -54,8 +54,9 @@ class ModbusServer(DaqServer):
         self._reply_faults: deque[ReplyFault] = deque()
 
     async def run(self) -> None:
-        """Serve until cancelled, or until the feed has ended and no client waits for data.
+        """Serve until cancelled, or until the feed has ended and its data are no longer needed.
 
+        Data are no longer needed if a client has read all data or no client is connected.
         Raises the error of the device if one occurs.
         """
         for pacing in self._tasks:
@@ -72,7 +73,7 @@ class ModbusServer(DaqServer):
         """Return the number of connected clients."""
 
     def reply(self, request: bytes) -> bytes | None:
-        """Return the reply to a request, with the next fault applied; None for no reply.
+        """Return the reply PDU to a request PDU, with the next fault applied; None for no reply.
 
         Raises
         ------

@@ -32,7 +32,7 @@ class RecordedFeed:
         self._ready: deque[RawBlock] = deque()
 
     def advance(self, n_samples: int) -> RawBlock:
-        """Return the next samples, at most `n_samples`.
+        """Return the next block, of at most `n_samples` samples per channel.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Register contents of simulated devices: register maps, and block rings."""
+"""Register contents of simulated Modbus devices: values of a register map, slots of a ring."""
 
 import math
 import struct
@@ -26,7 +26,8 @@ class RegisterImage:
     Parameters
     ----------
     ranges
-        Full scale by value id, for values with full scale in registers; default -1000 to 1000.
+        Minimum and maximum by value id, for values whose full scale is stored in registers; -1000
+        and 1000 by default.
     """
 
     def __init__(
@@ -59,7 +60,7 @@ class RegisterImage:
         return None if len(found) < count else np.packbits(found, bitorder="little").tobytes()
 
     def put(self, cell: Cell, number: float) -> None:
-        """Write a raw number to a cell; an integer is clipped to the range of its type."""
+        """Write a raw number to a cell; for an integer type, round it and clip it to the range."""
         start = cell.start(self._base)
         if cell.function in BIT_FUNCTIONS:
             self._bits[cell.function, start] = bool(number)
@@ -80,7 +81,7 @@ class RegisterImage:
         self._words[place] = word | mask if are_set else word & ~mask
 
     def put_value(self, value: MapValue, number: float) -> None:
-        """Write a value in the unit of its channel; NaN is written as the invalid value."""
+        """Write a number in the unit of a value; NaN or infinity is written as a missing value."""
         wanted = (number - value.offset) / value.scale
         if value.scale_register is not None:
             scale = max(1.0, math.ceil(abs(wanted))) if math.isfinite(wanted) else 1.0
@@ -119,7 +120,7 @@ class RegisterImage:
         self.put_bits(flag.cell, number * flag.lowest_bit & flag.mask, True)
 
     def put_time(self, time_ns: int) -> None:
-        """Write the measurement time to its registers, if the map has a time."""
+        """Write the measurement time, in ns since 1970 UTC, if the map has registers for it."""
         time = self._map.time
         if time is None:
             return
@@ -143,7 +144,7 @@ class RegisterImage:
 
 
 def encoded(number: float, cell: Cell) -> bytes:
-    """Return the bytes of a number in the byte order of the registers of its cell."""
+    """Return a number as the register bytes of a cell, with the type and byte order of the cell."""
     dtype = np.dtype(DTYPES[cell.type])
     if cell.type not in FLOATS:
         limits = np.iinfo(dtype)
@@ -170,7 +171,7 @@ def no_value(value: MapValue) -> float:
 
 
 def encode_header(header: RingHeader) -> bytes:
-    """Return the header registers of a block ring with checksum, without the slow values."""
+    """Return the header of a block ring as big-endian words with checksum, without slow values."""
     ring = header.layout
     data = HEADER.pack(
         *(MAGIC, VERSION, ring.n_channels, ring.samples_per_slot, ring.n_slots),
@@ -181,7 +182,7 @@ def encode_header(header: RingHeader) -> bytes:
 
 
 def encode_slot(slot: Slot) -> bytes:
-    """Return the registers of one slot of a block ring, with checksum."""
+    """Return one slot of a block ring as big-endian words with checksum."""
     head = struct.pack(
         ">6I",
         *(slot.sequence, slot.first_index, slot.seconds, slot.microseconds),
@@ -193,5 +194,5 @@ def encode_slot(slot: Slot) -> bytes:
 
 
 def encode_slow(values: Sequence[float]) -> bytes:
-    """Return the slow values of a block ring as float32 registers."""
+    """Return slow values as big-endian float32 numbers, two registers each."""
     return np.asarray(values, dtype=">f4").tobytes()

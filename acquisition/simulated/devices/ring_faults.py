@@ -1,4 +1,4 @@
-"""Slot faults of a simulated block ring, and tracking of the slots that a client has read."""
+"""Slot faults of a simulated block ring, and tracker of the slots that a client has read."""
 
 from collections import deque
 from collections.abc import Callable, Mapping
@@ -53,7 +53,7 @@ SLOT_FAULTS: Mapping[str, SlotFault] = {
 
 
 class ReadingWatch:
-    """Tracking of the slots that a client has read, from its register requests.
+    """Tracker of the slots that a client has read, based on its register requests.
 
     A slot counts as read when its last register and those of all previous slots have been read. If
     a client reads the header, then the newest slot of this header, and then the header again, it
@@ -97,7 +97,7 @@ class ReadingWatch:
         self.waiting = not self._unread
 
     def note_read(self, asked: range) -> None:
-        """Record a read of the registers `asked`."""
+        """Record a read of the registers with the addresses `asked`."""
         ring = self._layout
         end = ring.ring_address + ring.slot_registers - 1
         first = -((end - asked.start) // ring.slot_stride)

@@ -17,7 +17,9 @@ _READ_BYTES = 4096
 
 
 class DaqServer(ABC):
-    """Server of a simulated device; a reusable context manager that opens and closes the link.
+    """Base class of the servers of simulated devices, as asynchronous context managers.
+
+    Entering opens the link, exiting closes it; a server can be entered again.
 
     Raises
     ------
@@ -38,7 +40,7 @@ class DaqServer(ABC):
         """Serve until cancelled, or until the end of the feed of the device."""
 
     def inject(self, fault: str, count: int = 1) -> None:
-        """Inject a fault of the device or of its link, `count` times.
+        """Inject the fault with the name `fault` into the device or its link, `count` times.
 
         Raises
         ------
@@ -69,7 +71,7 @@ class DaqServer(ABC):
 
     @abstractmethod
     def _faults_by_name(self) -> Mapping[str, Callable[[int], None]]:
-        """Return the available faults by name; the argument of each function is the count."""
+        """Return the functions that inject faults, by fault name; their argument is a count."""
 
     @abstractmethod
     def _jobs(self) -> list[Coroutine[Any, Any, None]]:

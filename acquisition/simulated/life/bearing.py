@@ -27,18 +27,20 @@ class LifeBearing:
     cold_clearance_um
         Radial clearance with shaft and housing at the same temperature.
     closing_um
-        Final decrease of the clearance at a running machine, where the shaft is warmer than the
+        Final decrease of the clearance in a running machine, where the shaft is warmer than the
         housing.
     opening_um
         Final outward displacement of the pads along one diameter at full load, when the magnetic
-        field of the generator has warmed the bracket arms (Figure 3); inward across it.
+        field of the generator has warmed the bracket arms (Figure 3). Along the perpendicular
+        diameter the displacement is inward.
     configured_clearance_um
         Clearance of the warm machine in the plant file; the reference of the eccentricity ratio.
-    oil_rise_c, oil_rise_at_load_c
-        Temperature rise of the oil above the cooling water at speed without load, and additional
-        rise at full load.
+    oil_rise_c
+        Temperature rise of the oil above the cooling water at speed without load.
+    oil_rise_at_load_c
+        Additional temperature rise of the oil at full load.
     oil_time_s, closing_time_s, opening_time_s
-        Time constants of a running machine.
+        Time constants of oil temperature, closing and opening while the machine runs.
     """
 
     id: str
@@ -107,19 +109,19 @@ LIFE_BEARINGS = (LIFE_UJB, LIFE_LJB, LIFE_TJB)
 
 
 STANDING_TIME_FACTOR = 10.0
-"""Ratio of the time constants at standstill, without oil flow, to those of running."""
+"""Ratio of the time constants at standstill, without oil flow, to those while running."""
 
 STANDING_OIL_C = 3.0
-"""Final temperature of the oil above the water at standstill: the hall temperature."""
+"""Final oil temperature above the cooling water at standstill: that of the machine hall."""
 
 WATER_MEAN_C = 22.5
 WATER_SEASON_C = 4.5
-"""Mean and seasonal amplitude of the water of the Paraná at Itaipu, warmest in February."""
+"""Mean and seasonal amplitude of the Paraná's temperature at Itaipu; warmest in February."""
 
 WARMEST_DAY = 45.0
 
 CLOSING_RMS, CLOSING_TIME_S = 0.006, 6.0 * DAY_S
-"""Relative rms and time constant of the closing: 1 µm of 165 µm, the effect of 0.1 K."""
+"""Random variation of the closing, relative rms and time constant: 1 µm of 165 µm, as by 0.1 K."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +142,7 @@ class ThermalCourse:
 
 
 def draw_water_c(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Draw the temperature of the cooling water, with season and weather, (n,)."""
+    """Draw the temperature of the cooling water in °C, with season and weather, (n,)."""
     n, step_s = len(operation), operation.step_s
     year = (operation.time_ns / NS_PER_S - WARMEST_DAY * DAY_S) / YEAR_S
     season = WATER_SEASON_C * np.cos(2.0 * math.pi * year)
@@ -149,7 +151,7 @@ def draw_water_c(random: np.random.Generator, operation: Operation) -> FloatArra
 
 
 def draw_closing_share(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Draw the ratio of closing to `LifeBearing.closing_um`, which air and water change, (n,)."""
+    """Draw the ratio of the closing to `LifeBearing.closing_um`, with random variation, (n,)."""
     n, step_s = len(operation), operation.step_s
     return 1.0 + wander(random, n, step_s, CLOSING_TIME_S, CLOSING_RMS)
 
@@ -162,7 +164,7 @@ def thermal_course(
     oil_offset_c: FloatArray | float = 0.0,
     initial_oil_c: float | None = None,
 ) -> ThermalCourse:
-    """Return the thermal course of a bearing, from a cold start.
+    """Return oil temperature and clearance changes of a bearing over time, from a cold start.
 
     Parameters
     ----------

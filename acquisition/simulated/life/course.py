@@ -1,4 +1,4 @@
-"""Simulated life as a course of scenarios for live samples, and its history until now."""
+"""Simulated life of a unit: scenarios over time for live samples, and readings until now."""
 
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -32,7 +32,7 @@ but the excitation is negligible too."""
 
 
 class LifeCourse:
-    """Operating conditions of a simulated unit over time, interpolated between the grid times.
+    """Operating conditions of a simulated unit over time, interpolated between 10-minute steps.
 
     Standstill is included: forces decrease with the square of the speed, so that only transducer
     noise, gaps and oil temperatures remain.
@@ -42,7 +42,7 @@ class LifeCourse:
     damage
         Damage, which begins at its exact onset, not at the next reading.
     machine
-        Unit to be sampled; see `scenario_at`.
+        Unit to be sampled, as in `scenario_at`.
     start_ns
         Time of the first sample.
 
@@ -81,7 +81,7 @@ class LifeCourse:
         return self._inputs.operation.rated_speed_rpm
 
     def at(self, elapsed_s: float) -> Scenario:
-        """Return the scenario at a time after the first sample.
+        """Return the scenario at `elapsed_s` seconds after the first sample.
 
         Raises
         ------
@@ -210,7 +210,7 @@ def history_until(plan: LifePlan, now_ns: int, years: float = 1.0) -> UnitLife:
 def course_from(
     plan: LifePlan, now_ns: int, machine: Unit, noise: TransducerNoise = TRANSDUCER_NOISE
 ) -> LifeCourse:
-    """Return the course of the life of `history_until` from `now_ns` to the end of next year.
+    """Return the life of `history_until` from `now_ns` to the end of next year, as scenarios.
 
     Raises
     ------
@@ -230,6 +230,6 @@ def _inputs(plan: LifePlan, now_ns: int) -> LifeInputs:
 
 
 def _last_new_year_ns(now_ns: int) -> int:
-    """Return the time of 1 January of last year, UTC."""
+    """Return the start of last year (UTC), in ns since 1970."""
     year = datetime.fromtimestamp(now_ns // NS_PER_S, UTC).year - 1
     return int(datetime(year, 1, 1, tzinfo=UTC).timestamp()) * NS_PER_S

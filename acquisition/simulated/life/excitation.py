@@ -1,4 +1,4 @@
-"""Unbalance, hydraulic force and vortex rope of a life, and the response at 1×."""
+"""Unbalance, hydraulic force and vortex rope in a simulated life, and the response at 1×."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -34,7 +34,9 @@ GRADE_WANDER, GRADE_TIME_S = 0.03, 5.0 * 86_400.0
 
 NO_LOAD_FORCE_N = 6.0e3
 FULL_LOAD_FORCE_N = 20.0e3
-"""Rms of the broadband hydraulic force; at full load as in the accuracy trial of the design."""
+"""Rms of the broadband hydraulic force without load and at full load.
+
+The force at full load is that of the accuracy trial of the design."""
 
 VORTEX_LOADS = (0.35, 0.65)
 """Load range with a vortex rope in a Francis turbine, as a share of rated power (320 MW of 700 MW
@@ -42,7 +44,7 @@ in Brito et al., section 3.2)."""
 
 VORTEX_FORCE_N = 60.0e3
 VORTEX_TURBULENCE = 1.6
-"""Factor of the broadband hydraulic force in this load range."""
+"""Factor of the broadband hydraulic force in the load range `VORTEX_LOADS`."""
 
 
 def warm_unbalance(operation: Operation) -> FloatArray:
@@ -53,7 +55,7 @@ def warm_unbalance(operation: Operation) -> FloatArray:
 
 
 def draw_grade_mm_s(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Draw the residual unbalance of a balanced machine as an ISO balance grade, (n,)."""
+    """Draw the residual unbalance of a balanced machine as an ISO grade in mm/s, (n,)."""
     cold_mm_s = random.uniform(*BALANCED_GRADES_MM_S) / WARM_UNBALANCE
     magnetic = 1.0 + MAGNETIC_UNBALANCE * operation.load
     slow = wander(random, len(operation), operation.step_s, GRADE_TIME_S, GRADE_WANDER)
@@ -61,14 +63,17 @@ def draw_grade_mm_s(random: np.random.Generator, operation: Operation) -> FloatA
 
 
 def has_vortex(load: FloatArray) -> FloatArray:
-    """Return 1 with and 0 without vortex rope, with linear edges of 5 % of rated power, (n,)."""
+    """Return the relative strength of the vortex rope at given loads, from 0 to 1, (n,).
+
+    The load range has linear edges of 5 % of rated power.
+    """
     low, high = VORTEX_LOADS
     rising = np.clip((load - low) / 0.05, 0.0, 1.0)
     return rising * np.clip((high - load) / 0.05, 0.0, 1.0)
 
 
 def hydraulic_force_n(load: FloatArray) -> FloatArray:
-    """Return the rms of the broadband hydraulic force in each direction, (n,)."""
+    """Return the rms of the broadband hydraulic force in each direction at given loads, (n,)."""
     smooth_n = NO_LOAD_FORCE_N + (FULL_LOAD_FORCE_N - NO_LOAD_FORCE_N) * np.clip(load, 0.0, 1.0)
     return smooth_n * (1.0 + (VORTEX_TURBULENCE - 1.0) * has_vortex(load))
 
@@ -84,7 +89,7 @@ def order1_um_pk(
     grade_mm_s: FloatArray,
     rotor: RotorParameters,
 ) -> dict[str, ComplexArray]:
-    """Return the 1x response to an unbalance at the mass centre, by the model of `plant.rotor`.
+    """Return the response at 1× to an unbalance at the mass centre, by the model of `plant.rotor`.
 
     Brackets are eliminated: with D = K + iΩC of the film and b = k_b − m_b Ω² of the bracket, the
     stiffness of the support is (D⁻¹ + b⁻¹)⁻¹, which reduces ten equations to four.
@@ -96,6 +101,7 @@ def order1_um_pk(
     speed_rpm
         Rated speed; its variation is negligible.
     grade_mm_s : (n,)
+        Unbalance as an ISO balance grade.
 
     Returns
     -------
@@ -129,7 +135,7 @@ def rotor_of(ids: tuple[str, ...]) -> RotorParameters:
 
 
 def shaft_motion(height_m: float) -> FloatArray:
-    """Return the map from X, Y, φ_x, φ_y to the shaft motion (x, y) at a height (Table 3)."""
+    """Return the matrix from X, Y, φ_x, φ_y to shaft motion x, y at a height (Table 3), (2, 4)."""
     return np.array([[1.0, 0.0, 0.0, height_m], [0.0, 1.0, -height_m, 0.0]])
 
 

@@ -1,4 +1,4 @@
-"""Oil films of a life: pad clearances and stiffness; row selection in column dataclasses."""
+"""Oil films of a simulated life: clearances and stiffness; rows of dataclasses of arrays."""
 
 import math
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from core.arrays import FloatArray
 
 UNIT_CLEARANCE_RMS = 0.02
 PAD_CLEARANCE_RMS = 0.01
-"""Relative rms of the clearance between machines and between pads: accuracy of the wedges."""
+"""Relative rms differences in clearance between machines and between pads: wedge accuracy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +52,12 @@ class FilmCourse:
 
 
 def even_setting(bearing: LifeBearing) -> PadSetting:
-    """Return a setting with the nominal cold clearance at all pads."""
+    """Return pad clearances that all equal the nominal cold clearance of the bearing."""
     return PadSetting(np.full(bearing.ring.n_pads, bearing.cold_clearance_um))
 
 
 def draw_setting(random: np.random.Generator, bearing: LifeBearing) -> PadSetting:
-    """Draw random pad clearances of one machine."""
+    """Draw random pad clearances of a bearing, as set in one machine."""
     each = 1.0 + PAD_CLEARANCE_RMS * random.standard_normal(bearing.ring.n_pads)
     whole = 1.0 + UNIT_CLEARANCE_RMS * random.standard_normal()
     angle_rad = float(random.uniform(0.0, math.pi))
@@ -73,13 +73,16 @@ def film_course(
     altered: Alteration | None = None,
     worn: int = 0,
 ) -> FilmCourse:
-    """Return the film, clearance and shaft position over time.
+    """Return film stiffness, mean clearance and shaft position of a bearing over time.
 
     Parameters
     ----------
     speed_rpm : (n,)
+        Running speed.
     centre_um : (2, n)
-        Shaft position without damage; growing clearance scales it.
+        Shaft position without damage; it increases in proportion to a clearance grown by damage.
+    altered
+        Effect of damage; None without damage.
     worn
         Index of the pad with a worn pivot.
     """
@@ -125,18 +128,19 @@ Column: TypeAlias = npt.NDArray[Any]
 
 
 def rows_of(columns: T, rows: npt.NDArray[np.bool_]) -> T:
-    """Return a column dataclass with selected rows of all arrays.
+    """Return a copy of a dataclass of arrays, with selected rows of all arrays.
 
     Parameters
     ----------
     rows : (n,)
-        Mask of the selected rows. Arrays with a last axis of another length are unchanged.
+        Mask of the selected rows. Rows lie along the last axis; arrays with a last axis of another
+        length are unchanged.
     """
     return _mapped(columns, rows.size, lambda value: value[..., rows])
 
 
 def row_between(columns: T, n: int, row: int, share: float) -> T:
-    """Return a column dataclass of one row, interpolated between two rows.
+    """Return a copy of a dataclass of arrays with one row, interpolated between two rows.
 
     Parameters
     ----------

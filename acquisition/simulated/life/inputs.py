@@ -1,4 +1,4 @@
-"""Random inputs of a life: operation, temperatures, shaft position and transducer errors."""
+"""Random inputs of a simulated life: operation, temperatures, positions, transducer errors."""
 
 from dataclasses import dataclass
 
@@ -25,12 +25,12 @@ RATED_SPEEDS_RPM = (92.3, 90.9)
 
 @dataclass(frozen=True, eq=False)
 class BearingInputs:
-    """Inputs of one bearing at evenly spaced times, without damage.
+    """Simulation inputs of one bearing at evenly spaced times, without damage.
 
     Parameters
     ----------
     position_um : (2, n)
-        Shaft position without damage.
+        Position of the shaft centre relative to the bearing centre.
     worn_pad
         Index of the pad nearest to the median shaft position while turning.
     """
@@ -45,12 +45,14 @@ class BearingInputs:
 
 @dataclass(frozen=True, eq=False)
 class LifeInputs:
-    """Inputs of one unit at evenly spaced times.
+    """Simulation inputs of one unit at evenly spaced times.
 
     Parameters
     ----------
-    water_c, grade_mm_s : (n,)
-        Cooling water temperature and ISO balance grade.
+    water_c : (n,)
+        Cooling water temperature.
+    grade_mm_s : (n,)
+        Residual unbalance as an ISO balance grade.
     noise
         Seeds of the random errors of the readings, in the order of `bearings`.
     """
@@ -77,7 +79,9 @@ def draw_inputs(
     Parameters
     ----------
     start_ns
-        Midnight in the time zone of the plant.
+        Time of the first row: midnight in the time zone of the plant.
+    held
+        Operation at constant load; None for random starts and stops.
 
     Raises
     ------
@@ -107,7 +111,7 @@ def draw_inputs(
 
 
 def rated_speed_rpm(unit_seed: int) -> float:
-    """Return the rated speed of the unit with a seed."""
+    """Return the rated speed in r/min of the unit with a random seed."""
     return RATED_SPEEDS_RPM[unit_seed % 2]
 
 

@@ -1,4 +1,4 @@
-"""Simulation of years of readings of a unit, with the true state."""
+"""Simulation of years of stiffness readings of a unit, together with the true state."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ from core.baseline.history import ReadingOutcome, StiffnessHistory
 
 
 def ln_stiffness(film: FilmColumns) -> FloatArray:
-    """Return the logarithm of the direct stiffness in x and y, (2, n)."""
+    """Return the natural logarithm of the direct stiffness in x and y, in N/m, (2, n)."""
     return np.log(np.stack([film.k_xx_n_per_m, film.k_yy_n_per_m]))
 
 
@@ -40,11 +40,12 @@ def readings(
     chain: Chain,
     operation: Operation,
 ) -> StiffnessHistory:
-    """Return the readings of one bearing at all rows of `operation`; the shaft turns at all rows.
+    """Return the simulated readings of one bearing at all rows of `operation`.
 
-    Stiffness is force divided by motion, k = |X_b| / |U| · k_b with the configured k_b (Brito et
-    al., equation 5; other estimators compute the ratio differently). Errors of accelerometer, probe
-    and bracket therefore affect the stiffness.
+    The shaft must turn at all rows. Stiffness is force divided by motion, k = |X_b| / |U| · k_b
+    with bracket motion X_b, film motion U and the configured bracket stiffness k_b (Brito et al.,
+    equation 5; other estimators compute the ratio differently). Errors of accelerometer, probe and
+    bracket stiffness therefore affect it.
     """
     n = len(operation)
     probe_gain = chain.probe_gain[:, np.newaxis] * truth.altered.probe_gain
@@ -136,9 +137,9 @@ def live(
     Parameters
     ----------
     start_ns
-        Midnight in the time zone of the plant.
+        Start of the life: midnight in the time zone of the plant.
     held
-        Operation at a constant load; by default random starts and stops.
+        Operation at constant load; None for random starts and stops.
 
     Raises
     ------
@@ -168,12 +169,12 @@ def require_known_bearings(damage: tuple[Damage, ...], bearings: tuple[LifeBeari
 def life_of(
     inputs: LifeInputs, damage: tuple[Damage, ...], turns: npt.NDArray[np.bool_]
 ) -> UnitLife:
-    """Return the true state and the readings of a life.
+    """Return the true state and the readings of the life with the given inputs and damage.
 
     Parameters
     ----------
     turns : (n,)
-        Mask of the selected rows; the shaft turns at all selected rows.
+        Mask of the selected rows, at which the shaft must turn.
     """
     turning, grade_mm_s = rows_of(inputs.operation, turns), inputs.grade_mm_s[turns]
     lives = [_bearing_life(one, turns, turning, damage) for one in inputs.bearings]

@@ -1,4 +1,4 @@
-"""Scenario of a simulated unit at one time of its life, for samples at 600 Hz."""
+"""Scenario of a simulated unit at one time of its life, for the simulation of samples."""
 
 from collections.abc import Iterator
 
@@ -32,11 +32,11 @@ HYDRAULIC_CUTOFF_HZ = 20.0
 def scenario_at(
     life: UnitLife, time_ns: int, machine: Unit, noise: TransducerNoise = TRANSDUCER_NOISE
 ) -> Scenario:
-    """Return the steady scenario at the newest reading up to a time.
+    """Return the scenario of steady operation at the newest reading not later than `time_ns`.
 
     The transducer errors are those of the readings. At bearings with four probes, which separate
-    growth from displacement, the gaps include thermal growth. At bearings with two probes, the gaps
-    show the displacement that four probes would measure.
+    thermal growth from shaft displacement, the gaps include thermal growth. At bearings with two
+    probes, the gaps show the displacement that four probes would measure.
 
     Parameters
     ----------
@@ -72,12 +72,12 @@ def scenario_at(
 
 
 def growing(machine: Unit) -> frozenset[str]:
-    """Return the ids of the bearings with four probes, which separate growth from displacement."""
+    """Return the ids of the bearings with four probes, whose gaps include thermal growth."""
     return frozenset(b.id for b in machine.bearings if b.opposite_reference_um is not None)
 
 
 def row_at(life: UnitLife, time_ns: int) -> int:
-    """Return the row of the newest reading up to a time.
+    """Return the row of the newest reading not later than `time_ns`.
 
     Raises
     ------
@@ -93,12 +93,15 @@ def row_at(life: UnitLife, time_ns: int) -> int:
 
 
 def hydraulic_noise(load: float) -> HydraulicNoise:
-    """Return the broadband hydraulic force at a load, as a share of rated power."""
+    """Return the broadband hydraulic force at a load, given as a share of rated power."""
     return HydraulicNoise(float(hydraulic_force_n(np.array([load]))[0]), HYDRAULIC_CUTOFF_HZ)
 
 
 def vortex_rope(load: float) -> VortexRope:
-    """Return the vortex rope at a load, as a share of rated power; zero force outside its range."""
+    """Return the vortex rope at a load, given as a share of rated power.
+
+    Its force is zero outside `VORTEX_LOADS`.
+    """
     return VortexRope(VORTEX_FORCE_N * float(has_vortex(np.array([load]))[0]))
 
 
@@ -132,7 +135,7 @@ def bearing_at(
 def channels_at(
     truth: BearingMoments, row: int, bearing: Bearing
 ) -> Iterator[tuple[str, ChannelScenario]]:
-    """Yield the channel ids of a bearing with their transducers at one row."""
+    """Yield id and true transducer properties of each channel of a bearing at one row."""
     probe_gain, accelerometer_gain = _probe_gain(truth, row), _accelerometer_gain(truth, row)
     near, far = bearing.channels[:2], (bearing.opposite_x, bearing.opposite_y)
     for axis in range(2):
@@ -156,9 +159,10 @@ def _accelerometer_gain(truth: BearingMoments, row: int) -> FloatArray:
 
 
 def _position_error_um(truth: BearingMoments, row: int) -> FloatArray:
-    """Return the gap error before the probe gain that reproduces the errors of the readings, (2,).
+    """Return the position error in µm that reproduces the errors of the readings, (2,).
 
-    In the readings mean gaps have a separate gain, that of four probes combined.
+    It is the error before the probe gain. In the readings, mean gaps have a separate gain, that of
+    the four probes combined.
     """
     centre_um, chain = truth.centre_um[:, row], truth.chain
     read_um = chain.gap_gain * truth.altered.probe_gain[:, row] * centre_um

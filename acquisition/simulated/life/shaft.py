@@ -1,4 +1,4 @@
-"""Shaft position in the bearings of a life, and changes of the operating condition."""
+"""Shaft position in the bearings over a simulated life, and changes of operating condition."""
 
 import math
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ WARM_C, COLD_C = 3.0, -3.0
 def four_fold(
     start_ns: int, days: float = 30.0, *, stiffer: bool = True
 ) -> tuple[ConditionChange, ConditionChange]:
-    """Return two changes that make the films four times as stiff, or as soft, without damage.
+    """Return two condition changes that make healthy films about four times stiffer, or softer.
 
     For `days` before `start_ns` the shaft runs near the centre in warm oil, then for `days` at high
     eccentricity in cold oil; in reverse order if not `stiffer`. The factor is 3.5 to 8 in the most
@@ -66,7 +66,7 @@ def four_fold(
 def cooling_failure(
     start_ns: int, days: float = 5.0, oil_offset_c: float = 12.0
 ) -> ConditionChange:
-    """Return a change with oil warmer than in any healthy history."""
+    """Return a condition change by a failed cooler: oil warmer than in any healthy history."""
     return ConditionChange(start_ns, start_ns + round(days * DAY_NS), oil_offset_c=oil_offset_c)
 
 
@@ -93,7 +93,7 @@ def draw_positions_um(
     bearings: tuple[LifeBearing, ...],
     changes: tuple[ConditionChange, ...] = (),
 ) -> dict[str, FloatArray]:
-    """Draw the position of the shaft centre relative to the bearing centre, (2, n) by bearing."""
+    """Draw the shaft centre positions relative to the bearing centres, (2, n) by bearing id."""
     n, step_s = len(operation), operation.step_s
     which = change_rows(random, n, step_s, LEVEL_INTERVAL_S)
     common = random.standard_normal(n)
@@ -119,7 +119,7 @@ def _reflected(level: FloatArray) -> FloatArray:
 
 
 def _deviation(random: np.random.Generator, operation: Operation) -> FloatArray:
-    """Return the deviation from the level by starts, load and random variation, (n,)."""
+    """Draw the deviation of the eccentricity ratio from its level, (n,): by starts, load, noise."""
     n, step_s = len(operation), operation.step_s
     run = np.cumsum(np.isin(np.arange(n), operation.starts)).astype(np.float64)
     by_start = held(START_RMS * random.standard_normal(n), run)

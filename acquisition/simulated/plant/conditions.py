@@ -16,11 +16,14 @@ class Conditions:
 
     Parameters
     ----------
-    centre_um, position_error_um
-        (n_bearings, 2) position of the shaft centre relative to the bearing centre, and error of
-        the gaps.
-    oil_temperature_c, oil_temperature_error_c
-        (n_bearings,) oil temperature, and error of the thermometers.
+    centre_um
+        (n_bearings, 2) position of the shaft centre relative to the bearing centre.
+    position_error_um
+        (n_bearings, 2) error of the position as measured by the gaps.
+    oil_temperature_c
+        (n_bearings,) true oil temperature.
+    oil_temperature_error_c
+        (n_bearings,) error of the thermometers.
     gap_growth_um
         (n_bearings,) common growth of all gaps of a bearing.
     gain
@@ -37,7 +40,7 @@ class Conditions:
 
 
 def between(start: Conditions, stop: Conditions, fraction: float) -> Conditions:
-    """Return conditions interpolated linearly; `fraction` 0 is `start`, 1 is `stop`."""
+    """Interpolate conditions linearly; return `start` at `fraction` 0, and `stop` at 1."""
 
     def part(name: str) -> FloatArray:
         a, b = getattr(start, name), getattr(stop, name)
@@ -49,12 +52,14 @@ def between(start: Conditions, stop: Conditions, fraction: float) -> Conditions:
 
 
 class SlowWander:
-    """First-order Gauss-Markov variation about the means of a scenario, step by step.
+    """Slow random variation of conditions about the means of a scenario (first-order Gauss-Markov).
 
     Parameters
     ----------
-    growth_random, random
-        Random generators of the gap growth, and of all other quantities.
+    random
+        Random generator of all quantities except the gap growth.
+    growth_random
+        Random generator of the gap growth.
     scenario
         Scenario of the first step; it sets the rms of the variation, which does not change later.
     """
@@ -78,7 +83,7 @@ class SlowWander:
         self._growth = _Wander(growth_random, memory, np.array(growth_rms))
 
     def now(self, scenario: Scenario) -> Conditions:
-        """Return the conditions at the current step, about the means of a scenario."""
+        """Return the conditions at the current step: means of a scenario with random variation."""
         bearings = [scenario.bearings[b.id] for b in self._machine.bearings]
         mean = [centre for b in bearings for centre in (b.centre_x_um, b.centre_y_um)]
         mean += [b.oil_temperature_c for b in bearings] + [scenario.active_power_mw]
@@ -95,7 +100,7 @@ class SlowWander:
         )
 
     def advance(self) -> None:
-        """Advance by one step."""
+        """Advance the random variation by one step of `step_s`."""
         self._rest.advance()
         self._growth.advance()
 

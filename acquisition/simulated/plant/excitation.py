@@ -1,4 +1,4 @@
-"""Rotation of the shaft and forces on the rotor; results do not depend on the piece length."""
+"""Rotation of the shaft and forces on the rotor; both are independent of the requested lengths."""
 
 import math
 from typing import TypeAlias
@@ -11,7 +11,7 @@ from core.arrays import FloatArray
 from core.units import hz_from_rpm
 
 PARTS = ((0.5, 1.0), (0.3, 0.57), (0.2, 0.31))
-"""Sines of the speed variation: share of the total amplitude, and period in wander times."""
+"""Sines of the speed variation: share of total amplitude, and period divided by wander time."""
 
 CUTOFF_FILTER_ORDER = 4
 IMPULSE_SAMPLES_PER_CUTOFF_PERIOD = 20
@@ -20,7 +20,7 @@ IMPULSE_SAMPLES_PER_CUTOFF_PERIOD = 20
 class FollowedRotation:
     """Rotation of a shaft with a speed that is linear within each chunk.
 
-    Only sample indices of the newest chunk are valid.
+    Methods accept only sample indices of the newest chunk.
     """
 
     def __init__(self, rated_speed_rpm: float, rate_hz: float) -> None:
@@ -48,7 +48,7 @@ class FollowedRotation:
 
 
 class Rotation:
-    """Rotation of a shaft with slowly varying speed, as a closed function of the sample index.
+    """Rotation of a shaft with slowly varying speed, in closed form for any sample index.
 
     The variation is a sum of three slow sines, so that the angle is the exact integral of the
     speed, and the speed stays within its limits.
@@ -58,7 +58,7 @@ class Rotation:
     speed_wander
         Maximum relative deviation from the mean speed.
     wander_time_s
-        Period of the largest sine.
+        Period of the largest sine, in seconds.
     """
 
     def __init__(
@@ -150,7 +150,10 @@ class RopeForce:
 
 
 class HydraulicForce:
-    """Broadband hydraulic force: Gaussian, independent in x and y, white or low-pass filtered."""
+    """Broadband hydraulic force: Gaussian, independent in x and y, low-pass filtered or white.
+
+    The force is white if `cutoff_hz` is None.
+    """
 
     def __init__(
         self, random: np.random.Generator, rms_n: float, cutoff_hz: float | None, rate_hz: float
@@ -195,7 +198,7 @@ def _low_pass(cutoff_hz: float, rate_hz: float) -> FloatArray:
 
 
 def force_planes(scenario: Scenario) -> list[ForcePlane]:
-    """Return the planes with forces, in the order of `ForcePlane`; each costs computing time."""
+    """Return the planes on which forces act in a scenario, in the order of `ForcePlane`."""
     used = {ForcePlane.MASS_CENTRE, ForcePlane.RUNNER, scenario.hydraulic.plane}
     return [plane for plane in ForcePlane if plane in used]
 
@@ -234,11 +237,11 @@ class Forces:
         self._n_planes = len(planes)
 
     def advance(self, n_samples: int, start: Scenario, stop: Scenario) -> FloatArray:
-        """Return the forces at the next samples, during the transition between two scenarios.
+        """Return the forces at the next samples, during a linear transition between two scenarios.
 
         Returns
         -------
-        (2 · n_planes, n_samples) in newtons.
+        (2 · n_planes, n_samples) in newtons: x and y of each plane.
         """
         total = np.zeros((self._n_planes, 2, n_samples))
         sizes = zip(self._sizes_n(start), self._sizes_n(stop), strict=True)
@@ -258,7 +261,7 @@ class Forces:
 
 
 def straight(start: float, stop: float, n_samples: int) -> FloatArray | float:
-    """Return a linear ramp over a chunk, without its end point; one number if it is constant."""
+    """Return a linear ramp over a chunk, (n_samples,), without its end; one number if constant."""
     if start == stop:
         return start
     return np.linspace(start, stop, n_samples, endpoint=False)

@@ -12,7 +12,7 @@ from core.checks.channels import COUNTS_FULL_SCALE
 from core.samples.calibration import UnitCalibration
 
 RAIL_HIT_SPACING = 997
-"""Samples between two rail hits; a prime, so that their position in blocks varies."""
+"""Number of samples between two rail hits; a prime, so that their position in blocks varies."""
 
 RAILS = (COUNTS_FULL_SCALE - 1, -COUNTS_FULL_SCALE)
 
@@ -37,7 +37,7 @@ class Fault:
     Parameters
     ----------
     from_sample
-        Sample index at which the fault begins.
+        Index of the first faulty sample.
     """
 
     kind: FaultKind
@@ -45,12 +45,12 @@ class Fault:
 
 
 class FaultInjector:
-    """Fault injection into the counts of one unit.
+    """Injector of permanent channel faults into the converter counts of one unit.
 
     Parameters
     ----------
     faults
-        Faults by row of the counts, applied one after another.
+        Faults by channel row of the counts; those of one channel are applied in sequence.
     """
 
     def __init__(self, random: np.random.Generator, faults: Mapping[int, Sequence[Fault]]) -> None:
@@ -105,7 +105,7 @@ def _broken(
 
 
 def to_counts(readings: FloatArray, calibration: UnitCalibration) -> CountArray:
-    """Convert readings to integer counts, clipped at the rails.
+    """Convert readings to int16 counts, rounded and clipped to the range of the converter.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ import numpy as np
 from core.arrays import FloatArray
 
 DAMPING_OVER_STIFFNESS_S = 0.0125
-"""Factor α of proportional damping c = α k (Brito et al., section 2.2.1, after Cardinali)."""
+"""Factor α in s of proportional damping c = α k (Brito et al., section 2.2.1, after Cardinali)."""
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Film:
     def effective_stiffness_n_per_m(self, frequency_rad_s: float) -> tuple[float, float]:
         """Return the magnitudes ``|k_xx + iωc_xx|`` and ``|k_yy + iωc_yy|``.
 
-        Equation (5) of Brito et al. estimates these magnitudes if cross-coupling is negligible.
+        In N/m. Equation (5) of Brito et al. estimates them if cross-coupling is negligible.
         """
         return (
             math.hypot(self.k_xx_n_per_m, frequency_rad_s * self.c_xx_n_s_per_m),
@@ -87,7 +87,7 @@ class FilmColumns:
     k_yy_n_per_m: FloatArray
 
     def at(self, row: int) -> Film:
-        """Return the film of one row.
+        """Return stiffness and damping of the film at one row.
 
         Damping is proportional to the full stiffness matrix, because the squeeze film of a tilting
         pad has the same factor μ/h³ as the sliding film.
@@ -143,9 +143,13 @@ class PadRing:
         Parameters
         ----------
         pad_clearance_um : (n_pads, n) or (n_pads, 1)
+            Film thickness at each pivot with a centred shaft.
         centre_um : (2, n)
             Position of the shaft centre relative to the bearing centre.
-        viscosity_pa_s, speed_rpm : (n,)
+        viscosity_pa_s : (n,)
+            Dynamic viscosity of the oil.
+        speed_rpm : (n,)
+            Running speed.
 
         Raises
         ------
@@ -207,14 +211,16 @@ KELVIN_AT_0_C = 273.15
 
 @dataclass(frozen=True)
 class Oil:
-    """Temperature-dependent viscosity and density of an oil.
+    """Oil with temperature-dependent viscosity and density.
 
     The defaults are Lubrax Turbina Plus 50 as in Brito et al., Table 1.
 
     Parameters
     ----------
-    viscosity_40_pa_s, viscosity_100_pa_s
-        Dynamic viscosity at 40 °C and 100 °C.
+    viscosity_40_pa_s
+        Dynamic viscosity at 40 °C.
+    viscosity_100_pa_s
+        Dynamic viscosity at 100 °C.
     expansion_per_k
         Relative decrease of density per kelvin; 6.5e-4 is usual for mineral oils.
 

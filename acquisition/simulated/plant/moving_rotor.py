@@ -28,7 +28,7 @@ which is below their noise."""
 
 
 class MovingRotor:
-    """Rotor on films and brackets that follow a course of scenarios; outputs transducer motion.
+    """Rotor on time-varying films and brackets, which returns the motion at the transducers.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def _rows(scenario: Scenario) -> Iterator[tuple[float, ...]]:
 
 
 def _change(before: FloatArray, after: FloatArray) -> float:
-    """Return the largest change relative to the largest value of its row."""
+    """Return the largest change of a coefficient, divided by the largest coefficient of its row."""
     scale = np.maximum(np.max(np.abs(before), axis=1), np.max(np.abs(after), axis=1))
     change = np.max(np.abs(after - before), axis=1)
     return float(np.max(np.divide(change, scale, out=np.zeros_like(change), where=scale > 0.0)))

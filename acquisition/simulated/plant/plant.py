@@ -14,10 +14,12 @@ from core.machine.unit import Unit
 from core.units import hz_from_rpm
 
 CHUNK_SAMPLES = 64 * LIFTED_STEPS
-"""Length of a chunk, so that random numbers do not depend on the requested lengths."""
+"""Number of samples that are simulated together, so that random numbers do not depend on the
+requested block lengths."""
 
 WARM_UP_S = 15.0
-"""Warm-up time: transients of films of 0.3 GN/m decay to 1e-7 (7 % damping at 3 Hz)."""
+"""Simulated time before the first chunk, in which transients decay: to 1e-7 with films of 0.3 GN/m
+(7 % damping at 3 Hz)."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,10 @@ class Chunk:
     ----------
     readings
         (n_channels, CHUNK_SAMPLES) in engineering units.
+    start
+        Conditions at the first sample.
+    stop
+        Conditions one sample after the last.
     first_index
         Index of the first sample, counted from the start of the warm-up.
     scenario
@@ -75,7 +81,7 @@ class SimulatedPlant:
         self._warm_index = self._index
 
     def advance(self) -> Chunk:
-        """Return the next chunk."""
+        """Simulate and return the next chunk."""
         first_index, scenario = self._index, self._scenario
         elapsed_s = (first_index + CHUNK_SAMPLES - self._warm_index) / self._rate_hz
         start, following = self._wander.now(scenario), self._course.at(elapsed_s)
@@ -86,7 +92,7 @@ class SimulatedPlant:
         return Chunk(readings, start, stop, first_index, scenario)
 
     def speed_rpm(self, chunk: Chunk, offset: int) -> float:
-        """Return the speed at the sample `offset` of the newest chunk."""
+        """Return the speed in r/min at the sample `offset` of `chunk`, which must be the newest."""
         index = np.array([float(chunk.first_index + offset)])
         return self._course.rated_speed_rpm * float(self._rotation.relative_speed(index)[0])
 

@@ -27,11 +27,13 @@ class Probe:
     Parameters
     ----------
     row
-        Row of the channel.
+        Index of the probe's channel in the unit.
     slow_channel
-        Slow channel of the mean gap; None if the unit has no such channel.
-    bearing, axis
-        Index of the bearing, and axis of the probe: 0 is x, 1 is y.
+        Id of the slow channel of the mean gap; None if the unit has no such channel.
+    bearing
+        Index of the bearing in the unit.
+    axis
+        Axis of the probe: 0 is x, 1 is y.
     opposite
         Whether the probe is on the negative axis, opposite the main probe.
     reference_um
@@ -52,7 +54,7 @@ class Probe:
         return self.channel.measurand is Measurand.GAP_UM
 
     def gap_um(self, now: Conditions) -> float:
-        """Return the mean gap, including the position error."""
+        """Return the mean gap in µm under given conditions, including the position error."""
         place = self.bearing, self.axis
         shift_um = float(now.centre_um[place] + now.position_error_um[place])
         growth_um = float(now.gap_growth_um[self.bearing])
@@ -79,9 +81,9 @@ def probes(machine: Unit) -> Iterator[Probe]:
 
 
 def standing_gap_um(machine: Unit, now: Conditions | None = None) -> FloatArray:
-    """Return the mean reading of each channel, (n_channels,): gap of gap probes, otherwise zero.
+    """Return the mean reading of each channel, (n_channels,): mean gap of gap probes, others zero.
 
-    Without conditions the shaft is centred.
+    If `now` is None, the shaft is centred.
     """
     reading_um = np.zeros(len(machine.channels))
     for probe in probes(machine):
@@ -91,7 +93,7 @@ def standing_gap_um(machine: Unit, now: Conditions | None = None) -> FloatArray:
 
 
 class ShaftRunout:
-    """Runout of the shaft surface under the probes of each bearing."""
+    """Runout of the shaft surface in the signals of the probes."""
 
     def __init__(self, machine: Unit, scenario: Scenario) -> None:
         self._phasors: dict[int, ComplexArray] = {}
@@ -162,7 +164,7 @@ def output_map(machine: Unit, parameters: RotorParameters, matrices: RotorMatric
 def _motion_maps(
     parameters: RotorParameters, matrices: RotorMatrices
 ) -> dict[tuple[str, Measurand], FloatArray]:
-    """Return the maps from the state to the signals of Table 3 (Brito et al.), (6, 20) each."""
+    """Return the matrices from the state to the signals of Table 3 (Brito et al.), (6, 20) each."""
     shaft, bracket = relative_motion(parameters), bracket_motion(parameters)
     still = np.zeros_like(shaft)
     shaft_um = 1e6 * np.hstack([shaft, still])
@@ -178,7 +180,7 @@ def _motion_maps(
 
 
 def _places(machine: Unit, parameters: RotorParameters) -> dict[str, tuple[str, int]]:
-    """Return part and row of each channel in the motion maps: two rows per bracket."""
+    """Return part (shaft or bearing) and row in its motion map of each channel, by channel id."""
     names = [bracket.bearing for bracket in parameters.brackets]
     places = {}
     for bearing in machine.bearings:

@@ -24,9 +24,9 @@ CARE_ABOVE_BAND = 1e-3
 
 
 class ResponseFilter:
-    """Filter with the frequency response of one transducer, applied to successive pieces.
+    """Filter with the frequency response of one transducer, for successive pieces of a signal.
 
-    The initial state is the steady state for the first sample.
+    The initial filter state is the steady state for a constant signal equal to the first sample.
 
     Raises
     ------
@@ -47,13 +47,13 @@ class ResponseFilter:
             )
 
     def advance(self, samples: FloatArray) -> FloatArray:
-        """Filter the next samples of the signal, (n_samples,)."""
+        """Filter the next samples of the signal; return the filtered samples, (n_samples,)."""
         for stage in self._stages:
             samples = stage.advance(samples)
         return samples
 
     def response_at(self, frequency_hz: FloatArray, rate_hz: float) -> ComplexArray:
-        """Return the frequency response of the filter, (n_lines,)."""
+        """Return the complex frequency response of the filter at given frequencies, (n_lines,)."""
         factor = np.ones(frequency_hz.shape, dtype=np.complex128)
         for stage in self._stages:
             factor *= _response(stage.numerator, stage.denominator, frequency_hz, rate_hz)
@@ -86,7 +86,7 @@ def _parts(response: Response) -> list[HighPass | Resonance | ResponseTable]:
 def _section(
     response: HighPass | Resonance | ResponseTable, rate_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return numerator and denominator of the digital filter of one response."""
+    """Return numerator and denominator coefficients of the digital filter for one response."""
     match response:
         case HighPass(corner_hz, order=1):
             return _fitted(response, [-2.0 * np.pi * corner_hz], order=1, rate_hz=rate_hz)
@@ -108,7 +108,10 @@ def _pole_pair(natural_hz: float, damping: float) -> list[complex]:
 def _fitted(
     response: Response, poles: Sequence[complex], order: int, rate_hz: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a filter with the given poles, `order` zeros at 0 Hz and fitted further zeros."""
+    """Return numerator and denominator of a filter with given poles, `order` zeros at 0 Hz.
+
+    Further zeros are fitted to the frequency response.
+    """
     denominator, zeros = _polynomial(np.exp(np.array(poles) / rate_hz)), _polynomial(np.ones(order))
     frequency_hz = np.linspace(0.1, 0.45 * rate_hz, 10 * N_POINTS)
     shape = _response(zeros, denominator, frequency_hz, rate_hz)
@@ -129,7 +132,7 @@ def _polynomial(roots: ComplexArray | FloatArray) -> FloatArray:
 
 
 def _taps(columns: ComplexArray, wanted: FloatArray) -> FloatArray:
-    """Return the real least-squares solution of complex equations."""
+    """Return the real least-squares solution t of the complex equations columns · t = wanted."""
     taps: FloatArray = np.linalg.lstsq(
         np.vstack([columns.real, columns.imag]),
         np.concatenate([wanted, np.zeros_like(wanted)]),

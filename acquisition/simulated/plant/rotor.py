@@ -15,7 +15,7 @@ N_SHAFT_COORDINATES = 4
 """Number of shaft coordinates: position X, Y of the mass centre and tilts φ_x, φ_y."""
 
 UNBALANCE_REFERENCE_FORCE_N = 75.6e3
-"""Unbalance force of grade G4.25 at 92.3 r/min, derived from Table 4 of Brito et al."""
+"""Unbalance force of ISO balance grade G4.25 at 92.3 r/min, from Table 4 of Brito et al."""
 UNBALANCE_REFERENCE_GRADE_MM_S = 4.25
 UNBALANCE_REFERENCE_SPEED_RPM = 92.3
 
@@ -50,9 +50,11 @@ class RotorParameters:
     magnetic_stiffness_n_per_m
         Stiffness of the air gap of the generator. Table 2 gives -0.60e9 for the excited machine;
         the default and the simulations of Brito et al. are for the machine without excitation.
-    thrust_stiffness_n_per_m, thrust_radius_m
-        Axial stiffness of the thrust bearing and radius of its pad circle. Brito et al. do not
-        describe its effect; their tables are reproduced if the pads resist tilt.
+    thrust_stiffness_n_per_m
+        Axial stiffness of the thrust bearing. Brito et al. do not describe its effect; their tables
+        are reproduced if the thrust pads resist tilt.
+    thrust_radius_m
+        Radius of the circle of the thrust pads.
     """
 
     rotor_mass_kg: float = 2.37e6
@@ -86,7 +88,7 @@ class ForcePlane(StrEnum):
 
 
 def unbalance_force_n(grade_mm_s: float, speed_rpm: float) -> float:
-    """Return the unbalance force at a speed, for an ISO balance grade at 92.3 r/min.
+    """Return the unbalance force in N at a speed, for an ISO balance grade at 92.3 r/min.
 
     The force of an unbalanced mass is proportional to the square of the speed.
     """
@@ -136,19 +138,22 @@ def rotor_matrices(
 
 
 def relative_motion(parameters: RotorParameters) -> FloatArray:
-    """Return the map to u_x, u_y of each bearing, shaft minus bracket, (6, 10) (Table 3)."""
+    """Return the matrix from coordinates to u_x, u_y of each bearing (Table 3), (6, 10).
+
+    u is shaft minus bracket motion.
+    """
     return np.vstack(
         [_shaft_motion(parameters, b.height_m) for b in parameters.brackets]
     ) - bracket_motion(parameters)
 
 
 def bracket_motion(parameters: RotorParameters) -> FloatArray:
-    """Return the map from coordinates to bracket motion x_b, y_b of each bearing, (6, 10)."""
+    """Return the matrix from coordinates to bracket motion x_b, y_b of each bearing, (6, 10)."""
     return np.eye(parameters.n_coordinates)[N_SHAFT_COORDINATES:]
 
 
 def force_map(parameters: RotorParameters, plane: ForcePlane) -> FloatArray:
-    """Return the map from a radial force (x, y) in a plane to generalized forces, (10, 2)."""
+    """Return the matrix from a radial force (x, y) in a plane to generalized forces, (10, 2)."""
     height_m = {
         ForcePlane.MASS_CENTRE: 0.0,
         ForcePlane.GENERATOR: parameters.generator_height_m,
@@ -158,7 +163,7 @@ def force_map(parameters: RotorParameters, plane: ForcePlane) -> FloatArray:
 
 
 def forward_force(parameters: RotorParameters, plane: ForcePlane, force_n: float) -> ComplexArray:
-    """Return the generalized phasor of a forward force (F cos ωt, F sin ωt) in a plane, (10,)."""
+    """Return the generalized force phasor of (F cos ωt, F sin ωt) in a plane, (10,)."""
     rotating: ComplexArray = np.array([force_n, -1j * force_n])
     return force_map(parameters, plane) @ rotating
 

@@ -20,10 +20,11 @@ class BearingScenario:
         Mean position of the shaft centre relative to the bearing centre.
     centre_wander_um_rms
         Slow random variation of the shaft position, in each direction.
-    gap_growth_um, gap_growth_wander_um_rms
+    gap_growth_um
         Common growth of all gaps of the bearing, relative to the centred shaft at reference
-        temperature, and its slow random variation; positive if the housing grows more than the
-        shaft.
+        temperature; positive if the housing grows more than the shaft.
+    gap_growth_wander_um_rms
+        Slow random variation of the gap growth.
     runout_um_pk
         Runout of the shaft surface, 1×, 2×, …: phasors at the x probe, locked to the shaft. The
         other probes measure the same surface with a delay. Positive is towards the probe.
@@ -74,6 +75,8 @@ class VortexRope:
 
     Parameters
     ----------
+    force_n
+        Amplitude of the force; 0 without vortex rope.
     order
         Mean frequency as a multiple of the running speed; nominally 0.25.
     line_width_hz
@@ -105,7 +108,7 @@ class KeyPhasePulse:
 
 @dataclass(frozen=True)
 class TransducerNoise:
-    """Noise of the transducers, by measurand.
+    """Noise of the transducers, with one parameter for each measurand.
 
     Parameters
     ----------
@@ -135,7 +138,7 @@ class ChannelScenario:
     Parameters
     ----------
     response
-        Complex frequency response, a model and not a table; None is flat.
+        Complex frequency response, given by a model, not by a table; None is flat.
     gain
         Ratio of true to nominal sensitivity. The reference gap of a probe was measured with the
         probe itself, so the gain applies to the difference from the reference gap.
@@ -151,7 +154,7 @@ class ChannelScenario:
 
 @dataclass(frozen=True)
 class Scenario:
-    """Scenario of one unit in steady operation; also a constant `Course`.
+    """Simulated conditions of one unit in steady operation; also a `Course` that is constant.
 
     Parameters
     ----------
@@ -165,7 +168,7 @@ class Scenario:
         Maximum relative deviation of the running speed from `speed_rpm`; 0.003 is 0.3 %. Film and
         gyroscopic forces are computed at `speed_rpm`.
     channels
-        Imperfect transducers, by channel id.
+        Transducers that are not ideal, by channel id.
     exchanged
         Pairs of channels with swapped cables.
     """
@@ -201,7 +204,7 @@ class Scenario:
         return self.speed_rpm
 
     def at(self, elapsed_s: float) -> "Scenario":  # noqa: ARG002  steady operation
-        """Return this scenario."""
+        """Return this scenario, which is the same at all times."""
         return self
 
     def channel(self, id_: str) -> ChannelScenario:
@@ -210,7 +213,7 @@ class Scenario:
 
 
 class Course(Protocol):
-    """Sequence of scenarios over time.
+    """Protocol of a sequence of scenarios of one unit over time.
 
     Films, brackets, forces, speed and the fields of `Conditions` may change between two scenarios;
     all other values remain those of the first scenario. The unit interpolates linearly between two
@@ -223,5 +226,8 @@ class Course(Protocol):
         ...
 
     def at(self, elapsed_s: float) -> Scenario:
-        """Return the scenario at a time after the first sample; the times of calls increase."""
+        """Return the scenario at `elapsed_s` seconds after the first sample.
+
+        The times of successive calls increase.
+        """
         ...

@@ -36,12 +36,13 @@ def slow_values(machine: Unit, now: Conditions, speed_rpm: float) -> dict[str, f
 
 @dataclass(frozen=True)
 class BearingTruth:
-    """True state of one bearing.
+    """True state of one simulated bearing at one instant.
 
     Parameters
     ----------
     k_eff_xx_n_per_m, k_eff_yy_n_per_m
-        Magnitude ``|k + iΩc|`` at the running speed (estimated by Brito et al., equation 5).
+        Effective stiffness ``|k + iΩc|`` in x and y at the running speed Ω (Brito et al.,
+        equation 5).
     eccentricity
         Distance of the shaft centre from the bearing centre divided by the clearance.
     gap_growth_um
@@ -63,7 +64,7 @@ class BearingTruth:
 
 @dataclass(frozen=True)
 class UnitTruth:
-    """True state of a unit at one instant."""
+    """True state of a simulated unit at one instant; bearings by id."""
 
     speed_rpm: float
     active_power_mw: float
@@ -71,7 +72,7 @@ class UnitTruth:
 
 
 def unit_truth(machine: Unit, scenario: Scenario, now: Conditions, speed_rpm: float) -> UnitTruth:
-    """Return the true state of a unit at one instant."""
+    """Return the true state of a simulated unit under given conditions and at a given speed."""
     brackets = {b.bearing: b.stiffness_n_per_m for b in scenario.true_rotor.brackets}
     bearings = {}
     for index, bearing in enumerate(machine.bearings):
@@ -162,7 +163,7 @@ class SimulatedUnit:
         )
 
     def begin_at(self, start_ns: int) -> None:
-        """Set the time of sample 0, because the construction of many units takes time."""
+        """Set the time of sample 0 again, for example after the slow set-up of many units."""
         self._start_ns = start_ns
 
     def truth(self) -> UnitTruth:
@@ -213,7 +214,7 @@ def _faults(machine: Unit, scenario: Scenario, seed: int) -> FaultInjector:
 
 
 def _exchanged(machine: Unit, calibration: UnitCalibration, scenario: Scenario) -> list[list[int]]:
-    """Return the pairs of rows with swapped cables."""
+    """Return the pairs of channel rows with swapped cables."""
     rows = {channel.id: row for row, channel in enumerate(machine.channels)}
     pairs = []
     for pair in scenario.exchanged:
