@@ -128,7 +128,7 @@ class AlarmModel(ApiModel):
     """Whether the newest occurrence is acknowledged."""
 
     is_latched: bool
-    """Whether the alarm is latched: its condition has cleared, but it stays active until a reset."""
+    """Whether the alarm is latched: its condition has cleared, but it is active until a reset."""
 
     is_chattering: bool
     """Whether the alarm was chattering in the last ten minutes: raised often in a short time."""
@@ -181,7 +181,7 @@ class AlarmCountModel(ApiModel):
     """Number of active alarms that are not hidden (shelved, suppressed or out of service)."""
 
     n_danger: int
-    """Number of these active alarms at level danger."""
+    """Number of these active alarms whose level is danger."""
 
     n_unacknowledged: int
     """Number of alarms that are not hidden and whose newest occurrence is unacknowledged."""
@@ -190,7 +190,7 @@ class AlarmCountModel(ApiModel):
     """Number of alarms that are shelved, suppressed or out of service."""
 
     n_unjudged: int
-    """Number of alarms that are not active and whose condition is unknown."""
+    """Number of alarms that are neither active nor hidden and whose condition is unknown."""
 
 
 class AlarmListModel(DatedAnswer):
@@ -354,7 +354,7 @@ def _raised_at(point: OperatingPoint | None, grid: CellGrid) -> RaisedAtModel | 
 
 
 def _urgency(alarm: Alarm) -> tuple[bool, bool, int, int]:
-    """Return a sort key: hidden alarms last; otherwise by acknowledgement, level, and newest first."""
+    """Return the sort key of an alarm: unacknowledged, danger, newest first; hidden alarms last."""
     shown = alarm.shelf is None and alarm.outage is None and alarm.suppressed_by is None
     return (not shown, alarm.is_acknowledged, -(alarm.level or 0), -(alarm.raised_ns or 0))
 

@@ -71,7 +71,7 @@ class AlarmFiguresModel(ApiModel):
     """Alarms with the most announcements, at most ten, in descending order."""
 
     chattering: dict[AlarmIdText, int]
-    """Number of times each chattering alarm was raised while chattering, as the plant file defines."""
+    """Number of times each alarm was raised while chattering; the plant file defines chattering."""
 
     n_fleeting: int
     """Number of alarms that returned to normal within ``chattering_window_s`` of the plant file."""

@@ -98,7 +98,7 @@ RAISED_AT = {
 
 
 def event_table(events: Sequence[StoredEvent], grid: CellGrid) -> list[Column]:
-    """Return alarm events as columns: time in ``time_utc``, other columns named like JSON fields."""
+    """Return alarm events as table columns: ``time_utc``, and columns named like JSON fields."""
     rows = [event_model(stored, grid) for stored in events]
     times = Column("time_utc", "time", [stored.event.time_ns for stored in events])
     flat = [name for name in AlarmEventModel.model_fields if name not in ("time", "raised_at")]
@@ -145,7 +145,7 @@ COMMENT_PROBLEMS = ACTION_PROBLEMS | problem_responses(
 
 
 def alarm_router(context: Context) -> APIRouter:
-    """Return the router that reads alarms; add it after other routers with paths below ``/alarms``."""
+    """Return the router that reads alarms; it must follow other routers for ``/alarms/...``."""
     router = subject_router("/alarms", "alarms")
     engine, films, origin, clock = context.alarms, context.films, context.origin, context.clock
     listed = SharedAnswer(
@@ -218,7 +218,7 @@ def operation_router(context: Context) -> APIRouter:
 
     @router.post("/shelve", summary="Shelve", responses=ACTION_PROBLEMS)
     async def shelve(alarm: AlarmId, asked: ShelveModel) -> AlarmModel:
-        """Hide an alarm for a limited time; an alarm that is active afterwards is announced again."""
+        """Hide an alarm for a limited time; an alarm still active afterwards is announced again."""
         if asked.duration_s > context.max_shelf_s:
             detail = f"duration_s {asked.duration_s:g} is above {context.max_shelf_s:g}"
             raise ProblemError(422, "Wrong parameter", detail, "duration_s")

@@ -48,8 +48,7 @@ LevelHeldName = Literal["alert", "danger"]
 
 
 class FilmChangeModel(ApiModel):
-    """Mean deviation of the stiffness from the baseline, for the averaging time at which it is most
-    significant."""
+    """Mean deviation of stiffness from the baseline, at its most significant averaging time."""
 
     percent: Annotated[float, Field(examples=[-19.2])]
     """Change of stiffness, %; negative if the film is softer than the baseline."""
@@ -124,7 +123,7 @@ class FilmDirectionModel(ApiModel):
     """Reason why the film is not judged; "ok" if it is judged."""
 
     level: LevelHeldName | None
-    """Alarm level in force, also while the newest reading cannot be judged; null without a level."""
+    """Alarm level in force, also while the newest reading cannot be judged; null if none."""
 
     change: FilmChangeModel | None
     """Change of stiffness; null without a baseline, until the shortest averaging time has passed,
@@ -450,7 +449,7 @@ def film_router(context: Context) -> APIRouter:
         "", summary="A film now", response_model=FilmModel, responses=problem_responses(404)
     )
     async def film(unit: UnitId, bearing: BearingId) -> Response:
-        """Return verdict, change of stiffness and its cause in x and y, and the operating condition.
+        """Return verdict, change of stiffness and cause in x and y, and the operating condition.
 
         A film that cannot be judged is never reported as normal; its verdict states the reason.
         """
