@@ -58,13 +58,7 @@ class LiveState(Protocol):
         """Return the status of the data source of a unit."""
 
     def blocks(self, unit: str) -> Sequence[SampleBlock]:
-        """Return the buffered sample blocks of a unit, oldest first.
-
-        Raises
-        ------
-        NotAvailableError
-            If only the process that analyses the unit has the samples.
-        """
+        """Return the buffered blocks of a unit, oldest first; replicas raise NotAvailableError."""
 
     def newest_block(self, unit: str) -> SampleBlock | None:
         """Return the newest sample block of a unit; None without a block."""
@@ -76,12 +70,9 @@ class LiveState(Protocol):
         """Return the age of the newest sample block of a unit, s; None without a block."""
 
     def assessment(self, unit: str, bearing: str) -> Assessment | None:
-        """Return the newest result of a bearing with spectrum and orbit; None without a result.
+        """Return the newest result with spectrum and orbit; None before the first result.
 
-        Raises
-        ------
-        NotAvailableError
-            If only the process that analyses the unit has spectra and orbits.
+        Replicas raise `NotAvailableError`, since they have no spectra and orbits.
         """
 
     def current(self, unit: str, bearing: str) -> CurrentBearing:

@@ -151,13 +151,7 @@ class LoadWatch:
             )
 
     def refuses(self, refused_from: Refused) -> bool:
-        """Whether a request is refused at the current level; refused requests are counted.
-
-        Parameters
-        ----------
-        refused_from
-            Lowest level that refuses the request; `Refused.NOTHING` if it is never refused.
-        """
+        """Whether requests that are refused from a level are refused now; refusals are counted."""
         if refused_from is Refused.NOTHING or refused_from > self.refused:
             return False
         self.n_refused[refused_from] += 1

@@ -364,13 +364,7 @@ def require_samples(settings: UnitSettings) -> None:
 
 
 def held_blocks(live: LiveState, unit: str) -> tuple[Sequence[SampleBlock], float]:
-    """Return the buffered blocks of a unit, and the age of the newest block, s.
-
-    Raises
-    ------
-    ProblemError
-        With status 409 if no sample has arrived yet.
-    """
+    """Return the buffered blocks of a unit and the age of the newest, s; without any, raise 409."""
     blocks, age_s = live.blocks(unit), live.data_age_s(unit)
     if not blocks or age_s is None:
         raise ProblemError(409, "No samples", f"no sample of unit {unit!r} has arrived yet")

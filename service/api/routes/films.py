@@ -426,13 +426,7 @@ def level_name(level: int | None) -> LevelHeldName | None:
 
 
 def watched_place(context: Context, unit: str, bearing: str) -> FilmPlace:
-    """Return unit, bearing and estimator of a watched film.
-
-    Raises
-    ------
-    ProblemError
-        With status 404 for an unknown bearing, 409 if the film is not watched.
-    """
+    """Return unit, bearing and estimator of a film; raise a problem if the film is not watched."""
     context.bearing(unit, bearing)
     place = context.films.place(unit, bearing)
     if place is None:
