@@ -1,4 +1,4 @@
-"""Interface of the API to the running service: protocols, and `Context` with all parts."""
+"""Interfaces of the API to the running service, collected in `Context`."""
 
 import pathlib
 from collections.abc import Awaitable, Callable, Mapping, Sequence, Set

@@ -194,7 +194,7 @@ class AlarmCountModel(ApiModel):
 
 
 class AlarmListModel(DatedAnswer):
-    """Alarms that are not normal, and alarms whose condition is unknown."""
+    """List of alarms that are not normal, and of normal alarms whose condition is unknown."""
 
     origin: OriginName
     """Origin of the data: live, or replay of a recording."""

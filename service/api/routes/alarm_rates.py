@@ -53,7 +53,7 @@ class AlarmFiguresModel(ApiModel):
     """Mean number of announcements per day."""
 
     per_10_min: Annotated[float, Field(examples=[0.02])]
-    """Mean number of announcements in ten minutes."""
+    """Mean number of announcements per ten minutes."""
 
     most_in_10_min: int
     """Largest number of announcements in ten minutes."""
@@ -81,7 +81,7 @@ class AlarmRatesModel(ApiModel):
     """Alarm performance figures in a time range, and alarms active for more than a day."""
 
     start: Time
-    """Start of the range; later than requested if the requested range has too many events."""
+    """Start of the counted range; later than requested if there are too many events."""
 
     end: Time
     """End of the range."""

@@ -156,7 +156,7 @@ def alarm_router(context: Context) -> APIRouter:
 
     @router.get("", summary="All alarms that are not normal", response_model=AlarmListModel)
     async def alarms() -> Response:
-        """List alarms that are not normal, most urgent first, and alarms of unknown condition."""
+        """List alarms that are not normal, most urgent first; then those of unknown condition."""
         return await listed.answer()
 
     @router.get(

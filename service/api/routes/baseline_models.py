@@ -139,7 +139,7 @@ class BaselinesModel(BearingAnswer):
     """Whether an engineer has frozen learning."""
 
     renewed: Time | None
-    """Time of the newest machine event, after which readings are used; null without an event."""
+    """Time of the newest machine event; earlier readings are not used. Null without an event."""
 
     acceptance: Literal["automatic", "by_engineer"]
     """Acceptance of learned baselines: "automatic" if a baseline agrees with the previous one, or

@@ -243,7 +243,7 @@ def _waveform(
 def _extent(
     settings: UnitSettings, block: SampleBlock | None, rows: list[int], quality: Quality
 ) -> dict[str, Any]:
-    """Return the fields minimum, maximum and mean of a channel in a block; None as in the model."""
+    """Return minimum, maximum and mean of a channel in a block; each None without samples."""
     has_samples = not isinstance(settings.source, ModbusVectorSettings)
     if block is None or quality.level is Level.BAD or not has_samples:
         return {"minimum": None, "maximum": None, "mean": None}

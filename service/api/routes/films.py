@@ -96,7 +96,7 @@ class FilmCauseModel(ApiModel):
     """Cause of a change of stiffness, inferred from the motion of shaft and bearing."""
 
     cause: CauseName
-    """Origin of the change: film of this bearing, oil of all bearings, or bracket or transducer."""
+    """Cause: film of this bearing, oil of all bearings, bracket or transducer, or unknown."""
 
     reason: str
     """Reason why this cause was inferred."""

@@ -48,7 +48,7 @@ class ReceiverModel(ApiModel):
     """Server of a webhook, or mail address; null if the receiver is no longer in the plant file."""
 
     state: SenderStateName
-    """State of the loop that sends messages to the receiver."""
+    """State of the delivery of messages to the receiver."""
 
     is_failing: bool
     """Whether the newest delivery attempt failed."""
